@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.exports import save_geojson as save_geojson
     from maneuver_automaton.exports import save_rerun as save_rerun
     from maneuver_automaton.exports import save_ros2_bag as save_ros2_bag
+    from maneuver_automaton.fleet import DaskWorkers as DaskWorkers
     from maneuver_automaton.fleet import FleetHorizon as FleetHorizon
     from maneuver_automaton.fleet import FleetLog as FleetLog
     from maneuver_automaton.fleet import FleetProblem as FleetProblem
@@ -107,6 +108,7 @@ _HOMES = {
     "Car": "models",
     "CarWithTrailer": "models",
     "Cost": "costs",
+    "DaskWorkers": "fleet",
     "DesignedLibrary": "design",
     "Disc": "collision",
     "DispersedLibrary": "design",

@@ -199,7 +199,8 @@ def _compared(
 def _standing(plan: Plan, model: Model, stated: Stated) -> Drive:
     """Of a plan that lasts no time: one element of rest."""
     still = np.zeros((1, N, plan.start.size))
-    states = plan.trims[0].reduced_state if plan.trims else np.zeros(0)
+    # Without a trim it rests, with all at zero.
+    states = plan.trims[0].reduced_state if plan.trims else np.zeros(len(model.reduced_names))
     return Drive(
         plan=plan,
         model=model,

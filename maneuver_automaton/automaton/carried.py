@@ -45,8 +45,6 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
     >>> behind.start.tolist(), behind.end.round(9).tolist()
     ([-1.0, 0.0, 0.0], [-0.0, -1.0, 1.570796327])
     """
-    if not plan.trims:
-        return plan
     which = model.part_names.index(part)
     group = group_of(plan.start.size)
 
@@ -54,6 +52,9 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         """Where the part is, seen from the vehicle."""
         return group(np.asarray(model.part_poses(states)[..., which, :], dtype=np.float64))
 
+    if not plan.trims:  # it rests, with all at zero
+        behind = group(plan.start) @ frame(np.zeros(len(model.reduced_names)))
+        return replace(plan, start=behind.pose)
     states = np.array([trim.reduced_state for trim in plan.trims])
     adjoints = frame(states).inverse().adjoint()
     start = group(plan.start) @ frame(_first_state(plan))

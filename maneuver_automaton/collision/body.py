@@ -29,7 +29,7 @@ class Body(NamedTuple):
     half_width: float  # [m] of the narrowest piece
 
 
-@functools.lru_cache(maxsize=16)
+@functools.lru_cache(maxsize=1024)  # a fleet has as many as it has vehicles
 def body_of(footprint: tuple[Shape, ...]) -> Body:
     """Arrays of a footprint; a point if it is empty.
 

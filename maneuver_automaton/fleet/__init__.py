@@ -8,6 +8,7 @@ from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.fleet.agreement import Message as Message
+    from maneuver_automaton.fleet.asking import Workers as Workers
     from maneuver_automaton.fleet.driven import DrivenVerdict as DrivenVerdict
     from maneuver_automaton.fleet.driven import verify_driven as verify_driven
     from maneuver_automaton.fleet.horizon import FleetHorizon as FleetHorizon
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet.log import FleetStep as FleetStep
     from maneuver_automaton.fleet.log import FleetViolation as FleetViolation
     from maneuver_automaton.fleet.log import Swap as Swap
+    from maneuver_automaton.fleet.on_dask import DaskWorkers as DaskWorkers
     from maneuver_automaton.fleet.planning import plan_fleet as plan_fleet
     from maneuver_automaton.fleet.problem import FleetProblem as FleetProblem
     from maneuver_automaton.fleet.result import Closest as Closest
@@ -27,6 +29,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Message": "agreement",
+    "Workers": "asking",
     "DrivenVerdict": "driven",
     "verify_driven": "driven",
     "FleetHorizon": "horizon",
@@ -35,6 +38,7 @@ _HOMES = {
     "FleetStep": "log",
     "FleetViolation": "log",
     "Swap": "log",
+    "DaskWorkers": "on_dask",
     "plan_fleet": "planning",
     "FleetProblem": "problem",
     "Closest": "result",

@@ -1,4 +1,4 @@
-"""Who drives what, as each vehicle knows it, where messages may be lost.
+"""Who drives what, as each vehicle knows it, where messages may be lost, and where none is.
 
 A vehicle may drive another plan once all others have acknowledged it; until then the others keep
 clear of both, the one it drives and the one it asked for. Whatever message is lost, what a vehicle
@@ -8,9 +8,9 @@ held, and so ends all doubt.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Protocol
 
 from maneuver_automaton.fleet.vehicle import Found
 
@@ -29,6 +29,89 @@ class Message(NamedTuple):
 Lost = Callable[[Message], bool]
 
 
+class Knowledge(Protocol):
+    """What every vehicle expects of every other one: the plans that it may drive."""
+
+    sent: int  # messages
+
+    def start(self, held: Mapping[int, Found]) -> None:
+        """All know the plans that are driven at first."""
+
+    def begin(self, step: int, held: Mapping[int, Found]) -> None:
+        """A step begins: everybody says which plan it holds."""
+
+    def enter(self, k: int, found: Found, held: Mapping[int, Found]) -> bool:
+        """Let a vehicle in that holds a plan, if all others say that they know of it."""
+
+    def everything(self) -> Iterator[tuple[int, Found]]:
+        """All plans that somebody expects of a vehicle, with its number."""
+
+    def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
+        """Whether all others agree that a vehicle drives another plan than the one it holds."""
+
+    def announce(self, k: int, found: Found) -> None:
+        """A vehicle drives another plan, whether the others agree or not."""
+
+    def knows(self, j: int, k: int, found: Found) -> bool:
+        """Whether a vehicle expects a plan of another one."""
+
+    def others_of(self, k: int) -> Mapping[int, Sequence[Found]]:
+        """The plans that a vehicle expects of each of the others."""
+
+    def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
+        """Pairs of which the first does not expect of the second what that drives."""
+
+
+@dataclass(slots=True, eq=False)
+class AllHeard:
+    """No message is lost: everybody knows what all hold. Messages are counted, but not stored.
+
+    `near` says who may come near a vehicle with a plan: it speaks to nobody else.
+    """
+
+    near: Callable[[int, Found], int]
+    held: Mapping[int, Found] = field(default_factory=dict)
+    sent: int = 0
+
+    def start(self, held: Mapping[int, Found]) -> None:
+        """All know the plans that are driven at first."""
+        self.held = held
+
+    def begin(self, step: int, held: Mapping[int, Found]) -> None:
+        """A step begins; nobody has to say what all know."""
+        self.held = held
+
+    def enter(self, k: int, found: Found, held: Mapping[int, Found]) -> bool:
+        """Let a vehicle in that holds a plan."""
+        self.sent += 2 * self.near(k, found)
+        return True
+
+    def everything(self) -> Iterator[tuple[int, Found]]:
+        """All plans that are held."""
+        return iter(self.held.items())
+
+    def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
+        """All others agree: each that is near is asked, agrees, and is told."""
+        self.sent += 3 * self.near(k, found)
+        return True
+
+    def announce(self, k: int, found: Found) -> None:
+        """Each that is near is told, and says that it heard."""
+        self.sent += 2 * self.near(k, found)
+
+    def knows(self, j: int, k: int, found: Found) -> bool:
+        """Everybody knows."""
+        return True
+
+    def others_of(self, k: int) -> Mapping[int, Sequence[Found]]:
+        """The plans that all others hold."""
+        return {j: (one,) for j, one in self.held.items() if j != k}
+
+    def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
+        """Nothing is unknown."""
+        return []
+
+
 @dataclass(slots=True, eq=False)
 class Agreement:
     """What every vehicle expects of every other one: the plans that it may drive."""
@@ -37,6 +120,8 @@ class Agreement:
     lost: Lost | None = None
     tries: int = 3  # to be heard, and to hear an answer, in a step
     expected: dict[int, dict[int, list[Found]]] = field(default_factory=dict)
+    # Of whom an emergency was not heard: the first drives what the second does not expect.
+    unheard: set[tuple[int, int]] = field(default_factory=set)
     step: int = 0
     sent: int = 0
 
@@ -64,11 +149,17 @@ class Agreement:
         self.expected[k] = {j: [held[j]] for j in others}
         return True
 
+    def everything(self) -> Iterator[tuple[int, Found]]:
+        """All plans that somebody expects of a vehicle, with its number."""
+        for known in self.expected.values():
+            yield from ((j, one) for j, some in known.items() for one in some)
+
     def leave(self, k: int) -> None:
         """A vehicle is gone."""
         self.expected.pop(k, None)
         for others in self.expected.values():
             others.pop(k, None)
+        self.unheard = {pair for pair in self.unheard if k not in pair}
 
     def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
         """Whether all others agree that a vehicle drives another plan than the one it holds.
@@ -100,27 +191,52 @@ class Agreement:
         return False
 
     def announce(self, k: int, found: Found) -> None:
-        """A vehicle drives another plan, whether the others agree or not."""
-        self._tell(k, found, "drives")
+        """A vehicle drives another plan, whether the others agree or not.
+
+        It says so until each acknowledges it, some times. Whoever has not heard of it asks in vain
+        for another plan of its own: the vehicle refuses, as that is proven past its old one.
+        """
+        for j in self.expected:
+            if j == k:
+                continue
+            self.unheard.add((k, j))
+            for _ in range(self.tries):
+                if not self._say(k, j, "drives"):
+                    continue
+                self._expect(j, k, found)
+                if self._say(j, k, "agrees"):
+                    break
+
+    def knows(self, j: int, k: int, found: Found) -> bool:
+        """Whether a vehicle expects a plan of another one."""
+        return any(one.course is found.course for one in self.expected[j].get(k, ()))
+
+    def _expect(self, j: int, k: int, found: Found) -> None:
+        """A vehicle knows for sure what another one drives."""
+        self.expected[j][k] = [found]
+        self.unheard.discard((k, j))
 
     def others_of(self, k: int) -> dict[int, list[Found]]:
         """The plans that a vehicle expects of each of the others."""
         return self.expected[k]
 
     def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
-        """Pairs of which the first does not expect of the second what that drives."""
+        """Pairs of which the first does not expect of the second what that drives.
+
+        But for those that have not heard of an emergency.
+        """
         return [
             (j, k)
-            for j, others in self.expected.items()
+            for j in self.expected
             for k, found in held.items()
-            if k != j and not any(one.course is found.course for one in others.get(k, ()))
+            if k != j and (k, j) not in self.unheard and not self.knows(j, k, found)
         ]
 
     def _tell(self, sender: int, found: Found, kind: Kind) -> None:
         """A vehicle says to all others which plan it drives."""
         for receiver in self.expected:
             if receiver != sender and self._say(sender, receiver, kind):
-                self.expected[receiver][sender] = [found]
+                self._expect(receiver, sender, found)
 
     def _say(self, sender: int, receiver: int, kind: Kind) -> bool:
         """Whether a message arrives."""

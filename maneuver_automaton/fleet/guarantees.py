@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from maneuver_automaton.fleet.agreement import Agreement
-from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.agreement import Knowledge
+from maneuver_automaton.fleet.conflicts import Course, Meeting, meetings
 from maneuver_automaton.fleet.held import (
     CONTACT,
     LATER,
@@ -57,7 +57,7 @@ class After:
 
     time: float
     held: Mapping[int, Found]
-    courses: Mapping[int, Course]  # what is left of them
+    courses: Mapping[int, Course]  # what is left of those that are looked at
     off: Mapping[int, float]  # [m] beside the plans
     disturbed: set[int]  # who has another plan not by an exchange of its own
     in_group: set[int]  # who has another one by an exchange of several at once
@@ -65,10 +65,11 @@ class After:
     tube_m: float
     keep: float  # [m]
     frame: Frame
+    fresh: Mapping[int, Sequence[int]] | None = None  # who holds another plan, and who is near it
 
 
 def broken(
-    vehicles: Sequence[Vehicle], agreement: Agreement, before: Before, after: After
+    vehicles: Sequence[Vehicle], agreement: Knowledge, before: Before, after: After
 ) -> Iterator[FleetViolation]:
     """The guarantees that a step broke."""
     names = [one.name for one in vehicles]
@@ -77,7 +78,8 @@ def broken(
         if after.off[k] > after.tube_m:
             reason = f"it is {after.off[k]:.3g} m beside its plan, need at most {after.tube_m:g} m"
             yield FleetViolation(FleetGuarantee.HELD, (names[k],), reason)
-        if said := why_not_free(vehicles[k], after.courses[k]):
+        fresh = after.fresh is None or k in after.fresh
+        if fresh and (said := why_not_free(vehicles[k], after.courses[k])):
             yield FleetViolation(FleetGuarantee.STILL, (names[k],), said)
     yield from _dearer(vehicles, before, after)
     yield from _out_of_order(after.swaps)
@@ -87,13 +89,28 @@ def broken(
 
 
 def _too_near(names: Sequence[str], after: After) -> Iterator[FleetViolation]:
-    """Pairs that the kernel cannot prove apart, and the audit's bounds neither."""
-    for row in meetings(after.courses, keep=after.keep, frame=after.frame):
+    """Pairs that the kernel cannot prove apart, and the audit's bounds neither.
+
+    Only pairs of which one holds a plan that it did not hold a step ago, if these are given: the
+    others were proven apart for all later times.
+    """
+    for row in _met(after):
         least = nearest(after.courses[row.one], after.courses[row.other]).distance
         if least <= max(after.keep - CONTACT, CONTACT):
             pair = (names[row.one], names[row.other])
             reason = f"at {row.time:.6g} s they come within {least:.6g} m, need {after.keep:g} m"
             yield FleetViolation(FleetGuarantee.APART, pair, reason)
+
+
+def _met(after: After) -> list[Meeting]:
+    if after.fresh is None:
+        return meetings(after.courses, keep=after.keep, frame=after.frame)
+    found = {}
+    for k, others in after.fresh.items():
+        courses = {j: after.courses[j] for j in (k, *others)}
+        for row in meetings(courses, keep=after.keep, among=[k], frame=after.frame):
+            found[row.one, row.other] = row
+    return sorted(found.values(), key=lambda row: (row.time, row.one, row.other))
 
 
 def _dearer(vehicles: Sequence[Vehicle], before: Before, after: After) -> Iterator[FleetViolation]:
@@ -143,20 +160,28 @@ def gap_between(courses: Mapping[int, Course], *, keep: float, frame: Frame) -> 
     """
     if len(courses) < 2:
         return math.inf
-    if meetings(courses, keep=keep, frame=frame):
+    low, most, more = keep, keep + FAR, 2.0 * FINE
+    rows = meetings(courses, keep=most, frame=frame)
+    if not rows:
+        return most
+    near = sorted({k for row in rows for k in (row.one, row.other)})
+    among, courses = sorted({row.one for row in rows}), {k: courses[k] for k in near}
+
+    def met(wanted: float) -> bool:
+        return bool(meetings(courses, keep=wanted, among=among, frame=frame))
+
+    if met(keep):
         return 0.0
-    low, high, most, more = keep, math.inf, keep + FAR, 2.0 * FINE
-    while high == math.inf and low < most:
+    high = math.inf
+    while high == math.inf:
         wanted = min(low + more, most)
-        if meetings(courses, keep=wanted, frame=frame):
+        if wanted >= most or met(wanted):
             high = wanted
         else:
             low, more = wanted, 2.0 * more
-    if high == math.inf:
-        return low
     while high - low > FINE:
         middle = 0.5 * (low + high)
-        if meetings(courses, keep=middle, frame=frame):
+        if met(middle):
             high = middle
         else:
             low = middle

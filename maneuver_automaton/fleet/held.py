@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterator
@@ -47,7 +48,20 @@ def resting(vehicle: Vehicle, pose: Array, time: float) -> Found:
     rest = next((one for one in vehicle.problem.automaton.trims if one.is_rest), None)
     trims, lasting = ((), []) if rest is None else ((rest,), [0.0])
     plan = Plan(pose, trims, durations=lasting, start_time=time)
-    return Found(plan, math.inf, 0, vehicle.course_of(plan))
+    return _not_leading(vehicle, plan)
+
+
+def _not_leading(vehicle: Vehicle, plan: Plan) -> Found:
+    """A plan that does not arrive: the vehicle stays where it ends, also if it was to leave."""
+    return Found(plan, math.inf, 0, replace(vehicle.course_of(plan), until=math.inf))
+
+
+def given_up(found: Found) -> Found:
+    """A plan that is driven to its end, but does not arrive there."""
+    course = found.course
+    if course.until < math.inf:
+        course = replace(course, until=math.inf)
+    return replace(found, cost=math.inf, course=course)
 
 
 def leads(found: Found) -> bool:
@@ -60,6 +74,7 @@ def arrival(found: Found) -> float:
     return found.arrival if leads(found) else math.inf
 
 
+@functools.lru_cache(maxsize=4096)  # a step asks for the same ones several times
 def rest_of_plan(vehicle: Vehicle, found: Found, time: float) -> Plan:
     """What is left of a plan from a time on [s]."""
     plan = found.plan
@@ -69,6 +84,15 @@ def rest_of_plan(vehicle: Vehicle, found: Found, time: float) -> Plan:
     return tail_of(cut, time - plan.start_time)
 
 
+def begin_of(vehicle: Vehicle, plan: Plan, lasting: float) -> Plan:
+    """The first seconds of a plan."""
+    if not plan.trims or plan.duration <= lasting:
+        return plan
+    cut = with_samples_at(plan, [plan.start_time + lasting], vehicle.problem.automaton.model)
+    return head_of(cut, lasting)
+
+
+@functools.lru_cache(maxsize=4096)
 def left_to_pay(vehicle: Vehicle, found: Found, time: float) -> float:
     """Cost of what is left of a plan; inf if it does not arrive."""
     if not leads(found) or time <= found.plan.start_time:
@@ -85,15 +109,28 @@ def is_over(found: Found, time: float) -> bool:
 
 def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
     """How far any point of the body is from where its plan has it [m]: an upper bound."""
-    planned = found.plan.pose_at(time)
-    places = [0, 1, *range(3, pose.size)]
-    distance = float(np.linalg.norm(pose[places] - planned[places]))
-    turn = abs(math.remainder(float(pose[2] - planned[2]), 2.0 * math.pi))
-    reach = 0.0
-    for shapes, motion in zip(found.course.shapes, found.course.motions, strict=True):
-        beside = float(np.hypot(*(motion.at(time)[:2] - planned[:2])))
-        reach = max(reach, beside + body_of(shapes).reach)
-    return distance + 2.0 * reach * math.sin(min(turn, math.pi) / 2.0)
+    return float(beside(pose, found.plan.pose_at(time), reach_of(found, time)))
+
+
+def beside(poses: Array, planned: Array, reach: float) -> Array:
+    """How far any point of a body is from where it should be [m], at poses (..., dof)."""
+    gap = poses - planned
+    turn = np.abs(np.remainder(gap[..., 2] + math.pi, 2.0 * math.pi) - math.pi)
+    gap[..., 2] = 0.0
+    distance = np.sqrt((gap * gap).sum(axis=-1))
+    return np.asarray(distance + 2.0 * reach * np.sin(0.5 * np.minimum(turn, math.pi)))
+
+
+def reach_of(found: Found, time: float) -> float:
+    """How far any point of a vehicle is from its pose at a time of its plan [m]."""
+    bodies = [body_of(shapes) for shapes in found.course.shapes]
+    reaches = [math.hypot(body.middle_x, body.middle_y) + body.reach for body in bodies]
+    if len(reaches) == 1:
+        return reaches[0]
+    places = [motion.at(time)[:2] for motion in found.course.motions]
+    return max(
+        math.dist(place, places[0]) + reach for place, reach in zip(places, reaches, strict=True)
+    )
 
 
 def onward(
@@ -160,14 +197,18 @@ def proposal(
     budget: Budget,
     known: float,
     most: int,
+    keep: float = math.inf,
 ) -> tuple[Found | None, Found | None]:
     """Another plan past the others that costs less than `known`, and the way alone, if that does.
 
-    Both from a time on, with what is committed.
+    Both from a time on, with what is committed. They keep the vehicle's margin, or a distance [m]
+    that is less.
     """
     head, problem = onward(vehicle, found, time, after)
     if problem is None:
         return None, None
+    if keep < problem.margin:
+        problem = replace(problem, margin=keep)
     there = Vehicle(
         vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
     )
@@ -224,17 +265,17 @@ def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
         return resting(vehicle, pose, time)
     head, problem = onward(vehicle, found, time)
     if problem is None:  # it is driven to its end
-        return replace(found, cost=math.inf)
+        return given_up(found)
     plan = head
     if not problem.first_trim.is_rest:
         brake = _brake(problem)
         if brake is None:
-            return replace(found, cost=math.inf)
+            return given_up(found)
         plan = brake if head is None else joined(head, brake)
     if plan is None:
         return resting(vehicle, pose, time)
     plan = replace(plan, start=pose)
-    return Found(plan, math.inf, 0, vehicle.course_of(plan))
+    return _not_leading(vehicle, plan)
 
 
 def _brake(problem: Problem) -> Plan | None:
@@ -261,34 +302,53 @@ def _brake(problem: Problem) -> Plan | None:
     )
 
 
-def why_not_free(vehicle: Vehicle, course: Course) -> str:
+def why_not_free(vehicle: Vehicle, course: Course, keep: float = math.inf) -> str:
     """Why a course is not free of what is not of the fleet; empty if it is.
 
-    By the kernels, and where they cannot prove it by the audit's bounds.
+    By the kernels, and where they cannot prove it by the audit's bounds. It keeps the vehicle's
+    margin, or a distance [m] that is less.
     """
     problem = vehicle.problem
     if not problem.obstacles:
         return ""
+    keep = min(problem.margin, keep)
     frame = own_frame(problem.obstacles, problem.goals[0].pose)
     for shapes, motion in zip(course.shapes, course.motions, strict=True):
-        world = world_of(problem.obstacles, shapes, frame, keep=problem.margin)
+        world = world_of(problem.obstacles, shapes, frame, keep=keep)
         until = min(course.until, max(problem.quiet_after, float(motion.time[-1])) + 1.0)
         lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
         still = np.zeros((1, 3))
-        margin = PROVEN if problem.margin <= 0.0 else min(PROVEN, PROVEN_SHARE * problem.margin)
+        margin = PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep)
         free = free_times(
             world,
             world.into(motion.pose),
             twists=np.concatenate([motion.rates, still]),
             durations=lasting,
             margin=margin,
-            keep=problem.margin,
+            keep=keep,
             times=motion.time,
         )
         if (free >= lasting).all():
             continue
         plan = plan_of_motion(motion, until)
-        least = closest_to(plan, Omnidirectional(), problem.obstacles, footprint=shapes)
-        if least.distance <= max(problem.margin - CONTACT, CONTACT):
+        enough = max(keep - CONTACT, CONTACT)
+        least = closest_to(
+            plan, Omnidirectional(), problem.obstacles, footprint=shapes, enough=enough
+        )
+        if least.distance <= enough:
             return f"at {least.time:.6g} s it comes within {least.distance:.3g} m of an obstacle"
     return ""
+
+
+def distance_to_obstacles(vehicle: Vehicle, course: Course) -> float:
+    """A lower bound of the distance [m] of a course to what is not of the fleet."""
+    found = [
+        closest_to(
+            plan_of_motion(motion, max(float(motion.time[-1]), vehicle.problem.quiet_after)),
+            Omnidirectional(),
+            vehicle.problem.obstacles,
+            footprint=shapes,
+        ).distance
+        for shapes, motion in zip(course.shapes, course.motions, strict=True)
+    ]
+    return min(found, default=math.inf)

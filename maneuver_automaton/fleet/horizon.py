@@ -11,19 +11,25 @@ anybody on more than the order of swaps, and no plan is ever lost.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.fleet.agreement import Agreement, Lost
+from maneuver_automaton.collision.shapes import AnyObstacle
+from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, Lost
+from maneuver_automaton.fleet.asking import Workers
+from maneuver_automaton.fleet.held import given_up
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
 from maneuver_automaton.fleet.log import FleetStep
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
 from maneuver_automaton.fleet.vehicles import prepare_vehicles, vehicles_of
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Problem
 
 
 class FleetHorizon:
@@ -56,7 +62,11 @@ class FleetHorizon:
     time_limit : float
         [s] per step, for all searches.
     swaps_per_step : int, optional
-        Vehicles that look for a better plan in a step; all if omitted, as long as there is time.
+        So many vehicles look for a better plan in a step, by turns, those first that may gain most;
+        all if None, as long as there is time.
+    at_once : int
+        So many look at the same time, past the plans that are held then; each swap is proven past
+        those that were made before it.
     group_size : int
         Up to so many exchange their plans at once where the sum falls: some of them may then arrive
         later. Not where messages may be lost, over which several cannot agree to change at once.
@@ -64,6 +74,9 @@ class FleetHorizon:
         An answer comes so many steps late; meanwhile the plan that is held is driven.
     lost : callable, optional
         Whether a message is lost; none is if omitted.
+    workers : Workers, optional
+        Who looks for the vehicles' plans, such as `DaskWorkers`; this process if omitted. Whose
+        worker does not answer any more drives the plan that it holds.
 
     Raises
     ------
@@ -94,10 +107,12 @@ class FleetHorizon:
         margin: float = 0.0,
         tube_m: float | None = None,
         time_limit: float = 1.0,
-        swaps_per_step: int | None = None,
+        swaps_per_step: int | None = 2,
+        at_once: int = 1,
         group_size: int = 1,
         delay_steps: int = 0,
         lost: Lost | None = None,
+        workers: Workers | None = None,
     ) -> None:
         for name, value in (("step", step), ("time_limit", time_limit)):
             if not value > 0.0:
@@ -109,7 +124,8 @@ class FleetHorizon:
                 f"fleet horizon: tube_m is {tube_m:g} m, need at most half of the margin of the "
                 f"fleet, {fleet.margin:g} m: two bodies may both be off their plans"
             )
-        for name, count in (("group_size", group_size), ("swaps_per_step", swaps_per_step)):
+        counts = {"group_size": group_size, "swaps_per_step": swaps_per_step, "at_once": at_once}
+        for name, count in counts.items():
             if count is not None and count < 1:
                 raise ValueError(f"fleet horizon: {name} must be at least 1, got {count}")
         if delay_steps < 0:
@@ -124,15 +140,24 @@ class FleetHorizon:
                 tube_m=0.5 * fleet.margin if tube_m is None else tube_m,
                 time_limit=time_limit,
                 swaps_per_step=swaps_per_step,
+                at_once=at_once,
                 group_size=group_size if lost is None else 1,
                 delay_steps=delay_steps,
             ),
             vehicles,
-            Agreement(fleet.names, lost),
+            self._knowledge(lost),
             _plans_of(first, vehicles),
+            workers=workers,
         )
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
+        # What is prepared for obstacles that vehicles have got since, which are kept alive.
+        self._workspaces: dict[tuple[int, ...], tuple[tuple[AnyObstacle, ...], Workspace]] = {}
         prepare_vehicles(vehicles)
+
+    def _knowledge(self, lost: Lost | None) -> Knowledge:
+        if lost is not None:
+            return Agreement(self.fleet.names, lost)
+        return AllHeard(lambda k, found: self._under_way.how_many_near(k, found))
 
     def step(
         self,
@@ -173,8 +198,47 @@ class FleetHorizon:
             )
         stopped = {self._number_of(name) for name in broken_down}
         budget = Budget.from_now(state.settings.time_limit)
-        state.last = FleetStepUnderWay(state, at, poses, budget).run(stopped)
+        self._under_way = FleetStepUnderWay(state, at, poses, budget)
+        state.last = self._under_way.run(stopped)
         return state.last
+
+    def assign(self, name: str, problem: Problem) -> None:
+        """Give a vehicle another problem from the next step on: another goal, other obstacles.
+
+        It drives the plan that it holds, to its end, until it has one that leads to the new goal.
+        Among the obstacles must be all that this plan passes: it is not proven again.
+
+        Parameters
+        ----------
+        name : str
+        problem : Problem
+            Its start is no matter; automaton and body are those of before.
+
+        Raises
+        ------
+        ValueError
+            If no vehicle has that name, the margin is less than that of all before, or the time
+            is fixed.
+        """
+        k, state = self._number_of(name), self.state
+        old = state.vehicles[k]
+        if problem.margin < min(one.margin for one in self.fleet.problems):
+            raise ValueError(
+                f"vehicle {name!r}: its margin is {problem.margin:g} m, need at least the least "
+                "of the fleet: the others are seen larger by what that lacks"
+            )
+        (new,) = vehicles_of(FleetProblem([problem], leaves=[old.leaves]))
+        key = tuple(map(id, problem.obstacles))
+        kept = self._workspaces.setdefault(key, (problem.obstacles, new.workspace))[1]
+        own = replace(new.problem, obstacles=kept.obstacles)
+        state.vehicles[k] = Vehicle(k, name, own, old.leaves, old.grown, kept)
+        state.arrived.discard(k)
+        for known in (state.settled, state.in_vain, state.due, state.attempts, state.gains):
+            known.pop(k, None)
+        if k in state.held:
+            state.held[k] = given_up(state.held[k])
+            state.lineage[k] += 1
+            state.assigned.add(k)
 
     def _number_of(self, name: str) -> int:
         if name not in self._numbers:

@@ -86,6 +86,7 @@ class FleetStep:
     violations: tuple[FleetViolation, ...]
     solve_s: float
     distance_m: float = math.inf  # least of any two bodies along what was driven, measured
+    silent: tuple[str, ...] = ()  # whose workers do not answer: they drive the plans that they hold
 
     __repr__ = brief
 

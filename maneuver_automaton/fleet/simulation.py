@@ -14,6 +14,7 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_at
 from maneuver_automaton.fleet.agreement import Lost
+from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.horizon import FleetHorizon
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetLog, FleetStep, FleetViolation
 from maneuver_automaton.fleet.planning import plan_fleet
@@ -48,10 +49,12 @@ def simulate_fleet(
     margin: float = 0.0,
     tube_m: float | None = None,
     time_limit: float = 1.0,
-    swaps_per_step: int | None = None,
+    swaps_per_step: int | None = 2,
+    at_once: int = 1,
     group_size: int = 1,
     delay_steps: int = 0,
     lost: Lost | None = None,
+    workers: Workers | None = None,
     joins_s: Mapping[str, float] = NEVER,
     breaks_s: Mapping[str, float] = NEVER,
     progress: Callable[[FleetStep], None] | None = None,
@@ -72,7 +75,7 @@ def simulate_fleet(
         Of the disturbances and the first plans.
     first : FleetResult, optional
         Plans to begin with; those of `plan_fleet` if omitted, within `first_time_limit` [s].
-    margin, tube_m, time_limit, swaps_per_step, group_size, delay_steps, lost
+    margin, tube_m, time_limit, swaps_per_step, at_once, group_size, delay_steps, lost, workers
         As in `FleetHorizon`.
     joins_s : mapping of str to float
         When vehicles appear at their starts [s]; each joins as soon as there is room.
@@ -120,9 +123,11 @@ def simulate_fleet(
         tube_m=tube_m,
         time_limit=time_limit,
         swaps_per_step=swaps_per_step,
+        at_once=at_once,
         group_size=group_size,
         delay_steps=delay_steps,
         lost=lost,
+        workers=workers,
     )
     drives = [_Drive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)]
     world = _World(loop, drives, step, dict(joins_s), dict(breaks_s))
@@ -236,7 +241,15 @@ class _World:
     def is_over(self) -> bool:
         """Whether all that can have arrived."""
         names = {one.vehicle.name for one in self.drives}
-        return not names - set(self.arrived_s) - self.broken
+        return not names - set(self.arrived_s) - self.broken - self._stuck
+
+    @property
+    def _stuck(self) -> set[str]:
+        """Whose workers are gone, and whose plans do not arrive."""
+        if not self.steps:
+            return set()
+        values = self.steps[-1].values
+        return {name for name in self.steps[-1].silent if values[name] == math.inf}
 
     def advance(self, number: int) -> FleetStep:
         """One step: measure, decide, drive."""
@@ -290,6 +303,8 @@ class _World:
         names = {one.vehicle.name for one in self.drives}
         left = names - set(self.arrived_s) - self.broken
         status, reason = "reached", ""
+        of_loop = self.loop.state.workers
+        workers = {} if of_loop is None else of_loop.counts
         if left:
             status = "steps_spent"
             reason = f"{', '.join(sorted(left))} did not arrive in {len(self.steps)} steps"
@@ -308,5 +323,6 @@ class _World:
                 "swaps": sum(len(one.swaps) for one in self.steps),
                 "asked": sum(len(one.asked) for one in self.steps),
                 "messages": self.loop.state.agreement.sent,
+                **workers,
             },
         )

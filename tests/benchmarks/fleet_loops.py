@@ -1,25 +1,39 @@
 """Random fleets in closed loop: does anybody ever collide, or lose its plan, and what does it cost?
 
-``python tests/benchmarks/fleet_loops.py [--fleets N] [--seed N] [--least N] [--most N] [--dense]``:
-robots of 0.6 m on a square with a box in the middle, two to thirty at random; the same fleets
-undisturbed, with noise of 3 mm and 3 mrad a step, with noise and a breakdown, with answers a step
-late, and with every tenth message lost. Seconds are those of one processor.
+``python tests/benchmarks/fleet_loops.py [--fleets N] [--cases NAME ...] [--out FILE] [--jobs N]``:
+fleets of two to thirty vehicles of mixed kinds (`mixed_fleets.py`), driven undisturbed, with noise
+of 3 mm and 3 mrad a step (a tenth of it for those with inertia), with a tenth of all messages lost
+besides, with a fifth of the workers killed or with a breakdown besides, or with answers a step
+late. What was driven is judged by shapely (`fleet_judge.py`). A loop is a line of
+FILE; lines that are there are not driven again, so it may be stopped at any time. Seconds are
+those of one processor.
+
+*lost plans*: a vehicle that is there holds none. *not flagged*: a plan that leads through where
+another one broke down, whose step does not say that it is void. *left behind*: a vehicle that did
+not arrive, though `plan_fleet` finds a way for it from where it stands in the end.
 """
 
 from __future__ import annotations
 
 import argparse
 import collections
+import functools
+import json
 import math
 import sys
 import time
-from collections.abc import Callable
+import traceback
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
+from maneuver_automaton._parallel import in_parallel
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.fleet import (
     FleetGuarantee,
     FleetLog,
@@ -30,80 +44,66 @@ from maneuver_automaton.fleet import (
     plan_fleet,
     simulate_fleet,
 )
+from maneuver_automaton.fleet.planning import vehicles_of
 from maneuver_automaton.receding_horizon import Disturbance
-from tests.fleet.robots import at_rest, scattered
+from maneuver_automaton.receding_horizon.settings import switches_at_will
+from tests.benchmarks.fleet_judge import distance_to, judged
+from tests.benchmarks.mixed_fleets import mixed_fleet
+from tests.fleet.mortal import Mortal
+from tests.fleet.robots import at_rest
 
 STEP = 0.5  # [s]
+STEPS = 400
 NOISE = Disturbance(position_m=0.003, heading_rad=0.003)
-ROOM = (9.0, 4.0)  # [m^2] for each robot; dense
+LITTLE = Disturbance(position_m=0.0003, heading_rad=0.0003)  # of those with inertia
+DIES = 0.2  # share of the workers
+LOST = 0.1  # of all messages
+CASES = ("undisturbed", "noise", "lost", "killed", "breakdown", "late")
+LONG_S = 600.0  # no clock decides
+
+Row = dict[str, Any]
 
 
-def every_tenth(seed: int) -> Callable[[Message], bool]:
+def losing(seed: int) -> Callable[[Message], bool]:
     """Loses a tenth of all messages."""
-    rng = np.random.default_rng(seed)
-    return lambda _: bool(rng.random() < 0.1)
+    rng = np.random.default_rng([seed, 4])
+    return lambda _: bool(rng.random() < LOST)
 
 
-def cases(fleet: FleetProblem, seed: int) -> dict[str, dict]:
-    """What happens to a fleet, by name."""
+def settings_of(case: str, fleet: FleetProblem, seed: int) -> dict[str, Any]:
+    """What happens to a fleet."""
     rng = np.random.default_rng([seed, 1])
-    broken = {str(rng.choice(fleet.names)): float(rng.uniform(1.0, 6.0))}
+    broken = {str(rng.choice(fleet.names)): float(rng.uniform(1.0, 8.0))}
+    dies = {k: float(rng.uniform(0.0, 8.0)) for k in range(len(fleet)) if rng.random() < DIES}
+    rows = zip(fleet.names, fleet.problems, strict=True)
+    noise = {name: NOISE if switches_at_will(problem) else LITTLE for name, problem in rows}
+    upset: dict[str, Any] = {"disturbance": noise}
+    lost = upset | {"lost": losing(seed)}
     return {
         "undisturbed": {},
-        "noise": {"disturbance": NOISE},
-        "noise, breakdown": {"disturbance": NOISE, "breaks_s": broken},
-        "a step late": {"delay_steps": 1},
-        "messages lost": {"disturbance": NOISE, "lost": every_tenth(seed)},
-    }
+        "noise": upset,
+        "lost": lost,
+        "killed": lost | {"workers": Mortal(fleet, dies)},
+        "breakdown": lost | {"breaks_s": broken},
+        "late": upset | {"delay_steps": 1},
+    }[case]
 
 
-class Tally:
-    """What became of the loops of one case."""
-
-    def __init__(self) -> None:
-        self.loops: list[FleetLog] = []
-        self.step_s: list[float] = []
-        self.lost_plans = 0
-        self.planned_s = 0.0
-
-    def add(self, log: FleetLog, times: list[float], planned: float) -> None:
-        """One more loop, the time of its steps, and what the first plans said."""
-        self.loops.append(log)
-        self.step_s += times
-        self.planned_s += planned
-        names = set(log.problem.names)
-        gone = {name for name in names if log.problem.leaves[log.problem.names.index(name)]}
-        self.lost_plans += sum(len(names - gone - set(step.plans)) for step in log.steps)
-
-    def line(self) -> str:
-        """A row of the table."""
-        count = collections.Counter(
-            violation.guarantee for log in self.loops for _, violation in log.violations
-        )
-        hits = count.pop(FleetGuarantee.NO_COLLISION, 0)
-        able = sum(len(log.problem) - len(log.broken_down) for log in self.loops)
-        came = sum(len(log.arrived_s) for log in self.loops)
-        least = min((log.distance_m for log in self.loops), default=math.inf)
-        swaps = sum(log.counts["swaps"] for log in self.loops)
-        driven = math.fsum(log.sum_s for log in self.loops)
-        median, most = (
-            (float(np.percentile(self.step_s, q)) for q in (50, 99)) if self.step_s else (0.0, 0.0)
-        )
-        flagged = ", ".join(f"{one.value} {n}" for one, n in count.items()) or "none"
-        return (
-            f"{len(self.loops):6d} {sum(len(log.steps) for log in self.loops):7d} {hits:10d} "
-            f"{self.lost_plans:10d} {came:6d}/{able:<6d} {1e3 * least:9.1f} {swaps:6d} "
-            f"{self.planned_s:9.1f} {driven:9.1f} {median:8.3f} {most:8.3f}  {flagged}"
-        )
+def tried(piece: tuple[int, str], least: int, most: int) -> Row:
+    """One loop, or what was raised."""
+    try:
+        return driven(*piece, least, most)
+    except Exception as error:  # noqa: BLE001, it is shown
+        traceback.print_exc()
+        return {"seed": piece[0], "case": piece[1], "raised": repr(error)}
 
 
-def driven(fleet: FleetProblem, seed: int, tally: Tally, **more: object) -> None:
-    """One loop, with the processor time of its steps."""
-    first = plan_fleet(fleet, time_limit=60.0, max_rounds=0, seed=seed)
-    if first.status is not FleetStatus.FOUND:
-        first = at_rest(fleet)
-    times: list[float] = []
+def driven(seed: int, case: str, least: int, most: int) -> Row:
+    """One loop, and what became of it."""
+    fleet = mixed_fleet(seed, least=least, most=most)
+    first = plan_fleet(fleet, time_limit=LONG_S, max_rounds=0, seed=seed)
     begun = time.process_time()
+    times: list[float] = []
 
     def note(_: FleetStep) -> None:
         nonlocal begun
@@ -111,35 +111,179 @@ def driven(fleet: FleetProblem, seed: int, tally: Tally, **more: object) -> None
         begun = time.process_time()
 
     log = simulate_fleet(
-        fleet, step=STEP, steps=240, first=first, seed=seed, time_limit=60.0, progress=note, **more
+        fleet,
+        step=STEP,
+        steps=STEPS,
+        first=first if first.plans else at_rest(fleet),
+        seed=seed,
+        time_limit=LONG_S,
+        progress=note,
+        **settings_of(case, fleet, seed),
     )
-    tally.add(log, times, first.sum_s)
+    return {
+        "seed": seed,
+        "case": case,
+        "n": len(fleet),
+        "planned": len(first.plans),
+        "planned_s": first.sum_s if first.status is FleetStatus.FOUND else math.nan,
+        "times": [round(one, 4) for one in times],
+        **outcome(log),
+    }
+
+
+def outcome(log: FleetLog) -> Row:
+    """What a loop is judged by."""
+    least, names = judged(log), set(log.problem.names)
+    gone = {
+        name for name, leaves in zip(log.problem.names, log.problem.leaves, strict=True) if leaves
+    }
+    said = collections.Counter(one.guarantee.value for _, one in log.violations)
+    return {
+        "steps": len(log.steps),
+        "arrived": len(log.arrived_s),
+        "broken": len(log.broken_down),
+        "least_m": least.pair_m,
+        "pair": [*least.names, least.time_s],
+        "still_m": least.still_m,
+        "own_m": log.distance_m,
+        "lost_plans": sum(len(names - gone - set(step.plans)) for step in log.steps),
+        "void": sum(len(step.void) for step in log.steps),
+        "unavoidable": said.get(FleetGuarantee.SAFETY.value, 0),
+        "violations": dict(said),
+        "not_flagged": len(not_flagged(log)),
+        "left_behind": left_behind(log),
+        "swaps": log.counts["swaps"],
+        "messages": log.counts["messages"],
+        "driven_s": log.sum_s,
+    }
+
+
+def not_flagged(log: FleetLog) -> set[str]:
+    """Vehicles whose plans lead through one that broke down, and are not said to be void."""
+    found = set()
+    for before, now in zip(log.steps[:-1], log.steps[1:], strict=True):
+        for name in set(log.broken_down) & set(before.plans):
+            if now.plans[name] is before.plans[name] or now.values[name] < math.inf:
+                continue
+            for other, plan in before.plans.items():
+                if other == name or other in now.void or now.plans[other] is not plan:
+                    continue
+                if distance_to(log.problem, other, plan, name, now, now.time) <= 0.0:
+                    found.add(other)
+    return found
+
+
+def left_behind(log: FleetLog) -> int:
+    """How many did not arrive, though a plan is found for them from where all stand in the end."""
+    late = set(log.problem.names) - set(log.arrived_s) - set(log.broken_down)
+    if not late:
+        return 0
+    end, leading, standing = log.steps[-1], [], []
+    for name, problem in zip(log.problem.names, log.problem.problems, strict=True):
+        if name in end.poses:
+            here = problem.starting_at(end.poses[name], time=problem.start_time)
+            (leading if name in late else standing).append((name, here))
+    walls: tuple[Obstacle, ...] = ()
+    if standing:
+        rows = FleetProblem([one for _, one in standing])
+        walls = tuple(body for one in vehicles_of(rows) for body in one.standing.arrived)
+    fleet = FleetProblem(
+        [replace(one, obstacles=(*one.obstacles, *walls)) for _, one in leading],
+        names=[name for name, _ in leading],
+        margin=log.problem.margin,
+    )
+    return len(plan_fleet(fleet, time_limit=60.0, max_rounds=0).plans)
+
+
+def line(rows: list[Row]) -> str:
+    """A row of the table."""
+    times = np.concatenate([row["times"] for row in rows])
+    median, most = np.percentile(times, [50, 99])
+    said: collections.Counter[str] = collections.Counter()
+    for row in rows:
+        said.update(row["violations"])
+    flags = ", ".join(f"{name} {count}" for name, count in sorted(said.items())) or "none"
+
+    def total(key: str) -> int:
+        return sum(row[key] for row in rows)
+
+    hits = sum(row["least_m"] <= 0.0 for row in rows)
+    avoidable = sum(row["least_m"] <= 0.0 and not row["unavoidable"] for row in rows)
+    still = sum(row["still_m"] <= 0.0 for row in rows)
+    able = total("n") - total("broken")
+    least = min(row["least_m"] for row in rows)
+    whole = [row for row in rows if row["planned"] == row["n"]]
+    came = sum(row["arrived"] == row["n"] - row["broken"] for row in whole)
+    return (
+        f"{len(rows):5d} {total('n'):8d} {total('steps'):6d} {hits:4d} {avoidable:5d} {still:5d} "
+        f"{total('lost_plans'):5d} {total('arrived'):5d}/{able:<5d} {came:4d}/{len(whole):<4d} "
+        f"{total('left_behind'):6d} {total('void'):5d} {total('not_flagged'):6d} "
+        f"{1e3 * least:8.1f} {total('swaps'):6d} {median:7.3f} {most:6.3f} {times.max():6.2f}  "
+        f"{flags}"
+    )
+
+
+def table(rows: Iterable[Row]) -> None:
+    """Print what became of all loops, case by case, and of those that went wrong."""
+    by_case: dict[str, list[Row]] = {}
+    for row in sorted(rows, key=lambda one: (CASES.index(one["case"]), one["seed"])):
+        by_case.setdefault(row["case"], []).append(row)
+    print(
+        f"{'case':12s} {'loops':>5s} {'vehicles':>8s} {'steps':>6s} {'hits':>4s} {'avoid':>5s} "
+        f"{'still':>5s} {'lost':>5s} {'arrived':>11s} {'all came':>9s} {'behind':>6s} {'void':>5s} "
+        f"{'unsaid':>6s} {'least mm':>8s} {'swaps':>6s} {'median':>7s} {'p99':>6s} {'most':>6s}  "
+        "violations"
+    )
+    for case, some in by_case.items():
+        print(f"{case:12s} {line(some)}")
+    for case, some in by_case.items():
+        for row in some:
+            wrong = row["least_m"] <= 0.0 or row["still_m"] <= 0.0 or row["left_behind"]
+            came = row["arrived"] == row["n"] - row["broken"] or row["planned"] < row["n"]
+            if wrong or not came or row["lost_plans"] or row["not_flagged"]:
+                print(
+                    f"  {case} {row['seed']}: {row['arrived']} of {row['n']} arrived, "
+                    f"{row['broken']} broke down, {row['planned']} planned, "
+                    f"least {1e3 * row['least_m']:.1f} mm {row['pair']}, "
+                    f"obstacles {1e3 * row['still_m']:.1f} mm, behind {row['left_behind']}, "
+                    f"unsaid {row['not_flagged']}, {row['violations']}"
+                )
 
 
 def main() -> None:
-    """Print a table, and again after every fleet."""
+    """Drive what is not in the file yet, and print a table of all that is."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--fleets", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--least", type=int, default=2)
     parser.add_argument("--most", type=int, default=30)
-    parser.add_argument("--dense", action="store_true", help="4 m^2 for each robot, not 9")
+    parser.add_argument("--cases", nargs="+", choices=CASES, default=["undisturbed", "killed"])
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=Path("out/fleet_loops.jsonl"))
     arguments = parser.parse_args()
-    tallies: dict[str, Tally] = collections.defaultdict(Tally)
-    for seed in range(arguments.seed, arguments.seed + arguments.fleets):
-        rng = np.random.default_rng([seed, 2])
-        n = int(rng.integers(arguments.least, arguments.most + 1))
-        fleet = scattered(n, seed, size=math.sqrt(ROOM[arguments.dense] * n + 4.0))
-        for name, more in cases(fleet, seed).items():
-            driven(fleet, seed, tallies[name], **more)
-        print(f"\nafter fleet {seed} of {n} robots")
-        print(
-            f"{'case':18s} {'loops':>6s} {'steps':>7s} {'collisions':>10s} {'lost plans':>10s} "
-            f"{'arrived':>13s} {'least mm':>9s} {'swaps':>6s} {'planned s':>9s} {'driven s':>9s} "
-            f"{'median s':>8s} {'p99 s':>8s}  violations"
-        )
-        for name, tally in tallies.items():
-            print(f"{name:18s} {tally.line()}", flush=True)
+    arguments.out.parent.mkdir(parents=True, exist_ok=True)
+    rows = []
+    if arguments.out.exists():
+        rows = [json.loads(one) for one in arguments.out.read_text().splitlines()]
+    done = {(row["seed"], row["case"]) for row in rows}
+    seeds = range(arguments.seed, arguments.seed + arguments.fleets)
+    wanted = [(seed, case) for seed in seeds for case in arguments.cases]
+    work = functools.partial(tried, least=arguments.least, most=arguments.most)
+    missing = [one for one in wanted if one not in done]
+    with arguments.out.open("a") as file:
+        for row in in_parallel(work, missing, jobs=arguments.jobs, order="as done"):
+            if "raised" in row:
+                print(row, file=sys.stderr)
+                continue
+            rows.append(row)
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(
+                f"{len(rows):4d} {row['case']} {row['seed']}: {row['arrived']} of {row['n']}, "
+                f"least {1e3 * row['least_m']:.1f} mm, {sum(row['times']):.1f} s",
+                file=sys.stderr,
+            )
+    table(rows)
 
 
 if __name__ == "__main__":

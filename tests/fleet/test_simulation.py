@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maneuver_automaton import Disturbance, FleetProblem, Goal, Problem, simulate_fleet
-from maneuver_automaton.collision import Disc
+from maneuver_automaton import (
+    Disturbance,
+    FleetHorizon,
+    FleetProblem,
+    Goal,
+    Problem,
+    simulate_fleet,
+)
+from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
 from tests.fleet.robots import (
     at_rest,
@@ -185,3 +192,76 @@ def test_wrong_arguments():
         loop_of(crossing(), steps=0)
     with pytest.raises(ValueError, match="breaks_s: no vehicle is named 'c'"):
         loop_of(crossing(), breaks_s={"c": 1.0})
+
+
+def test_two_that_stand_too_near_part_again():
+    """Pushed to within the margin of each other, they keep what they have until they part."""
+    ends = ([0, 0, 0], [8, 0, 0]), ([0, 0.75, 0], [8, 0.75, 0])
+    fleet = FleetProblem([problem_of(*one, tolerance=0.1) for one in ends], names="ab", margin=0.1)
+    log = loop_of(fleet, disturbance={"a": Disturbance(pushes={2: (0.0, 0.12, 0.0)})}, steps=60)
+    assert log.reached
+    assert 0.0 < least_distance(log) < 0.1
+    said = [number for number, _ in log.violations]
+    assert said
+    assert max(said) < 15  # flagged while they are too near, and not for ever
+
+
+def test_who_is_pushed_to_an_obstacle_gets_away():
+    wall = (Box([4.0, 0.4], [2.0, 0.6]),)
+    fleet = FleetProblem(
+        [problem_of([0, 0, 0], [5, 0, 0], tolerance=0.1, obstacles=wall, margin=0.05)], margin=0.1
+    )
+    log = loop_of(fleet, disturbance=Disturbance(pushes={2: (0.0, 0.08, 0.0)}), steps=40)
+    assert log.reached
+    assert {one.guarantee for _, one in log.violations} <= {FleetGuarantee.STILL}
+
+
+def test_who_was_to_leave_but_has_no_plan_stays():
+    """Nobody drives through one that is not gone yet."""
+    ends = ([0, 0, 0], [0, 0, 3.1]), ([-2, 0, 0], [2, 0, 0])
+    cage = [Box([0.1, 1.4], [x, 0]) for x in (-0.7, 0.7)] + [Box([1.5, 0.1], [0, 0.7])]
+    caged = problem_of([0, 0, 0], [9, 0, 0], obstacles=[*cage, Box([1.5, 0.1], [0, -0.7])])
+    fleet = FleetProblem(
+        [caged, problem_of(*ends[1], tolerance=0.1)], names="ab", margin=0.1, leaves=(True, False)
+    )
+    log = loop_of(fleet, steps=30)
+    assert set(log.arrived_s) == {"b"}
+    assert least_distance(log) >= 0.1 - 1e-9
+    assert [*log.violations] == []
+
+
+def test_an_emergency_that_is_not_heard():
+    """All words of three steps are lost as one breaks down: nobody swaps, all is flagged."""
+
+    def lost(message):
+        return 6 <= message.step < 9
+
+    for tries in range(3):
+        log = loop_of(
+            scattered(5, tries), breaks_s={"1": 3.0}, lost=lost, disturbance=NOISE, steps=80
+        )
+        said = {one.guarantee for _, one in log.violations}
+        assert FleetGuarantee.KNOWN not in said
+        assert not any(6 <= number < 9 for number, _ in log.swaps)
+        hit = FleetGuarantee.NO_COLLISION in said
+        assert FleetGuarantee.SAFETY in said or not hit
+
+
+def test_another_goal_on_the_way():
+    fleet = crossing(tolerance=0.1)
+    loop = FleetHorizon(fleet, step=0.5, first=at_rest(fleet), time_limit=60.0)
+    poses = {name: problem.start for name, problem in zip("ab", fleet.problems, strict=True)}
+    turns = {4: ("a", [2.0, 2.0, 1.5]), 9: ("b", [-2.0, 2.0, 3.0])}
+    for number in range(40):
+        if number in turns:
+            name, goal = turns[number]
+            loop.assign(name, problem_of([0, 0, 0], goal, tolerance=0.1))
+        step = loop.step(poses)
+        assert step.violations == ()
+        poses = {name: plan.pose_at(step.time + 0.5) for name, plan in step.plans.items()}
+    assert set(step.arrived) == {"a", "b"}
+    assert np.hypot(*(poses["a"][:2] - [2.0, 2.0])) <= 0.1
+    with pytest.raises(ValueError, match="no vehicle is named 'c'"):
+        loop.assign("c", fleet.problems[0])
+    with pytest.raises(ValueError, match="its margin is 0 m"):
+        loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], margin=0.0))

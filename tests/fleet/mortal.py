@@ -1,0 +1,30 @@
+"""Workers that die, in this process."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.fleet import FleetProblem
+from maneuver_automaton.fleet.asking import Answer, Question, answered
+from maneuver_automaton.fleet.planning import vehicles_of
+
+
+class Mortal:
+    """Answers in this process, until a vehicle's worker dies at a time [s]."""
+
+    def __init__(self, fleet: FleetProblem, dies: Mapping[int, float]) -> None:
+        self.vehicles, self.dies = vehicles_of(fleet), dies
+        self.counts = {"questions": 0}
+
+    def ask(self, questions: Sequence[Question], budget: Budget) -> list[Answer | None]:
+        self.counts["questions"] += len(questions)
+        return [
+            None
+            if one.time >= self.dies.get(one.number, math.inf)
+            else answered(
+                self.vehicles[one.number], one, budget, lambda f, at=one.time: f.course.after(at)
+            )
+            for one in questions
+        ]
