@@ -233,7 +233,10 @@ class FleetStepUnderWay:
         for k, found in self.held.items():
             if k in self.state.arrived or not leads(found) or not is_over(found, self.time):
                 continue
-            if within(self.poses[k], self.vehicles[k].problem.goals[found.goal_index]):
+            vehicle = self.vehicles[k]
+            there = within(self.poses[k], vehicle.problem.goals[found.goal_index])
+            # Who leaves is gone for all others once its plan is over: within its tube, it goes.
+            if there or (vehicle.leaves and self._off(k, found) <= self.state.settings.tube_m):
                 self.state.arrived.add(k)
                 continue
             # It stays where it is, or where its plan ends, and looks for another one.

@@ -187,7 +187,7 @@ class FleetLog:
     @property
     def distance_m(self) -> float:
         """Least distance of any two bodies along what was driven [m]; inf if none came near."""
-        return math.inf if self.closest is None else self.closest.distance_m
+        return min((one.distance_m for one in self.steps), default=math.inf)
 
     @property
     def sum_s(self) -> float:

@@ -23,6 +23,7 @@ from maneuver_automaton.fleet.result import Closest, FleetResult
 from maneuver_automaton.fleet.vehicle import Vehicle
 from maneuver_automaton.fleet.verdict import measured
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.disturbance import (
     Disturbance,
     Draw,
@@ -214,6 +215,12 @@ class _Drive:
             self.pose = np.array((group(self.pose) @ group(push)).pose)
         return piece
 
+    def leaves_at(self, plan: Plan) -> float:
+        """When [s] it leaves at the end of the plan that it holds; inf if it does not."""
+        goals = self.vehicle.problem.goals
+        leaves = self.vehicle.leaves and any(within(plan.end, goal) for goal in goals)
+        return plan.start_time + plan.duration if leaves else math.inf
+
 
 @dataclass(slots=True, eq=False)
 class _World:
@@ -262,7 +269,7 @@ class _World:
         due = {name for name, at in self.breaks_s.items() if at <= time and name in states}
         now = self.loop.step(states, time=time, broken_down=due - set(self.arrived_s))
         self.broken |= due & set(now.plans) - set(now.arrived)
-        driven = {}
+        driven, leaves_s = {}, {}
         for k, one in enumerate(self.drives):
             name = one.vehicle.name
             if name not in now.plans:
@@ -277,14 +284,17 @@ class _World:
             if name not in now.arrived:
                 self.arrived_s.pop(name, None)
             driven[k] = one.drive(now.driven[name], time, self.step, number, noises[name])
-        self.steps.append(self._judged(now, driven))
+            leaves_s[k] = one.leaves_at(now.plans[name])
+        self.steps.append(self._judged(now, driven, leaves_s))
         return self.steps[-1]
 
-    def _judged(self, now: FleetStep, driven: Mapping[int, Plan]) -> FleetStep:
-        """The step with the collisions that were measured along what it drove."""
+    def _judged(
+        self, now: FleetStep, driven: Mapping[int, Plan], leaves_s: Mapping[int, float]
+    ) -> FleetStep:
+        """The step with the collisions that were measured along what it drove, until each left."""
         names = [one.vehicle.name for one in self.drives]
         courses = {
-            k: replace(self.drives[k].vehicle.course_of(piece), until=math.inf)
+            k: replace(self.drives[k].vehicle.course_of(piece), until=leaves_s[k])
             for k, piece in driven.items()
         }
         rows = measured(courses, names, keep=self.loop.fleet.margin)

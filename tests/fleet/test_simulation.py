@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from maneuver_automaton import (
     FleetProblem,
     Goal,
     Problem,
+    load_scenario,
     simulate_fleet,
 )
 from maneuver_automaton.collision import Box, Disc
@@ -265,3 +268,16 @@ def test_another_goal_on_the_way():
         loop.assign("c", fleet.problems[0])
     with pytest.raises(ValueError, match="its margin is 0 m"):
         loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], margin=0.0))
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.002])
+def test_who_leaves_is_gone_for_all_at_the_same_time(noise):
+    """Beside its goal by what its tube allows it leaves as well: the others count on that."""
+    file = Path(__file__).parents[2] / "scenarios" / "fleets" / "intersection.yaml"
+    fleet = load_scenario(file).fleet
+    assert all(fleet.leaves)
+    upset = Disturbance(position_m=noise, heading_rad=noise, seed=1)
+    log = simulate_fleet(fleet, step=0.5, steps=24, disturbance=upset)
+    assert [*log.violations] == []
+    assert log.distance_m > (0.9 if noise else 1.0) * fleet.margin
+    assert set(log.arrived_s) == set(fleet.names)
