@@ -171,7 +171,7 @@ def least_effort(
     (True, 3.0)
     >>> from maneuver_automaton.refinement import effort_report
     >>> round(effort_report(plan).cost, 2), round(effort_report(better).cost, 2)
-    (4.0, 3.32)
+    (4.0, 3.72)
     """
     if pieces < 2:
         raise ValueError(f"least effort: pieces must be at least 2, got {pieces}")
