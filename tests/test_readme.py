@@ -70,11 +70,16 @@ def code_of_pages() -> list[Any]:
         pytest.param(
             code,
             id=f"{page.stem}: {first_words(code)}",
-            marks=[pytest.mark.slow] if page.stem in LONG or "for name" in code else [],
+            marks=[pytest.mark.slow] if page.stem in LONG or takes_long(code) else [],
         )
         for page, text in TEXTS.items()
         for code in blocks("python", text)
     ]
+
+
+def takes_long(code: str) -> bool:
+    """Whether a block goes through many scenarios, or starts processes."""
+    return "for name" in code or "distributed" in code
 
 
 def first_words(text: str) -> str:
@@ -93,6 +98,8 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("code", code_of_pages())
 def test_python_runs(clone, code):
+    if "distributed" in code:
+        pytest.importorskip("distributed")
     exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
 
 
