@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import Bounds, NonlinearConstraint, minimize
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
@@ -98,6 +97,9 @@ class _Shooting:
 
     def within(self, box: Array, controls: Array) -> Array:
         """Controls (k, n_u) of least effort within limits (n_u, 2), from a guess."""
+        # Kernels are compiled where SciPy is not installed, by what their modules import.
+        from scipy.optimize import Bounds, NonlinearConstraint, minimize
+
         size = max(self.effort(controls.ravel()), TINY)
         found = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
             lambda flat: self.effort(flat) / size,
