@@ -1,7 +1,7 @@
 """How soon a prepared planner answers, and how good its answer is then; OMPL in the same run.
 
 ``pip install ompl``; ``python tests/benchmarks/latency.py`` (all groups, half an hour), or some of
-``car tight nav2 movingai``. Ours: `Planner` with ``search.improve`` off, many times over: until
+``car room tight nav2 movingai``. Ours: `Planner` with ``search.improve`` off, many times over: until
 there is a word proven free, until the checks of FCL and the audit have passed it too; then one run
 with a second of time, of which costs are read. RRT-Connect and BIT* of OMPL get the same footprint
 by a compiled test, sampled every 0.1 m and not proven between, in a process of its own. (AORRTC of
@@ -100,13 +100,15 @@ def theirs(problem: Problem, planner: str, repeats: int) -> list[float]:
 def main() -> None:
     every = groups()
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("groups", nargs="*", choices=[*every, []], default=list(every))
+    parser.add_argument("groups", nargs="*", metavar="GROUP", help=f"of {', '.join(every)}")
     parser.add_argument("--repeats", type=int, default=3, help="runs of each peer")
     parser.add_argument("--most", type=int, default=100, help="problems of a group")
     given = parser.parse_args()
+    if unknown := set(given.groups) - set(every):
+        parser.error(f"no group {', '.join(sorted(unknown))}: there are {', '.join(every)}")
     there = PEERS if peers.available() else ()
     print(f"ours: median and p99 of {REPEATS}; theirs: medians of {given.repeats} runs")
-    for group in given.groups:
+    for group in given.groups or every:
         try:
             problems = dict(itertools.islice(every[group]().items(), given.most))
         except FileNotFoundError as missing:
