@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from maneuver_automaton.audit._kernels_still import Found, Sides, Ways, nearest_still
 from maneuver_automaton.audit.frames import Spans
-from maneuver_automaton.audit.pairs import moving_pairs, on_arcs, overlapped, still_pairs
+from maneuver_automaton.audit.pairs import StillEdges, bounded, moving_pairs, on_arcs, overlapped
 from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of, time_of
 from maneuver_automaton.audit.surroundings import Surroundings
 
@@ -70,14 +72,49 @@ def least_clearance(
         start = float(body.frames.times_at(spans.element[:1], spans.begin[:1])[0])
         return Least(0.0, 0.0, start)
     if around.still.size:
-        pairs, known = still_pairs(body, around, places)
-        least = _sharpened(body, around, pairs, known, least, enough, ask)
+        ask()
+        edges = StillEdges.near(body, around, places)
+        found = None if body.in_space else edges.nearest(partial(_compiled, body, around, enough))
+        if found is None or found.touches:
+            pairs, known = edges.nearest(partial(bounded, body, around))
+            least = _sharpened(body, around, pairs, known, least, enough, ask)
+        else:
+            element, share = np.array([found.element]), np.array([found.share])
+            time = float(body.frames.times_at(element, share)[0])
+            least = Least(found.distance, found.measured, time)
     for nearest, pairs in moving_pairs(body, around, places):
         if not nearest < least.measured:
             break
         known = bounds_of(body, around, pairs)
         least = _sharpened(body, around, pairs, known, least, enough, ask)
     return least._replace(distance=max(least.distance, 0.0))
+
+
+def _compiled(body: Body, around: Surroundings, enough: float, pairs: Pairs) -> tuple[float, Found]:
+    """The least distance measured [m] over pairs in the plane, and what is known of it."""
+    outline, frames, edges, spans = body.outline, body.frames, around.outline, pairs.places.spans
+    found = nearest_still(
+        Ways(
+            frames.series,
+            np.diff(frames.times),
+            frames.speed,
+            frames.bend,
+            frames.swerve,
+            body.offset,
+        ),
+        Sides(*outline.edges[:3]),
+        outline.reach,
+        outline.middle,
+        outline.size,
+        Sides(*edges[:3]),
+        *spans,
+        pairs.span,
+        pairs.edge,
+        body.doubt * (1.0 + outline.most_reach),
+        enough,
+        CONTACT,
+    )
+    return -math.inf if found.touches else found.measured, found
 
 
 def _sharpened(

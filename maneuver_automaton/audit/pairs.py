@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,8 @@ from maneuver_automaton.audit.passages import (
 )
 from maneuver_automaton.audit.surroundings import Surroundings
 from maneuver_automaton.collision.motion import Motion
+
+T = TypeVar("T")
 
 CHORD = 0.25  # [rad] of the first stretches
 LONGEST = 64.0  # of which the path of a small body has so many
@@ -144,29 +147,55 @@ def instant(body: Body, around: Surroundings, time: float) -> Pairs:
     return Pairs(places, np.zeros_like(edge), edge, frames)
 
 
-def still_pairs(body: Body, around: Surroundings, places: Places) -> tuple[Pairs, Bounds]:
-    """The stretches, each with the still edges that may be the nearest of all, and their bounds.
+@dataclass(frozen=True, slots=True, eq=False)
+class StillEdges:
+    """The still edges near a body over stretches of time."""
 
-    Edges are looked for within a distance of where the body passes, and further away until one is
-    measured that is no further than that.
-    """
-    pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
-    boxes, own_boxes = _Boxes.around(places.corners), _Boxes.around(_from_begins(places))
-    within = FIRST_WITHIN * body.outline.size + SPARE
-    while True:
-        span, edge = around.near(np.concatenate(boxes.grown(pad + within), axis=1))
-        kept = _meets(around, places, own_boxes.grown(pad + within), span, edge)
-        if not kept.any():
-            within *= FURTHER
-            continue
-        pairs = Pairs(places, span[kept], edge[kept], None)
-        if pairs.edge.size > MANY:
-            pairs = _nearest_pairs(body, around, pairs)
-        known = bounds_of(body, around, pairs)
-        nearest = float(known.measured.min())
-        if nearest <= within:
-            return pairs, known
-        within = nearest
+    body: Body
+    around: Surroundings
+    places: Places
+    pad: Array  # (s, 1) [m] by which the boxes are too small
+    boxes: _Boxes  # around its corners
+    own_boxes: _Boxes  # the same, along the axes of the body as a stretch begins
+
+    @classmethod
+    def near(cls, body: Body, around: Surroundings, places: Places) -> StillEdges:
+        """Those of some surroundings."""
+        pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
+        boxes, own = _Boxes.around(places.corners), _Boxes.around(_from_begins(places))
+        return cls(body, around, places, pad, boxes, own)
+
+    def within(self, distance: float) -> Pairs:
+        """All pairs that come nearer than a distance [m], and others."""
+        pad = self.pad + distance
+        span, edge = self.around.near(np.concatenate(self.boxes.grown(pad), axis=1))
+        kept = _meets(self.around, self.places, self.own_boxes.grown(pad), span, edge)
+        return Pairs(self.places, span[kept], edge[kept], None)
+
+    def nearest(self, measured: Callable[[Pairs], tuple[float, T]]) -> T:
+        """What is known of pairs among which the nearest of all is.
+
+        They are looked for further and further away, until a distance is `measured` [m] within
+        which none is left out.
+        """
+        within = FIRST_WITHIN * self.body.outline.size + SPARE
+        while True:
+            pairs = self.within(within)
+            if not pairs.edge.size:
+                within *= FURTHER
+                continue
+            nearest, known = measured(pairs)
+            if nearest <= within:
+                return known
+            within = nearest
+
+
+def bounded(body: Body, around: Surroundings, pairs: Pairs) -> tuple[float, tuple[Pairs, Bounds]]:
+    """The least distance measured [m], and those pairs that may be the nearest, with bounds."""
+    if pairs.edge.size > MANY:
+        pairs = _nearest_pairs(body, around, pairs)
+    known = bounds_of(body, around, pairs)
+    return float(known.measured.min()), (pairs, known)
 
 
 def _nearest_pairs(body: Body, around: Surroundings, pairs: Pairs) -> Pairs:

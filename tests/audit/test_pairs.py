@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maneuver_automaton.audit import closest_to, pairs, passages
+from maneuver_automaton.audit import clearance, closest_to, pairs, passages
+from maneuver_automaton.audit._kernels_still import Found
 from maneuver_automaton.audit.judge import audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
@@ -55,6 +56,28 @@ def test_what_is_left_out_changes_nothing(seed, monkeypatch):
         assert other.measured == pytest.approx(every.measured, abs=1e-12)
         low = every.measured - max(1e-3, 0.011 * every.measured)
         assert low <= other.distance <= other.measured
+
+
+@pytest.mark.parametrize("seed", quick_are(range(8), range(60)))
+def test_compiled_bounds_are_those_of_arrays(seed, monkeypatch):
+    """Stretches halved one by one, against all cut side by side."""
+    rng = np.random.default_rng([22, seed])
+    body = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
+    plan, obstacles = random_plan(rng, 4), random_scene(rng)
+    enough = float(rng.uniform(0.0, 0.5))
+
+    def found():
+        return closest_to(plan, ANY, obstacles, footprint=body, enough=enough)
+
+    one = found()
+    touches = Found(0.0, 0.0, 0, 0.0, True)
+    monkeypatch.setattr(clearance, "nearest_still", lambda *_: touches)
+    other = found()
+    sharp = max(1e-3, 0.011 * other.measured)
+    assert one.measured == pytest.approx(other.measured, abs=sharp)
+    for low, known in ((one, other), (other, one)):
+        assert low.distance <= known.measured + 1e-12
+        assert low.distance >= low.measured - sharp
 
 
 def test_what_is_far_is_found():

@@ -1,11 +1,11 @@
 """How soon a prepared planner answers, and how good its answer is then; OMPL in the same run.
 
-``pip install ompl``; ``python tests/benchmarks/latency.py`` (all groups, half an hour), or some of
-``car room tight nav2 movingai``. Ours: `Planner` with ``search.improve`` off, many times over: until
-there is a word proven free, until the checks of FCL and the audit have passed it too; then one run
-with a second of time, of which costs are read. RRT-Connect and BIT* of OMPL get the same footprint
-by a compiled test, sampled every 0.1 m and not proven between, in a process of its own. (AORRTC of
-the wheel 2.0.1 crashes or hangs with it.)
+``pip install ompl``; ``python tests/benchmarks/latency.py`` (all groups, ten minutes), or some of
+``car room tight nav2 movingai``. Ours: `Planner` with ``search.improve`` off, many times over:
+until there is a word proven free, until the checks of FCL and the audit have passed it too; then
+one run with a second of time, of which costs are read. RRT-Connect and BIT* of OMPL get the same
+footprint by a compiled test, sampled every 0.1 m and not proven between, in a process of its own.
+(AORRTC of the wheel 2.0.1 crashes or hangs with it.)
 """
 
 from __future__ import annotations
