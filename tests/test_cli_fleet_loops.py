@@ -164,7 +164,7 @@ class TestMpc:
         Path("x.yaml").write_text(
             LOOP.replace("name: north,", f"name: north, receding_horizon: {onto},")
         )
-        assert run(["mpc", "x.yaml", "--quiet", "--no-plot"]) == 1
+        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--steps", "6"]) == 1
         printed = capsys.readouterr().err
         assert "broke a guarantee: " in printed
         assert "east and north touch at " in printed

@@ -10,6 +10,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc
 from maneuver_automaton.collision.advancement import clearances
+from maneuver_automaton.collision.all_round import touched_all_round
 from maneuver_automaton.collision.blocked import touched
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.checker import origin_near
@@ -74,14 +75,28 @@ def why_goal_blocked(problem: Problem, goal: Goal, *, free: bool = False) -> str
     if free or not problem.obstacles:
         return ""
     if goal.free_heading and problem.footprint:  # only what touches at every heading counts
-        inside = body_of(problem.footprint).inscribed
-        if not inside > 0.0:
-            return ""
-        problem = replace(problem, footprint=(Disc(inside),))
+        return _why_blocked_all_round(problem, goal)
     said = where_touched(problem, goal.pose, math.inf)
     if not goal.free_heading:
         said = said or _part_touched(problem, goal.trim, goal.pose, math.inf)
     return f"at the goal {said}" if said else ""
+
+
+def _why_blocked_all_round(problem: Problem, goal: Goal) -> str:
+    """Why no plan can end at a goal of any heading; empty if that is not proven.
+
+    The disc inside the body touches something, or the body does at every heading.
+    """
+    inside = body_of(problem.footprint).inscribed
+    if inside > 0.0:
+        disc = replace(problem, footprint=(Disc(inside),))
+        if said := where_touched(disc, goal.pose, math.inf):
+            return f"at the goal {said}"
+    said = where_touched(problem, goal.pose, math.inf)
+    still = tuple(one for one in _beside(problem, goal.pose) if not moves(one))
+    if said and touched_all_round(problem.footprint, still, goal.pose[:2], margin=problem.margin):
+        return f"at the goal no heading is free; at that given {said}"
+    return ""
 
 
 def open_goals(problem: Problem) -> tuple[int, ...]:

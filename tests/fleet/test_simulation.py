@@ -233,6 +233,7 @@ def test_who_was_to_leave_but_has_no_plan_stays():
     assert [*log.violations] == []
 
 
+@pytest.mark.slow
 def test_an_emergency_that_is_not_heard():
     """All words of three steps are lost as one breaks down: nobody swaps, all is flagged."""
 

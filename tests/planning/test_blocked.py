@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.all_round import touched_all_round
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.blocked import blocked_ends, why_goal_blocked
 from maneuver_automaton.problem import Bounds, Goal, Problem, SearchSettings
@@ -53,11 +54,11 @@ def test_verdicts_agree_with_shapely(first):
         ))  # fmt: skip
         blocked = []
         for goal in problem.goals:
-            whole = still
-            if goal.free_heading and still.footprint:  # what every heading has in common
-                inside = body_of(still.footprint).inscribed
-                whole = replace(still, footprint=Disc(inside)) if inside > 0.0 else None
-            near = math.inf if whole is None else clearance_at(whole, goal.pose)
+            poses = [goal.pose]
+            if goal.free_heading and still.footprint:
+                turns = np.linspace(0.0, 2.0 * np.pi, 97)[1:]
+                poses = [goal.pose, *(goal.pose + np.array([0.0, 0.0, turn]) for turn in turns)]
+            near = max(clearance_at(still, pose) for pose in poses)
             hit = near < least - CONTACT or near <= 0.0
             blocked.append(is_outside(problem, goal.pose) or hit)
             assert bool(why_goal_blocked(problem, goal)) == blocked[-1]
@@ -135,3 +136,50 @@ def test_a_goal_of_any_heading_in_a_solid_is_blocked(footprint):
     result = plan(problem)
     assert result.status is PlanStatus.GOAL_BLOCKED
     assert math.isclose(result.problem.goals[0].pose[0], 5.0)
+
+
+def ring_of_posts(place, count, *, radius=0.3, away=1.5):
+    """Round posts about a place, with gaps too narrow for a body as long as they are apart."""
+    angles = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    middles = place + away * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return tuple(Obstacle(Disc(radius, middle)) for middle in middles)
+
+
+@pytest.mark.parametrize(("count", "blocked"), [(8, True), (2, False)])
+def test_a_goal_of_any_heading_with_room_for_none(count, blocked):
+    """A disc inside the body would have room."""
+    goal = Goal(pose=[10.0, 0.0, 0.4], free_heading=True)
+    posts = ring_of_posts(np.array([10.0, 0.0]), count)
+    problem = replace(FREE, goals=(goal,), obstacles=posts, footprint=(Box([4.0, 2.0]),))
+    said = blocked_ends(problem)
+    assert (said is not None) == blocked
+    if said is not None:
+        assert said.status is PlanStatus.GOAL_BLOCKED
+        assert said.reason.startswith(
+            "at the goal no heading is free; at that given the vehicle touches obstacle "
+        )
+
+
+@pytest.mark.parametrize("seed", quick_are(range(10), range(120)))
+def test_touched_all_round_is_touched_at_each_heading(seed):
+    """Against headings one by one, with shapely; moved it is the same."""
+    rng = np.random.default_rng([7, seed])
+    body, margin = (Box([3.0, 1.6], [0.7, 0.0]), Disc(0.6, [2.0, 0.0])), rng.choice([0.0, 0.2])
+    place = rng.uniform(-3.0, 3.0, 2)
+    many = int(rng.integers(3, 14))
+    obstacles = tuple(
+        Obstacle(Disc(rng.uniform(0.1, 0.6), place + rng.uniform(-3.0, 3.0, 2))) if k % 2
+        else Obstacle(Box(rng.uniform(0.1, 2.0, 2), place + rng.uniform(-3.0, 3.0, 2), heading=k))
+        for k in range(many)
+    )  # fmt: skip
+    problem = replace(FREE, obstacles=obstacles, footprint=body, margin=margin)
+    headings = np.linspace(0.0, 2.0 * np.pi, 360)
+    clearances = [clearance_at(problem, np.array([*place, one])) for one in headings]
+    said = touched_all_round(body, obstacles, place, margin=margin)
+    if said:
+        assert max(clearances) <= max(margin, 0.0) + CONTACT
+    elif max(clearances) <= max(margin, 0.0):
+        assert max(clearances) > margin - 0.02  # hardly: between two of them one may be free
+    there = SE2(np.array([50.0, -20.0, 1.0]))
+    moved = tuple(one.moved(there) for one in obstacles)
+    assert touched_all_round(body, moved, there.act(place), margin=margin) == said

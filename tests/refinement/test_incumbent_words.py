@@ -168,6 +168,7 @@ def test_budgets_end_the_search():
     assert over.expansions == 0
 
 
+@pytest.mark.slow
 def test_what_moves_is_let_pass():
     crossing = Obstacle(
         Box([0.4, 3.0]), motion=Motion([0.0, 20.0], [[2.0, -3.0, 0.0], [2.0, 7.0, 0.0]])
