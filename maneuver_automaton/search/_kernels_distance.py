@@ -146,9 +146,18 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     if not (0 <= i < grid.columns and 0 <= j < grid.rows):
         return math.inf
     wanted = j * grid.columns + i
-    if grid.mark[wanted] == BLOCKED or blocked_cell(grid, field, i, j):
+    if grid.mark[wanted] == BLOCKED:
         return math.inf
+    aside = centre_clearance(grid, field, i, j)
+    if aside < grid.inflation:
+        return math.inf
+    # Whatever leads into a cell that a wall may cut makes the detour. So the path known is the best
+    # one as soon as all that is open is no nearer than it is without: else all the rest of the
+    # plane would come first.
+    due = _octile(i - grid.aim_i, j - grid.aim_j) - (grid.detour if aside < grid.cut else 0)
     while grid.mark[wanted] != SETTLED:
+        if grid.mark[wanted] == REACHED and grid.rank[wanted] + due <= grid.state[NOW]:
+            break
         here = _next_cell(grid)
         if here < 0:
             return math.inf

@@ -74,6 +74,29 @@ def test_little_is_looked_at_where_little_is_asked():
     assert grid.state[1] < 0.2 * grid.value.size
 
 
+def test_beside_a_wall_no_more_is_looked_at_and_the_value_is_that_of_all():
+    """Cells that a wall may cut come last, but what leads into one is known before."""
+    rng = np.random.default_rng(3)
+    walls = [Obstacle(Box([0.05, rng.uniform(1.0, 5.0)], rng.uniform(0.0, 15.0, 2), heading=k))
+             for k in range(25)]  # fmt: skip
+
+    def fresh():
+        return grid_and_world((Disc(0.02),), walls, [0.0, 0.0, 0.0], [15.0, 15.0, 0.0])
+
+    grid, world, _ = fresh()
+    field = world.arrays.field
+    cut = np.flatnonzero(centre_clearances(grid, field).ravel() < grid.cut)
+    asked = rng.permutation(cut)[:40]
+    one_by_one, looked_at = [], []
+    for place in centres(grid)[asked]:
+        alone, _, _ = fresh()
+        one_by_one += distances(alone, field, np.ascontiguousarray(place[None])).tolist()
+        looked_at.append(alone.state[1])
+    every = distances(grid, field, centres(grid))
+    assert one_by_one == every[asked].tolist()  # to the last bit
+    assert np.median(looked_at) < 0.6 * grid.value.size
+
+
 @pytest.mark.parametrize("name", ["car", "disc", "truck"])
 def test_no_free_pose_is_in_a_blocked_cell(name):
     rng = np.random.default_rng([9, *name.encode()])
