@@ -20,6 +20,7 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, Lost
+from maneuver_automaton.fleet.arriving import tube_of
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.held import given_up
 from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
@@ -137,7 +138,7 @@ class FleetHorizon:
             LoopSettings(
                 step=step,
                 margin=margin,
-                tube_m=0.5 * fleet.margin if tube_m is None else tube_m,
+                tube_m=tube_of(fleet, tube_m),
                 time_limit=time_limit,
                 swaps_per_step=swaps_per_step,
                 at_once=at_once,

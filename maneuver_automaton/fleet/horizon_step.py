@@ -111,6 +111,7 @@ class FleetStepUnderWay:
         self.held = state.held
         self.vehicles = state.vehicles
         self.keep = state.fleet.margin
+        self.tube = state.settings.tube_m
         start = state.vehicles[0].problem.start
         self.frame = (float(start[0]), float(start[1]), 0.0)
         self.time = time
@@ -342,7 +343,7 @@ class FleetStepUnderWay:
     def _rejoin_within(self, k: int, found: Found) -> None:
         others, left = self._expected_by(k), self._left_to_pay(k)
         choices, again = [], None
-        for one in rejoined(self.vehicles[k], found, self.time, self.poses[k]):
+        for one in rejoined(self.vehicles[k], found, self.time, self.poses[k], self.tube):
             choices.append(one)
             if self._is_proven(k, one, others):
                 again = one
@@ -470,7 +471,7 @@ class FleetStepUnderWay:
         """
         vehicle, pose = self.vehicles[k], self._begin(k)
         everyone = self._expected_by(k)
-        for one in rejoined(vehicle, self.held[k], self.time, pose):
+        for one in rejoined(vehicle, self.held[k], self.time, pose, self.tube):
             if self._is_proven(k, one, everyone):
                 return one
         past = everyone
@@ -545,6 +546,7 @@ class FleetStepUnderWay:
             between=self.keep,
             known=known,
             most=most,
+            tube_m=settings.tube_m,
             keep=self.near.get(k, math.inf),
         )
 
@@ -676,7 +678,7 @@ class FleetStepUnderWay:
             if gone or self.number < when:
                 continue
             on_it = self._off(k, found) == 0.0
-            again = rejoined(self.vehicles[k], found, self.time, self.poses[k])
+            again = rejoined(self.vehicles[k], found, self.time, self.poses[k], self.tube)
             for one in [found] if on_it else again:
                 if self._swap({k: one}):
                     break

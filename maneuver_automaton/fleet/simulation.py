@@ -14,6 +14,7 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_at
 from maneuver_automaton.fleet.agreement import Lost
+from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.horizon import FleetHorizon
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetLog, FleetStep, FleetViolation
@@ -115,7 +116,8 @@ def simulate_fleet(
             if name not in fleet.names:
                 raise ValueError(f"{what}: no vehicle is named {name!r}")
     if first is None:
-        first = _first_plans(fleet, set(joins_s), first_time_limit, seed)
+        tube = tube_of(fleet, tube_m)
+        first = _first_plans(fleet, set(joins_s), tube, first_time_limit, seed)
     loop = FleetHorizon(
         fleet,
         step=step,
@@ -143,20 +145,13 @@ def simulate_fleet(
 
 
 def _first_plans(
-    fleet: FleetProblem, later: set[str], time_limit: float, seed: int
+    fleet: FleetProblem, later: set[str], tube: float, time_limit: float, seed: int
 ) -> FleetResult | None:
-    """Plans of those that are there from the begin on."""
-    there = [k for k, name in enumerate(fleet.names) if name not in later]
+    """Plans of those that are there from the begin on, with room for noise where they end."""
+    there = set(fleet.names) - later
     if not there:
         return None
-    present = FleetProblem(
-        [fleet.problems[k] for k in there],
-        names=[fleet.names[k] for k in there],
-        margin=fleet.margin,
-        leaves=[fleet.leaves[k] for k in there],
-        priority=[fleet.priority[k] for k in there],
-    )
-    return plan_fleet(present, time_limit=time_limit, seed=seed)
+    return plan_fleet(fleet_with_room(fleet.only(there), tube), time_limit=time_limit, seed=seed)
 
 
 def _upsets(
