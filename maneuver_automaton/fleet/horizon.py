@@ -23,8 +23,10 @@ from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, L
 from maneuver_automaton.fleet.arriving import tube_of
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.held import given_up
-from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
+from maneuver_automaton.fleet.horizon_step import step_of
 from maneuver_automaton.fleet.log import FleetStep
+from maneuver_automaton.fleet.loop_state import LoopSettings, LoopState
+from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
@@ -158,7 +160,7 @@ class FleetHorizon:
     def _knowledge(self, lost: Lost | None) -> Knowledge:
         if lost is not None:
             return Agreement(self.fleet.names, lost)
-        return AllHeard(lambda k, found: self._under_way.how_many_near(k, found))
+        return AllHeard(lambda k, found: self._now.how_many_near(k, found))
 
     def step(
         self,
@@ -199,8 +201,8 @@ class FleetHorizon:
             )
         stopped = {self._number_of(name) for name in broken_down}
         budget = Budget.from_now(state.settings.time_limit)
-        self._under_way = FleetStepUnderWay(state, at, poses, budget)
-        state.last = self._under_way.run(stopped)
+        self._now = Moment(state, at, poses, budget)
+        state.last = step_of(self._now, stopped)
         return state.last
 
     def assign(self, name: str, problem: Problem) -> None:
