@@ -19,14 +19,19 @@ from maneuver_automaton.collision.shapes import (
 from maneuver_automaton.fleet.conflicts import PROOF, Course, where_it_stays
 from maneuver_automaton.fleet.levels import levels_of
 from maneuver_automaton.fleet.refuge import by_a_refuge
-from maneuver_automaton.planning.blocked import blocked_ends, goals_left, why_goal_blocked
+from maneuver_automaton.planning.blocked import (
+    blocked_ends,
+    goals_left,
+    proven_free,
+    why_goal_blocked,
+)
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in
 from maneuver_automaton.planning.result import LowerBound, PlanResult
-from maneuver_automaton.planning.within_tolerance import free_aims
+from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.planning.workspace import Workspace
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -41,7 +46,7 @@ LONG = 20_000  # ... and where nothing else helps
 AT_ONCE = Patience(attempts=0, passes=0)
 WITH_TIME = Patience(attempts=400, passes=2)
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
-MOST_AIMS = 4  # poses within the tolerance of a goal where another one stands
+MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
 LONGEST = 400_000  # expansions for a way alone
 LEAST_S, INERTIA_S, BETTER_S = 0.01, 5.0, 2.0  # [s] of a whole query: at least, and with inertia
 POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
@@ -281,12 +286,15 @@ class Vehicle:
         goals = tuple(enumerate(calm.goals))
         if self.leaves or not all(why_goal_blocked(calm, goal) for goal in calm.goals):
             return goals
-        return tuple(
-            (k, aim)
-            for k, goal in goals
-            if goal.tolerance_m or goal.tolerance_rad
-            for aim in itertools.islice(free_aims(calm, goal), MOST_AIMS)
-        )
+        still = tuple(one for one in calm.obstacles if not moves(one))
+        found = list[tuple[int, Goal]]()
+        for k, goal in goals:
+            if goal.tolerance_m or goal.tolerance_rad:
+                aims = list(aims_within(calm, goal))
+                free = proven_free(replace(calm, obstacles=still), [one.pose for one in aims])
+                rows = (aim for aim, is_free in zip(aims, free, strict=True) if is_free)
+                found += [(k, aim) for aim in itertools.islice(rows, MOST_AIMS)]
+        return tuple(found)
 
     def _round_the_arrived(self, query: LatticeQuery, calm: Problem, budget: Budget) -> Word | None:
         """A way round those that stay at their goals, wherever they are now, with rests."""

@@ -98,22 +98,19 @@ def _aims(problem: Problem) -> Iterator[Goal]:
     yield from problem.goals
     for goal in problem.goals:
         if why_goal_blocked(problem, goal):
-            yield from itertools.islice(free_aims(problem, goal), MOST_AIMS)
+            free = (aim for aim in aims_within(problem, goal) if not why_goal_blocked(problem, aim))
+            yield from itertools.islice(free, MOST_AIMS)
         else:
             yield from _exactly(
                 problem, goal, _poses_within(goal, problem.start, AROUND, RINGS[:1])
             )
 
 
-def free_aims(problem: Problem, goal: Goal) -> Iterator[Goal]:
-    """Free poses within the tolerance of a goal that is blocked itself, aimed at exactly."""
-    poses = [
-        *_poses_within(goal, problem.start, AROUND, RINGS[:1]),
-        *_poses_within(goal, problem.start, DENSE, RINGS),
-    ]
-    for aim in _exactly(problem, goal, poses):
-        if not why_goal_blocked(problem, aim):
-            yield aim
+def aims_within(problem: Problem, goal: Goal) -> Iterator[Goal]:
+    """Poses within the tolerance of a goal that is blocked itself, aimed at exactly."""
+    few = _poses_within(goal, problem.start, AROUND, RINGS[:1])
+    many = _poses_within(goal, problem.start, DENSE, RINGS)
+    return _exactly(problem, goal, itertools.chain(few, many))
 
 
 def _exactly(problem: Problem, goal: Goal, poses: Iterable[Array]) -> Iterator[Goal]:
