@@ -215,7 +215,7 @@ def proposal(
     there = Vehicle(
         vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
     )
-    there.plan_alone(budget)
+    there.plan_alone(budget, bounded=False)
     spent = 0.0 if head is None else vehicle.problem.cost_of(head)
     if there.alone is None or not there.alone.cost + spent < known:
         return None, None

@@ -131,19 +131,22 @@ class Vehicle:
             if one.height is None or (one.height[0] <= high + keep and one.height[1] >= low - keep)
         ]
 
-    def plan_alone(self, budget: Budget) -> None:
-        """Find its way past static obstacles, by itself, and a few others beside it."""
+    def plan_alone(self, budget: Budget, *, bounded: bool = True) -> None:
+        """Find its way past static obstacles, by itself, and a few others beside it.
+
+        And below which cost there is none, if that is wanted.
+        """
         blocked = blocked_ends(self.problem)
         if blocked is not None:
             self.why_none = blocked.reason
         elif self.at_will:
-            self._plan_words(budget)
+            self._plan_words(budget, bounded=bounded)
         else:
             result = self._planned(self.problem, budget, math.inf, improve=False)
             self.alone, self.why_none = self._found(result), result.reason
             self.bound = result.bound
 
-    def _plan_words(self, budget: Budget) -> None:
+    def _plan_words(self, budget: Budget, *, bounded: bool) -> None:
         """The same for one whose plans are words of the lattice."""
         query = self._query(self.problem)
         first = first_plan(query, budget=replace(budget, expansions=LONGEST))
@@ -152,7 +155,7 @@ class Vehicle:
             self.why_none = first.enclosed or "no way was found"
             return
         self._keep_ways(query, first.word, budget, AT_ONCE)
-        self.bound = lattice_bound(query)
+        self.bound = lattice_bound(query) if bounded else None
 
     def look_for_better_ways(self, budget: Budget) -> None:
         """Better ways past static obstacles, and others beside them."""
