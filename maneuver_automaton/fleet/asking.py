@@ -34,6 +34,7 @@ class Question:
     between: float  # [m] that any two vehicles keep
     known: float  # what it must cost less than
     most: int  # expansions
+    tube_m: float  # that the vehicle may be beside its plan
     keep: float  # [m] from obstacles, if that is less than its margin
 
     __repr__ = brief
@@ -79,6 +80,7 @@ def answered(
         budget=budget,
         known=question.known,
         most=question.most,
+        tube_m=question.tube_m,
         keep=keep,
     )
     return Answer(found, alone)

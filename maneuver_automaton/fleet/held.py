@@ -27,6 +27,7 @@ from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.collision.world import own_frame, world_of
+from maneuver_automaton.fleet.arriving import aimed_at, with_room
 from maneuver_automaton.fleet.conflicts import Course
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
 from maneuver_automaton.fleet.verdict import plan_of_motion
@@ -197,22 +198,24 @@ def proposal(
     budget: Budget,
     known: float,
     most: int,
+    tube_m: float = 0.0,
     keep: float = math.inf,
 ) -> tuple[Found | None, Found | None]:
     """Another plan past the others that costs less than `known`, and the way alone, if that does.
 
     Both from a time on, with what is committed. They keep the vehicle's margin, or a distance [m]
-    that is less.
+    that is less, and end where it arrives from anywhere in its tube.
     """
     head, problem = onward(vehicle, found, time, after)
     if problem is None:
         return None, None
+    problem = with_room(problem, tube_m)
     if keep < problem.margin:
         problem = replace(problem, margin=keep)
     there = Vehicle(
         vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
     )
-    there.plan_alone(budget)
+    there.plan_alone(budget, bounded=False)
     spent = 0.0 if head is None else vehicle.problem.cost_of(head)
     if there.alone is None or not there.alone.cost + spent < known:
         return None, None
@@ -233,11 +236,14 @@ def _after(vehicle: Vehicle, head: Plan | None, found: Found) -> Found:
     return Found(plan, cost, found.goal_index, vehicle.course_of(plan))
 
 
-def rejoined(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Iterator[Found]:
+def rejoined(
+    vehicle: Vehicle, found: Found, time: float, pose: Array, tube_m: float
+) -> Iterator[Found]:
     """A plan made to start where the vehicle was measured, in several ways; it arrives.
 
-    The same word with other times, three trims to one of its next joints, or as it is, if it then
-    ends within the goal's tolerance.
+    As it is, if it then ends where the vehicle arrives from anywhere in its tube; the same word
+    with other times; three trims to one of its next joints; or as it is, if it ends within the
+    goal's tolerance at all.
     """
     if not leads(found):
         yield resting(vehicle, pose, time)
@@ -245,18 +251,17 @@ def rejoined(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Iterat
     rest = rest_of_plan(vehicle, found, time)
     goal = vehicle.problem.goals[found.goal_index]
     here = vehicle.problem.starting_at(pose, time=rest.start_time)
-    plans = reanchored(here, rest, goal, pad=None, under_way=committed(rest, 0.0) > 0.0)
     moved = replace(rest, start=pose)
-    if within(moved.end, goal):
-        yield Found(
-            moved, vehicle.problem.cost_of(moved), found.goal_index, vehicle.course_of(moved)
-        )
-    if not moves_on(rest):
-        return
-    for plan in plans:
-        if allowed(here, plan):
-            cost = vehicle.problem.cost_of(plan)
-            yield Found(plan, cost, found.goal_index, vehicle.course_of(plan))
+    well = within(moved.end, with_room(here, tube_m).goals[found.goal_index])
+    plans: Iterator[Plan] = iter(())
+    if moves_on(rest):
+        aim = aimed_at(rest, goal) if switches_at_will(here) else goal
+        again = reanchored(here, rest, aim, pad=None, under_way=committed(rest, 0.0) > 0.0)
+        plans = (plan for plan in again if allowed(here, plan))
+    asis = [moved] if within(moved.end, goal) else []
+    for plan in itertools.chain(asis, plans) if well else itertools.chain(plans, asis):
+        cost = vehicle.problem.cost_of(plan)
+        yield Found(plan, cost, found.goal_index, vehicle.course_of(plan))
 
 
 def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:

@@ -20,10 +20,13 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, Lost
+from maneuver_automaton.fleet.arriving import tube_of
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.held import given_up
-from maneuver_automaton.fleet.horizon_step import FleetStepUnderWay, LoopSettings, LoopState
+from maneuver_automaton.fleet.horizon_step import step_of
 from maneuver_automaton.fleet.log import FleetStep
+from maneuver_automaton.fleet.loop_state import LoopSettings, LoopState
+from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
@@ -137,7 +140,7 @@ class FleetHorizon:
             LoopSettings(
                 step=step,
                 margin=margin,
-                tube_m=0.5 * fleet.margin if tube_m is None else tube_m,
+                tube_m=tube_of(fleet, tube_m),
                 time_limit=time_limit,
                 swaps_per_step=swaps_per_step,
                 at_once=at_once,
@@ -157,7 +160,7 @@ class FleetHorizon:
     def _knowledge(self, lost: Lost | None) -> Knowledge:
         if lost is not None:
             return Agreement(self.fleet.names, lost)
-        return AllHeard(lambda k, found: self._under_way.how_many_near(k, found))
+        return AllHeard(lambda k, found: self._now.how_many_near(k, found))
 
     def step(
         self,
@@ -198,8 +201,8 @@ class FleetHorizon:
             )
         stopped = {self._number_of(name) for name in broken_down}
         budget = Budget.from_now(state.settings.time_limit)
-        self._under_way = FleetStepUnderWay(state, at, poses, budget)
-        state.last = self._under_way.run(stopped)
+        self._now = Moment(state, at, poses, budget)
+        state.last = step_of(self._now, stopped)
         return state.last
 
     def assign(self, name: str, problem: Problem) -> None:

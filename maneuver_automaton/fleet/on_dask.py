@@ -13,7 +13,7 @@ from maneuver_automaton.fleet.vehicles import prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.wire import decoded, encoded
 
 REFERENCE = 12  # bytes that name a plan that is known already: number of the vehicle, and of it
-SETTINGS = 56  # bytes of the other numbers of a question
+SETTINGS = 64  # bytes of the other numbers of a question
 
 
 class Asked(NamedTuple):
@@ -22,7 +22,7 @@ class Asked(NamedTuple):
     base: int
     others: tuple[tuple[int, int, float], ...]  # number of a vehicle, of its plan, distance to keep
     new: dict[int, tuple[int, bytes]]  # by its number: whose it is, and the plan
-    settings: tuple[float, float, float, float, int, float]
+    settings: tuple[float, float, float, float, int, float, float]
     limit_s: float
 
 
@@ -41,7 +41,7 @@ class VehicleWorker:
             self.known[name] = decoded(self.vehicles[owner], said)
         used = {asked.base, *(name for _, name, _ in asked.others)}
         self.known = {name: found for name, found in self.known.items() if name in used}
-        time, after, between, known, most, keep = asked.settings
+        time, after, between, known, most, tube_m, keep = asked.settings
         question = Question(
             number=self.number,
             base=self.known[asked.base],
@@ -51,6 +51,7 @@ class VehicleWorker:
             between=between,
             known=known,
             most=most,
+            tube_m=tube_m,
             keep=keep,
         )
         vehicle, budget = self.vehicles[self.number], Budget.from_now(asked.limit_s)
@@ -144,6 +145,7 @@ class DaskWorkers:
                 question.between,
                 question.known,
                 question.most,
+                question.tube_m,
                 question.keep,
             ),
             limit_s=limit_s,

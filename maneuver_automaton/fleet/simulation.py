@@ -12,8 +12,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_at
 from maneuver_automaton.fleet.agreement import Lost
+from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.horizon import FleetHorizon
 from maneuver_automaton.fleet.log import FleetGuarantee, FleetLog, FleetStep, FleetViolation
@@ -115,7 +115,8 @@ def simulate_fleet(
             if name not in fleet.names:
                 raise ValueError(f"{what}: no vehicle is named {name!r}")
     if first is None:
-        first = _first_plans(fleet, set(joins_s), first_time_limit, seed)
+        tube = tube_of(fleet, tube_m)
+        first = _first_plans(fleet, set(joins_s), tube, first_time_limit, seed)
     loop = FleetHorizon(
         fleet,
         step=step,
@@ -143,20 +144,13 @@ def simulate_fleet(
 
 
 def _first_plans(
-    fleet: FleetProblem, later: set[str], time_limit: float, seed: int
+    fleet: FleetProblem, later: set[str], tube: float, time_limit: float, seed: int
 ) -> FleetResult | None:
-    """Plans of those that are there from the begin on."""
-    there = [k for k, name in enumerate(fleet.names) if name not in later]
+    """Plans of those that are there from the begin on, with room for noise where they end."""
+    there = set(fleet.names) - later
     if not there:
         return None
-    present = FleetProblem(
-        [fleet.problems[k] for k in there],
-        names=[fleet.names[k] for k in there],
-        margin=fleet.margin,
-        leaves=[fleet.leaves[k] for k in there],
-        priority=[fleet.priority[k] for k in there],
-    )
-    return plan_fleet(present, time_limit=time_limit, seed=seed)
+    return plan_fleet(fleet_with_room(fleet.only(there), tube), time_limit=time_limit, seed=seed)
 
 
 def _upsets(
@@ -194,16 +188,13 @@ class _Drive:
         self.pose = np.array(self.vehicle.problem.start)
         self.random = draws(self.upset, self.pose.size)
 
-    def drive(self, plan: Plan, time: float, step: float, number: int, noise: Array) -> Plan:
-        """Drive a plan for a step from where the vehicle is; what was driven."""
-        model = self.vehicle.problem.automaton.model
-        until = time + step - plan.start_time
-        if until <= NOTHING or not plan.trims:
-            piece = Plan(self.pose, (), durations=[], start_time=time)
-        else:
-            cut = with_samples_at(plan, [time + step], model)
-            piece = replace(head_of(cut, until), start=self.pose)
-            self.cost += self.vehicle.problem.cost_of(piece)
+    def drive(self, now: FleetStep, step: float, number: int, noise: Array) -> Plan:
+        """Drive what a step says from where the vehicle is, until the next one; what was driven."""
+        problem = self.vehicle.problem
+        until = now.time + step
+        piece = now.piece_of(self.vehicle.name, self.pose, until, problem.automaton.model)
+        if piece.trims:
+            self.cost += problem.cost_of(piece)
         piece = as_driven(piece, self.upset)
         self.pieces.append(piece)
         self.pose = np.array(piece.end)
@@ -283,7 +274,7 @@ class _World:
             # a void plan may undo an arrival
             if name not in now.arrived:
                 self.arrived_s.pop(name, None)
-            driven[k] = one.drive(now.driven[name], time, self.step, number, noises[name])
+            driven[k] = one.drive(now, self.step, number, noises[name])
             leaves_s[k] = one.leaves_at(now.plans[name])
         self.steps.append(self._judged(now, driven, leaves_s))
         return self.steps[-1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -18,13 +19,19 @@ from maneuver_automaton.collision.shapes import (
 from maneuver_automaton.fleet.conflicts import PROOF, Course, where_it_stays
 from maneuver_automaton.fleet.levels import levels_of
 from maneuver_automaton.fleet.refuge import by_a_refuge
-from maneuver_automaton.planning.blocked import blocked_ends, goals_left
+from maneuver_automaton.planning.blocked import (
+    blocked_ends,
+    goals_left,
+    proven_free,
+    why_goal_blocked,
+)
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in
 from maneuver_automaton.planning.result import LowerBound, PlanResult
+from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.planning.workspace import Workspace
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -39,6 +46,7 @@ LONG = 20_000  # ... and where nothing else helps
 AT_ONCE = Patience(attempts=0, passes=0)
 WITH_TIME = Patience(attempts=400, passes=2)
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
+MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
 LONGEST = 400_000  # expansions for a way alone
 LEAST_S, INERTIA_S, BETTER_S = 0.01, 5.0, 2.0  # [s] of a whole query: at least, and with inertia
 POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
@@ -123,19 +131,22 @@ class Vehicle:
             if one.height is None or (one.height[0] <= high + keep and one.height[1] >= low - keep)
         ]
 
-    def plan_alone(self, budget: Budget) -> None:
-        """Find its way past static obstacles, by itself, and a few others beside it."""
+    def plan_alone(self, budget: Budget, *, bounded: bool = True) -> None:
+        """Find its way past static obstacles, by itself, and a few others beside it.
+
+        And below which cost there is none, if that is wanted.
+        """
         blocked = blocked_ends(self.problem)
         if blocked is not None:
             self.why_none = blocked.reason
         elif self.at_will:
-            self._plan_words(budget)
+            self._plan_words(budget, bounded=bounded)
         else:
             result = self._planned(self.problem, budget, math.inf, improve=False)
             self.alone, self.why_none = self._found(result), result.reason
             self.bound = result.bound
 
-    def _plan_words(self, budget: Budget) -> None:
+    def _plan_words(self, budget: Budget, *, bounded: bool) -> None:
         """The same for one whose plans are words of the lattice."""
         query = self._query(self.problem)
         first = first_plan(query, budget=replace(budget, expansions=LONGEST))
@@ -144,7 +155,7 @@ class Vehicle:
             self.why_none = first.enclosed or "no way was found"
             return
         self._keep_ways(query, first.word, budget, AT_ONCE)
-        self.bound = lattice_bound(query)
+        self.bound = lattice_bound(query) if bounded else None
 
     def look_for_better_ways(self, budget: Budget) -> None:
         """Better ways past static obstacles, and others beside them."""
@@ -197,7 +208,7 @@ class Vehicle:
             limit = BETTER_S if again else INERTIA_S
             found = self._found(self._planned(problem, budget, limit, improve=again))
             return found if found is not None and found.cost < known else None
-        query = self._query(problem)
+        own, query = self.problem, self._query(problem)
         best: Word | None = None
         for way in self.ways:
             if way.cost >= (best.cost if best else known) or budget.is_over:
@@ -205,29 +216,42 @@ class Vehicle:
             timed = with_waits(query, way)
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
+        aims = tuple(enumerate(problem.goals))
         if best is None:
-            best = self._round_the_arrived(query, others, budget)
+            calm = self._past_the_arrived(others)
+            aims = self._aims(calm)
+            if not aims:
+                return None
+            goals = tuple(goal for _, goal in aims)
+            if goals != problem.goals:
+                own, calm = replace(own, goals=goals), replace(calm, goals=goals)
+                query = self._query(replace(problem, goals=goals))
+            best = self._round_the_arrived(query, calm, budget)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
             first = first_plan(query, budget=replace(budget, expansions=most))
             self._count(first.expansions)
             if first.word is not None and first.word.cost < (best.cost if best else math.inf):
                 best = first.word
         if best is None and most == LONG and self.alone is not None:
-            best = by_a_refuge(self.problem, query, self._query, self.alone.plan, budget)
+            best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
         best = improve(query, best, budget=budget, patience=AT_ONCE).word
         if not best.cost < known:
             return None
-        return self._word_found(query, best)
+        found = self._word_found(query, best)
+        return replace(found, goal_index=aims[found.goal_index][0])
 
     def past_arrived(
         self, arrived: Sequence[Obstacle], begin: float, budget: Budget
     ) -> Found | None:
         """A plan that rests until a time [s], and drives past others that all stand then."""
-        there = self.beside(arrived)
-        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *there))
-        if not self.at_will or blocked_ends(calm) is not None:
+        if not self.at_will:
+            return None
+        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *self.beside(arrived)))
+        aims = self._aims(calm)
+        calm = replace(calm, goals=tuple(goal for _, goal in aims) or calm.goals)
+        if not aims or blocked_ends(calm) is not None:
             return None
         query = self._query(calm)
         first = first_plan(query, budget=replace(budget, expansions=QUICK))
@@ -242,18 +266,41 @@ class Vehicle:
         steps = [*waits, *((SWITCH, trim, t) for trim, t in drives)]
         found = self._word_found(query, query.word_of(steps, word.goal))
         # The rest is in no library of a search past static obstacles, and so has no price there.
-        return replace(found, cost=self.problem.cost_of(found.plan))
+        return replace(
+            found,
+            cost=self.problem.cost_of(found.plan),
+            goal_index=aims[found.goal_index][0],
+        )
 
-    def _round_the_arrived(
-        self, query: LatticeQuery, others: Sequence[Obstacle], budget: Budget
-    ) -> Word | None:
-        """A way round those that stay at their goals, wherever they are now, with rests."""
+    def _past_the_arrived(self, others: Sequence[Obstacle]) -> Problem:
+        """Its problem where those that stay at their goals stand there already."""
         arrived = [
             where_it_stays(one)
             for one in others
             if one.motion is not None and one.presence[1] == math.inf
         ]
-        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
+        return replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
+
+    def _aims(self, calm: Problem) -> tuple[tuple[int, Goal], ...]:
+        """Where it may end among those that stay, each with its goal's number; empty if nowhere.
+
+        The goals themselves, or else poses within their tolerances. Who leaves may be there before.
+        """
+        goals = tuple(enumerate(calm.goals))
+        if self.leaves or not all(why_goal_blocked(calm, goal) for goal in calm.goals):
+            return goals
+        still = tuple(one for one in calm.obstacles if not moves(one))
+        found = list[tuple[int, Goal]]()
+        for k, goal in goals:
+            if goal.tolerance_m or goal.tolerance_rad:
+                aims = list(aims_within(calm, goal))
+                free = proven_free(replace(calm, obstacles=still), [one.pose for one in aims])
+                rows = (aim for aim, is_free in zip(aims, free, strict=True) if is_free)
+                found += [(k, aim) for aim in itertools.islice(rows, MOST_AIMS)]
+        return tuple(found)
+
+    def _round_the_arrived(self, query: LatticeQuery, calm: Problem, budget: Budget) -> Word | None:
+        """A way round those that stay at their goals, wherever they are now, with rests."""
         if blocked_ends(calm) is not None:
             return None
         first = first_plan(self._query(calm), budget=replace(budget, expansions=QUICK))

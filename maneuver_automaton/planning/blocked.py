@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -55,12 +56,15 @@ def _surely_free(problem: Problem) -> list[bool]:
 
     Not asked for where heights matter, where something moves, or for what a vehicle carries.
     """
-    none = [False] * (1 + len(problem.goals))
     if not problem.obstacles or problem.parts or problem.start.size > 3 or problem.moves:
-        return none
+        return [False] * (1 + len(problem.goals))
+    return proven_free(problem, [problem.start, *(goal.pose for goal in problem.goals)])
+
+
+def proven_free(problem: Problem, poses: Sequence[Array]) -> list[bool]:
+    """Whether the kernels prove poses in the plane free of all that stands, all in one call."""
     world = world_around(problem)
-    poses = np.array([problem.start, *(goal.pose for goal in problem.goals)])
-    aside = clearances(world, world.into(poses)).tolist()
+    aside = clearances(world, world.into(np.array(poses))).tolist()
     return [one > problem.margin + CLEARLY for one in aside]
 
 

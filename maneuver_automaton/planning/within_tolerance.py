@@ -7,8 +7,9 @@ coasting times of its word are solved for once more, and the end must be within 
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -96,16 +97,28 @@ def _aims(problem: Problem) -> Iterator[Goal]:
     """The goals themselves, then poses within their tolerances that are aimed at exactly."""
     yield from problem.goals
     for goal in problem.goals:
-        blocked = bool(why_goal_blocked(problem, goal))
-        poses = list(_poses_within(goal, problem.start, AROUND, RINGS[:1]))
-        if blocked:
-            poses += _poses_within(goal, problem.start, DENSE, RINGS)
-        if trim_headings(problem.automaton) is not None:  # a trim keeps its heading
-            poses = [pose for pose in poses if pose[2] == goal.pose[2]]
-        aims = [replace(goal, pose=pose, tolerance_m=0.0, tolerance_rad=0.0) for pose in poses]
-        if blocked:
-            aims = [aim for aim in aims if not why_goal_blocked(problem, aim)][:MOST_AIMS]
-        yield from aims
+        if why_goal_blocked(problem, goal):
+            free = (aim for aim in aims_within(problem, goal) if not why_goal_blocked(problem, aim))
+            yield from itertools.islice(free, MOST_AIMS)
+        else:
+            yield from _exactly(
+                problem, goal, _poses_within(goal, problem.start, AROUND, RINGS[:1])
+            )
+
+
+def aims_within(problem: Problem, goal: Goal) -> Iterator[Goal]:
+    """Poses within the tolerance of a goal that is blocked itself, aimed at exactly."""
+    few = _poses_within(goal, problem.start, AROUND, RINGS[:1])
+    many = _poses_within(goal, problem.start, DENSE, RINGS)
+    return _exactly(problem, goal, itertools.chain(few, many))
+
+
+def _exactly(problem: Problem, goal: Goal, poses: Iterable[Array]) -> Iterator[Goal]:
+    """Poses as goals without a tolerance; only those at the goal's heading if trims keep theirs."""
+    turns = trim_headings(problem.automaton) is None
+    for pose in poses:
+        if turns or pose[2] == goal.pose[2]:
+            yield replace(goal, pose=pose, tolerance_m=0.0, tolerance_rad=0.0)
 
 
 def _poses_within(

@@ -33,7 +33,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from maneuver_automaton._parallel import in_parallel
-from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.fleet import (
     FleetGuarantee,
     FleetLog,
@@ -44,7 +43,8 @@ from maneuver_automaton.fleet import (
     plan_fleet,
     simulate_fleet,
 )
-from maneuver_automaton.fleet.planning import vehicles_of
+from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
+from maneuver_automaton.problem import Goal
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.receding_horizon.settings import switches_at_will
 from tests.benchmarks.fleet_judge import distance_to, judged
@@ -101,7 +101,8 @@ def tried(piece: tuple[int, str], least: int, most: int) -> Row:
 def driven(seed: int, case: str, least: int, most: int) -> Row:
     """One loop, and what became of it."""
     fleet = mixed_fleet(seed, least=least, most=most)
-    first = plan_fleet(fleet, time_limit=LONG_S, max_rounds=0, seed=seed)
+    roomy = fleet_with_room(fleet, tube_of(fleet, None))
+    first = plan_fleet(roomy, time_limit=LONG_S, max_rounds=0, seed=seed)
     begun = time.process_time()
     times: list[float] = []
 
@@ -178,21 +179,16 @@ def left_behind(log: FleetLog) -> int:
     late = set(log.problem.names) - set(log.arrived_s) - set(log.broken_down)
     if not late:
         return 0
-    end, leading, standing = log.steps[-1], [], []
-    for name, problem in zip(log.problem.names, log.problem.problems, strict=True):
-        if name in end.poses:
-            here = problem.starting_at(end.poses[name], time=problem.start_time)
-            (leading if name in late else standing).append((name, here))
-    walls: tuple[Obstacle, ...] = ()
-    if standing:
-        rows = FleetProblem([one for _, one in standing])
-        walls = tuple(body for one in vehicles_of(rows) for body in one.standing.arrived)
-    fleet = FleetProblem(
-        [replace(one, obstacles=(*one.obstacles, *walls)) for _, one in leading],
-        names=[name for name, _ in leading],
-        margin=log.problem.margin,
-    )
-    return len(plan_fleet(fleet, time_limit=60.0, max_rounds=0).plans)
+    end = log.steps[-1]
+    names = [name for name in log.problem.names if name in end.poses]
+    rows = dict(zip(log.problem.names, log.problem.problems, strict=True))
+    problems = []
+    for name in names:
+        here = rows[name].starting_at(end.poses[name], time=rows[name].start_time)
+        problems.append(here if name in late else replace(here, goals=Goal(pose=here.start)))
+    fleet = FleetProblem(problems, names=names, margin=log.problem.margin)
+    found = plan_fleet(fleet, time_limit=60.0, max_rounds=0)
+    return len(late & set(found.plans))
 
 
 def line(rows: list[Row]) -> str:
