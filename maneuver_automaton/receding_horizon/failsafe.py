@@ -69,16 +69,21 @@ class Prediction:
 
 
 def predicted(here: Problem, settings: Settings, *, budget: Budget) -> Prediction:
-    """How far to look ahead: as far as is asked for, or until all obstacles are static."""
-    until = here.start_time + settings.look_ahead
-    if here.moves and settings.pad is not None:
-        until = min(until, last_event(here))
+    """The obstacles from here on, and how far they are looked at."""
     return Prediction(
         here=here,
         stand=max(settings.stand, settings.step),
-        until=max(until, here.start_time + settings.step),
+        until=looked_at(here, settings),
         budget=budget,
     )
+
+
+def looked_at(here: Problem, settings: Settings) -> float:
+    """Time [s] that is looked at: as far as is asked for, or until all obstacles are static."""
+    until = here.start_time + settings.look_ahead
+    if here.moves and settings.pad is not None:
+        until = min(until, last_event(here))
+    return max(until, here.start_time + settings.step)
 
 
 def last_event(problem: Problem) -> float:

@@ -53,6 +53,8 @@ def load_search(problem: Problem) -> None:
         load_linked_words()
         if problem.obstacles or problem.zones:
             load_maneuver_kernels()
+        if problem.moves:
+            load_fail_safe()
     elif problem.obstacles:
         load_lattice()
         load_fail_safe()

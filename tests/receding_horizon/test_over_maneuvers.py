@@ -247,10 +247,11 @@ def test_the_goal_must_stay_free_for_as_long_as_is_asked():
         footprint=Disc(0.2),
         search=SearchSettings(max_expansions=2000),
     )
-    for stand, deed in ((0.5, Deed.PLANNED), (6.0, Deed.STOPPED)):
+    for stand, deed in ((0.5, Deed.PLANNED), (6.0, Deed.APPROACHED)):
         _, step = ManeuverHorizon(problem, step=0.5, stand=stand, time_limit=30.0).step([0, 0, 0])
-        assert step.plan.duration < 7.0
         assert step.deed is deed, stand
+        arrives = bool(np.abs(step.plan.end - problem.goals[0].pose).max() < 1e-9)
+        assert arrives is (deed is Deed.PLANNED)
 
 
 def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
@@ -264,7 +265,7 @@ def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
     _, step = ManeuverHorizon(problem, step=1.0, time_limit=30.0).step([0.0, 0.0, 0.0])
     assert step.deed is Deed.MITIGATED
     assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
-    assert step.free_until == pytest.approx(0.925, abs=0.01)
+    assert 0.925 < step.free_until < 1.2  # as it stands it would be hit first of these
 
 
 @pytest.mark.slow
