@@ -1,9 +1,9 @@
 """Plans of a step over trims and maneuvers, from the end of the maneuver under way on.
 
 They serve every vehicle that does not switch at will, and conditions that the others do not know:
-zones, heights of obstacles, a fixed time that no rest fills. Among moving obstacles every step holds
-a motion that stays free: a plan to the goal after which it may stand there, or leave in time, or
-the begin of one and then a fail-safe trajectory, or that alone.
+zones, heights of obstacles, a fixed time that no rest fills. Among moving obstacles every step
+holds a motion that stays free: a plan to the goal after which it may stand there, or leave in time,
+or the begin of one and then a fail-safe trajectory, or that alone.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.needs import climbs_among_obstacles
 from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
-from maneuver_automaton.receding_horizon.failsafe import LEAST_AHEAD, looked_at
+from maneuver_automaton.receding_horizon.failsafe import LEAST_AHEAD, looked_at, settled
 from maneuver_automaton.receding_horizon.failsafe_search import FailSafe, search_fail_safe
 from maneuver_automaton.receding_horizon.log import Deed, Origin, first_part
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
@@ -39,6 +39,8 @@ from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_plan import plan_of_word
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
+WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
+PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
 LATE = 0.8  # share of a step's time after which no plan is searched where something moves
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
@@ -102,7 +104,7 @@ class OverManeuvers:
             return True  # without rest the end of the plan is the end
         stood = rested(plan, plan.trims[-1], self._stand)
         found = self._fail_safe_after(stood)
-        return found is None or found.complete
+        return not self._hit(plan, until=self.until) if found is None else found.complete
 
     def _fail_safe_after(self, plan: Plan) -> FailSafe | None:
         """A motion from the end of a plan; None if the library lacks the trim in which it ends."""
@@ -147,6 +149,9 @@ class OverManeuvers:
         if kept is not None:
             upper = kept.cost - self.settings.margin - TIE * (1.0 + abs(kept.cost))
         committed = 0.0 if now.head is None else here.cost_of(now.head)
+        share = FIRST_SHARE if now.last is None else 1.0
+        if here.moves and kept is None:
+            share = WORDS_SHARE
         guarded = bool(here.obstacles or here.zones) or bounded(here)
         found: list[Candidate] = []
         for index, goal in enumerate(problem.goals):
@@ -155,7 +160,7 @@ class OverManeuvers:
             words = search_insertion(
                 problem,
                 goal,
-                budget=self._for_plans.part(FIRST_SHARE if now.last is None else 1.0),
+                budget=self._for_plans.part(share),
                 alternatives=OTHERS if guarded else 0,
                 upper_bound=upper - committed,
             )
@@ -173,14 +178,19 @@ class OverManeuvers:
         if onward is None:
             return None
         if self.now.last is None:
-            return onward
+            return settled(onward)
         name = self.now.trim.name
         if name not in onward.automaton.trim_names:
             return None  # a plan with trims of its own is driven to its end
-        return replace(onward, start_trim=name)
+        return settled(replace(onward, start_trim=name))
 
     def otherwise(self) -> Candidate | None:
-        """The plan of the lattice, or of a planner, which is asked alone at first."""
+        """The plan of the lattice, or of a planner, which is asked alone at first.
+
+        Where something moves the planner comes first: it knows how to stop and steer as well.
+        """
+        if self.here.moves:
+            return self._planned(PLANNER_SHARE) or self._on_lattice()
         first = self.now.last is None
         found = self._on_lattice() if self.anew or not first else None
         return self._planned() if found is None else found
@@ -217,12 +227,12 @@ class OverManeuvers:
                 break
         return best
 
-    def _planned(self) -> Candidate | None:
-        """The plan that a planner finds from the end of the committed part."""
+    def _planned(self, share: float = 1.0) -> Candidate | None:
+        """The plan of a planner, from the end of the committed part on, in a share of the time."""
         now, limit, problem = self.now, self.now.longest, self._onward()
         if problem is None:
             return None
-        result = planned(problem, time_limit=max(self._for_plans.left, 1e-3))
+        result = planned(problem, time_limit=max(share * self._for_plans.left, 1e-3))
         if result.plan is None or result.goal_index is None:
             self.reason = f": {result.reason}"
             return None
