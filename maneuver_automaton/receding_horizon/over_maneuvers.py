@@ -12,14 +12,19 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
+
+from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import committed, head_of
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.needs import climbs_among_obstacles
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import LEAST_AHEAD, looked_at, settled
@@ -43,6 +48,7 @@ WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
 PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
 LATE = 0.8  # share of a step's time after which no plan is searched where something moves
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
+MOMENT = 1e-6  # [s]
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
 HALVINGS = 10  # of a plan's duration, to find out when it is hit
 
@@ -385,3 +391,20 @@ def with_trims_at_ends(problem: Problem) -> Problem:
         start_trim=problem.start_trim or name,
         goals=tuple(replace(goal, trim=goal.trim or name) for goal in problem.goals),
     )
+
+
+def within_its_margin(here: Problem) -> tuple[Problem, str]:
+    """The problem with a margin that the vehicle's own body keeps, and the one that it breaks.
+
+    One that is closer to an obstacle than the margin keeps half of its clearance.
+    """
+    body = replace(here, parts={}, zones=())
+    nowhere = Plan(here.start, (), durations=[], start_time=here.start_time)
+    if not what_is_hit(body, nowhere, here.goals[0]):
+        return here, ""
+    still = Trim(name="here", body_velocity=np.zeros(here.start.size), control=np.zeros(2))
+    stands = Plan(here.start, (still,), durations=[MOMENT], start_time=here.start_time)
+    found = closest_to(stands, Unicycle(), here.obstacles, footprint=here.footprint)
+    clearance = max(found.distance, 0.0)
+    broken = f"the clearance is {clearance:.3g} m, need {here.margin:g} m"
+    return replace(here, margin=0.5 * min(clearance, here.margin)), broken

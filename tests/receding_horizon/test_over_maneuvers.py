@@ -499,3 +499,21 @@ class TestAmongWhatMoves:
         loop = simulate(problem, step=0.5, time_limit=5.0, steps=14)
         assert loop.min_clearance_m > 0.0
         assert not any(step.deed is Deed.MITIGATED for step in loop.steps)
+
+    @pytest.mark.parametrize("static", [True, False])
+    def test_pushed_within_its_margin_it_drives_on_and_says_so(self, static):
+        wall = Box([4.0, 0.2], [0.0, -0.35])  # 0.1 m beside the body
+        problem = posed(
+            [5.0, 1.0, 0.0],
+            obstacles=[wall] if static else [wall, crossing(0.5)],
+            footprint=Box([0.4, 0.3]),
+            margin=0.08,
+            search=SearchSettings(max_expansions=300),
+        )
+        controller = ManeuverHorizon(problem, step=0.5, time_limit=20.0)
+        _, step = controller.step([0.0, -0.05, 0.0])  # 0.05 m
+        assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
+        assert "the clearance is 0.05 m, need 0.08 m" in step.violations[0].reason
+        assert step.deed is Deed.PLANNED
+        _, step = controller.step([0.0, 0.0, 0.0], elapsed=0.0)
+        assert Guarantee.SAFETY not in [one.guarantee for one in step.violations]
