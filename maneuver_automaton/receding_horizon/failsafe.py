@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.collision import AnyObstacle, Obstacle
 from maneuver_automaton.planning.tracking import free_until, stands_free
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.failsafe_search import FailSafe, search_fail_safe
@@ -69,28 +70,66 @@ class Prediction:
 
 
 def predicted(here: Problem, settings: Settings, *, budget: Budget) -> Prediction:
-    """How far to look ahead: as far as is asked for, or until all obstacles are static."""
-    until = here.start_time + settings.look_ahead
-    if here.moves and settings.pad is not None:
-        until = min(until, last_event(here))
+    """The obstacles from here on, and how far they are looked at."""
     return Prediction(
         here=here,
         stand=max(settings.stand, settings.step),
-        until=max(until, here.start_time + settings.step),
+        until=looked_at(here, settings),
         budget=budget,
     )
 
 
-def last_event(problem: Problem) -> float:
-    """Time [s] after which all obstacles are static; -inf if they always are.
+def looked_at(here: Problem, settings: Settings) -> float:
+    """Time [s] that is looked at: as far as is asked for, or until all obstacles are static."""
+    until = here.start_time + settings.look_ahead
+    if here.moves and settings.pad is not None:
+        quiet = here.quiet_after
+        comes = (isinstance(one, Obstacle) and one.presence[0] == quiet for one in here.obstacles)
+        until = min(until, quiet + settings.step if any(comes) else quiet)  # what comes last counts
+    return max(until, here.start_time + settings.step)
+
+
+def settled(problem: Problem) -> Problem:
+    """The problem without what is gone by its start, and with what has come to rest as it stands.
+
+    A search is quicker among obstacles that stand still.
 
     Examples
     --------
     >>> from maneuver_automaton import Automaton, Disc, Motion, Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
     >>> passing = Obstacle(Disc(1.0), motion=Motion([0, 4], [[2, -4, 0], [2, 4, 0]]))
-    >>> last_event(Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=passing))
-    4.0
+    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=passing)
+    >>> settled(problem).moves, settled(replace(problem, start_time=4.0)).moves
+    (True, False)
     """
-    motions = [one.motion for one in problem.obstacles if isinstance(one, Obstacle)]
-    return max((float(m.time[-1]) for m in motions if m is not None), default=-math.inf)
+    now, kinds = problem.start_time, []
+    for one in problem.obstacles:
+        kind = _KEPT
+        if isinstance(one, Obstacle) and one.motion is not None:
+            first, last = one.presence
+            if last < now:
+                kind = _GONE
+            elif one.motion.time[-1] <= now and first <= now and last == math.inf:
+                kind = _STANDS
+        kinds.append(kind)
+    if not any(kinds):
+        return problem
+    return replace(problem, obstacles=_as_they_stand(problem.obstacles, tuple(kinds)))
+
+
+_KEPT, _STANDS, _GONE = range(3)
+
+
+@functools.lru_cache(maxsize=8)
+def _as_they_stand(
+    obstacles: tuple[AnyObstacle, ...], kinds: tuple[int, ...]
+) -> tuple[AnyObstacle, ...]:
+    """The same values at every call, so that what was prepared for them serves again."""
+    found: list[AnyObstacle] = []
+    for one, kind in zip(obstacles, kinds, strict=True):
+        if kind == _STANDS and isinstance(one, Obstacle):
+            found.append(Obstacle(one.at(math.inf), height=one.height, name=one.name))
+        elif kind == _KEPT:
+            found.append(one)
+    return tuple(found)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.between import trims_between
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.tracking import stands_free
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import _kernels_failsafe as kernels
 from maneuver_automaton.receding_horizon.shifting import merged
 from maneuver_automaton.search._kernels_cells import EMPTY
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.scene import Scene
 
 CELL = 0.25  # of the search, in turning radii
 HEADINGS = 24
@@ -24,6 +27,7 @@ IMPATIENCE = 0.1  # seconds of safety that a second of driving is worth
 MOST_NODES = 2**16
 TIMELY = 16  # expansions between two looks at the clock
 MOST_EXPANSIONS = 4000
+WAITING = 1e6  # [s] a tick is less than that, unless no trim moves
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -69,17 +73,13 @@ def search_fail_safe(
     >>> found.complete, found.plan.word[-1], bool(abs(found.plan.end[0] - 2.0) > 1.0)
     (True, 'rest', True)
     """
-    query = lattice_query(problem, (0,))
-    library = query.library.arrays
-    twists = library.library.twists
-    still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
-    rest = int(still[0]) if still.size else -1
-    task = _task(query, rest, until)
+    query = lattice_query(_to_rest(problem), (0,))
+    library, scene = query.library.arrays, _scene(query)
+    task = _task(query, until)
     search = _arrays(MOST_NODES)
-    around = (query.world.arrays, query.world.body, search)
-    kernels.begin(task, library, *around)
+    kernels.begin(task, library, scene, search)
     left = max_expansions
-    while left > 0 and kernels.expand(task, library, *around, min(TIMELY, left)):
+    while left > 0 and kernels.expand(task, library, scene, search, min(TIMELY, left)):
         left -= TIMELY
         if budget.is_over:
             break
@@ -87,43 +87,71 @@ def search_fail_safe(
     node = int(state[kernels.BEST])
     free_until = float(search.nodes[node, kernels.SAFE])
     return FailSafe(
-        plan=_plan(query, search, node, rest),
+        plan=_plan(query, task, search, node),
         free_until=free_until,
-        complete=bool(state[kernels.FOUND]),
+        complete=bool(state[kernels.FOUND] >= 0),
         expansions=int(state[kernels.EXPANSIONS]),
     )
 
 
-def _task(query: LatticeQuery, rest: int, until: float) -> kernels.FailSafeTask:
+def _to_rest(problem: Problem) -> Problem:
+    """The problem with a rest to be reached, where maneuvers lead to one; its pose does not matter.
+
+    Otherwise trims that lead to none of the goals would be left out, the rest among them.
+    """
+    automaton = problem.automaton
+    if automaton.is_kinematic or automaton.rest is None:
+        return problem
+    first = automaton.index_of(problem.first_trim.name)
+    if first not in trims_between(automaton, first, [automaton.rest]):
+        return problem
+    rest = automaton.trims[automaton.rest].name
+    goal = replace(problem.goals[0], trim=rest, free_heading=False)
+    return replace(problem, goals=(goal,))
+
+
+def _scene(query: LatticeQuery) -> Scene:
+    """What motions are tested against; without bounds they may lead anywhere."""
+    if not (query.problem.bounds.x is None and query.problem.bounds.y is None):
+        return query.around
+    window, edge_window = query.around.window.copy(), query.around.edge_window.copy()
+    window[:4] = edge_window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
+    return query.around._replace(window=window, edge_window=edge_window)
+
+
+def _task(query: LatticeQuery, until: float) -> kernels.FailSafeTask:
     library = query.library
-    shortest = float(library.arrays.edge_durations[:, 0].min())
-    open_ = query.problem.bounds.x is None and query.problem.bounds.y is None
-    window = np.array(query.window)
-    if open_:
-        window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
+    arrays = library.arrays
+    numbered = arrays.library
+    m = numbered.n_trims
+    holds = arrays.edge_durations[:, 0]
+    tick = float(holds[holds > 0.0].min(initial=math.inf))
+    if not tick < WAITING:  # only maneuvers move it
+        tick = float(np.median(arrays.edge_time)) if arrays.edge_time.size else 1.0
+    still = np.flatnonzero(~numbered.twists[:m].any(axis=1))
+    rest_of = np.full(len(numbered.cost), -1)
+    rest_of[numbered.class_of[still][::-1]] = still[::-1]  # the first of each class
     return kernels.FailSafeTask(
-        x=float(query.start[0]),
-        y=float(query.start[1]),
-        heading=float(query.start[2]),
+        pose=tuple(query.start.tolist()),
+        trim=max(query.start_trim, 0),
         clock=float(query.problem.start_time),
         until=float(until),
-        rest=rest,
-        keep=float(query.keep),
-        margin=float(query.margin),
+        rests=bool(still.size),
+        rest_of=rest_of,
+        holds=np.where(holds < LONGEST * tick, holds, tick),
         cell=CELL * library.radius,
         headings=HEADINGS,
-        tick=shortest,
-        longest=LONGEST * shortest,
+        tick=tick,
+        longest=LONGEST * tick,
         impatience=IMPATIENCE,
-        window=window,
     )
 
 
 def _arrays(n: int) -> kernels.FailSafeArrays:
     """Room for `n` nodes, a power of two."""
     return kernels.FailSafeArrays(
-        nodes=np.empty((n, 6)),
-        links=np.empty((n, 2), dtype=np.int64),
+        nodes=np.empty((n, 8)),
+        links=np.empty((n, 3), dtype=np.int64),
         cells=np.full(4 * n, EMPTY),
         heap_key=np.empty(n),
         heap_node=np.empty(n, dtype=np.int64),
@@ -131,20 +159,58 @@ def _arrays(n: int) -> kernels.FailSafeArrays:
     )
 
 
-def _plan(query: LatticeQuery, search: kernels.FailSafeArrays, node: int, rest: int) -> Plan:
-    """The path to a node, and rest there as long as it is free."""
-    problem = query.problem
-    edges: list[tuple[int, float]] = []
-    if rest >= 0:
-        left = search.nodes[node, kernels.SAFE] - search.nodes[node, kernels.CLOCK]
-        edges.append((rest, float(left)))
+def _plan(
+    query: LatticeQuery, task: kernels.FailSafeTask, search: kernels.FailSafeArrays, node: int
+) -> Plan:
+    """The path to a node, and rest there, or the last trim, as long as that is free."""
+    problem, automaton, library = query.problem, query.automaton, query.library
+    rows: list[int] = []
+    last = node
     while search.links[node, kernels.PARENT] >= 0:
-        trim, t = search.links[node, kernels.TRIM], search.nodes[node, kernels.LASTING]
-        edges.append((int(trim), float(t)))
+        rows.append(node)
         node = int(search.links[node, kernels.PARENT])
-    trims = [problem.automaton.trims[query.library.trims[k]] for k, _ in reversed(edges)]
-    word, times = merged(trims, [t for _, t in reversed(edges)])
-    return Plan(problem.start, word, durations=times, start_time=problem.start_time)
+    word = [] if automaton.is_kinematic else [automaton.trims[library.trims[task.trim]]]
+    times, between = [0.0] * len(word), list[Maneuver | None]()
+    for row in reversed(rows):
+        edge = int(search.links[row, kernels.EDGE])
+        if edge >= 0:
+            maneuver = automaton.maneuvers[library.edge_maneuver[edge]]
+            begin, end = (automaton.trims[automaton.index_of(name)]
+                          for name in (maneuver.source, maneuver.target))  # fmt: skip
+            if word[-1].name != begin.name:
+                word, times, between = [*word, begin], [*times, 0.0], [*between, None]
+            word, times, between = [*word, end], [*times, 0.0], [*between, maneuver]
+        else:
+            held = automaton.trims[library.trims[search.links[row, kernels.TRIM]]]
+            _coast(word, times, between, held, float(search.nodes[row, kernels.LASTING]))
+    trim = int(search.links[last, kernels.TRIM])
+    rest = int(task.rest_of[library.arrays.library.class_of[trim]])
+    goes_on = trim if not task.rests and search.links[last, kernels.EDGE] >= 0 else rest
+    if goes_on >= 0:
+        left = search.nodes[last, kernels.SAFE] - search.nodes[last, kernels.CLOCK]
+        _coast(word, times, between, automaton.trims[library.trims[goes_on]], float(left))
+    if any(between):
+        start, at = problem.start, problem.start_time
+        return Plan(start, word, durations=times, maneuvers=tuple(between), start_time=at)
+    word_, durations = merged(word, times)
+    return Plan(problem.start, word_, durations=durations, start_time=problem.start_time)
+
+
+def _coast(
+    word: list[Trim],
+    times: list[float],
+    between: list[Maneuver | None],
+    trim: Trim,
+    lasting: float,
+) -> None:
+    """Append a coast to a word, or prolong its last one."""
+    if word and word[-1].name == trim.name:
+        times[-1] += lasting
+        return
+    if word:
+        between.append(None)
+    word.append(trim)
+    times.append(lasting)
 
 
 @functools.cache

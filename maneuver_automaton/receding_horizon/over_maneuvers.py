@@ -1,26 +1,35 @@
 """Plans of a step over trims and maneuvers, from the end of the maneuver under way on.
 
 They serve every vehicle that does not switch at will, and conditions that the others do not know:
-zones, heights of obstacles, a fixed time that no rest fills.
+zones, heights of obstacles, a fixed time that no rest fills. Among moving obstacles every step
+holds a motion that stays free: a plan to the goal after which it may stand there, or leave in time,
+or the begin of one and then a fail-safe trajectory, or that alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+import numpy as np
+
+from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import head_of
+from maneuver_automaton.automaton.cutting import committed, head_of
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.needs import climbs_among_obstacles
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
-from maneuver_automaton.receding_horizon.failsafe import last_event
-from maneuver_automaton.receding_horizon.log import Deed, Origin
+from maneuver_automaton.receding_horizon.failsafe import LEAST_AHEAD, looked_at, settled
+from maneuver_automaton.receding_horizon.failsafe_search import FailSafe, search_fail_safe
+from maneuver_automaton.receding_horizon.log import Deed, Origin, first_part
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
@@ -35,6 +44,11 @@ from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_plan import plan_of_word
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
+WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
+PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
+LATE = 0.8  # share of a step's time after which no plan is searched where something moves
+SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
+MOMENT = 1e-6  # [s]
 OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
 HALVINGS = 10  # of a plan's duration, to find out when it is hit
 
@@ -42,7 +56,6 @@ HALVINGS = 10  # of a plan's duration, to find out when it is hit
 class OverManeuvers:
     """A `StepSearch`: words of trims and maneuvers, then their lattice, checked by FCL."""
 
-    free_until = None
     knows_all = False
     improves = False
 
@@ -52,16 +65,29 @@ class OverManeuvers:
         self.settings = now.settings
         self.anew = now.here.moves or now.changed  # obstacles are not where they were
         self.reason = ""
+        self.until = looked_at(now.here, now.settings)  # [s] of the world's clock
+        self.unsafe: list[Plan] = []  # free plans that end where the vehicle cannot stay
         self.tried: list[Plan] = []  # motions that are hit
 
+    @property
+    def free_until(self) -> float | None:
+        """Time [s] until which plans are proven collision-free; None where nothing moves."""
+        return self.until if self.here.moves else None
+
     def is_safe(self, plan: Plan) -> bool:
-        """Whether a plan stays inside the bounds, is collision-free, and may stand at its end.
+        """Whether a plan stays inside the bounds, is free, and can be followed by a free motion.
 
         The rest of the last plan, from where it had said the vehicle would be, was checked before.
         """
         if plan is self.now.rest and self.now.off_plan == 0.0 and not self.anew:
             return True
-        return allowed(self.here, plan) and not self._hit(plan)
+        if not allowed(self.here, plan):
+            return False
+        if not self._hit(plan) and self._may_stay(plan):
+            return True
+        if self.here.moves and not what_is_hit(self.here, plan, self.here.goals[0]):
+            self.unsafe.append(plan)
+        return False
 
     def _hit(self, plan: Plan, *, until: float = -math.inf) -> str:
         """The obstacle that a plan hits, or that comes to its end at rest; empty if there is none.
@@ -69,10 +95,52 @@ class OverManeuvers:
         It must be free to stand there for a while, and until a time [s] of the world's clock.
         """
         if self.here.moves and plan.trims and plan.trims[-1].is_rest:
-            stand = max(self.settings.stand, self.settings.step)
             arrival = plan.start_time + plan.duration
-            plan = rested(plan, plan.trims[-1], max(stand, until - arrival))
+            plan = rested(plan, plan.trims[-1], max(self._stand, until - arrival))
         return what_is_hit(self.here, plan, self.here.goals[0])
+
+    @property
+    def _stand(self) -> float:
+        """Time [s] that the end of a plan must stay free."""
+        return max(self.settings.stand, self.settings.step)
+
+    def _may_stay(self, plan: Plan) -> bool:
+        """Whether a vehicle that stands at the end of a free plan can stay, or go away in time."""
+        if not self.here.moves or not plan.trims or not plan.trims[-1].is_rest:
+            return True  # without rest the end of the plan is the end
+        stood = rested(plan, plan.trims[-1], self._stand)
+        found = self._fail_safe_after(stood)
+        return not self._hit(plan, until=self.until) if found is None else found.complete
+
+    def _fail_safe_after(self, plan: Plan) -> FailSafe | None:
+        """A motion from the end of a plan; None if the library lacks the trim in which it ends."""
+        here, name = self.here, plan.trims[-1].name
+        if name not in here.automaton.trim_names:
+            return None
+        at = plan.start_time + plan.duration
+        there = replace(here, start=plan.end, start_time=at, start_trim=name)
+        until = max(self.until, at + LEAST_AHEAD)
+        return search_fail_safe(there, until=until, budget=self.now.budget)
+
+    def _continued(self, plan: Plan, after: float) -> Plan | None:
+        """The first seconds of a plan, then a fail-safe trajectory; None if either is not free.
+
+        A maneuver that is under way then is driven to its end.
+        """
+        piece = first_part(plan, after + committed(plan, after))
+        if not piece.trims:
+            return None
+        found = self._fail_safe_after(piece)
+        if found is None or not found.complete:
+            return None
+        whole = followed_by(piece, found.plan)
+        return whole if allowed(self.here, whole) and not self._hit(whole) else None
+
+    @property
+    def _for_plans(self) -> Budget:
+        """The budget to search a plan in: where something moves, a part is for a fail-safe one."""
+        late = 1.0 - LATE if self.here.moves else 0.0
+        return self.now.budget.before(late * self.settings.time_limit) if late else self.now.budget
 
     def cheaper(self, kept: Candidate | None) -> list[Candidate]:
         """The cheapest safe word for each goal, if it costs less than the kept plan.
@@ -87,15 +155,18 @@ class OverManeuvers:
         if kept is not None:
             upper = kept.cost - self.settings.margin - TIE * (1.0 + abs(kept.cost))
         committed = 0.0 if now.head is None else here.cost_of(now.head)
+        share = FIRST_SHARE if now.last is None else 1.0
+        if here.moves and kept is None:
+            share = WORDS_SHARE
         guarded = bool(here.obstacles or here.zones) or bounded(here)
         found: list[Candidate] = []
         for index, goal in enumerate(problem.goals):
-            if now.budget.is_over:
+            if self._for_plans.is_over:
                 break
             words = search_insertion(
                 problem,
                 goal,
-                budget=now.budget.part(FIRST_SHARE if now.last is None else 1.0),
+                budget=self._for_plans.part(share),
                 alternatives=OTHERS if guarded else 0,
                 upper_bound=upper - committed,
             )
@@ -113,21 +184,32 @@ class OverManeuvers:
         if onward is None:
             return None
         if self.now.last is None:
-            return onward
+            return settled(onward)
         name = self.now.trim.name
         if name not in onward.automaton.trim_names:
             return None  # a plan with trims of its own is driven to its end
-        return replace(onward, start_trim=name)
+        return settled(replace(onward, start_trim=name))
 
     def otherwise(self) -> Candidate | None:
-        """The plan of the lattice, or of a planner, which is asked alone at first."""
+        """The plan of the lattice, or of a planner, which is asked alone at first.
+
+        Where something moves the planner comes first: it knows how to stop and steer as well.
+        """
+        if self.here.moves:
+            return self._planned(PLANNER_SHARE) or self._on_lattice()
         first = self.now.last is None
         found = self._on_lattice() if self.anew or not first else None
         return self._planned() if found is None else found
 
     def _on_lattice(self) -> Candidate | None:
         problem = self._onward()
-        if problem is None or not problem.automaton.maneuvers:
+        return None if problem is None else self._best_on_lattice(problem, self.is_safe)
+
+    def _best_on_lattice(
+        self, problem: Problem, is_good: Callable[[Plan], bool], *, first: bool = False
+    ) -> Candidate | None:
+        """The cheapest good plan of the lattice, or its first, after the committed part."""
+        if not problem.automaton.maneuvers:
             return None
         goals = open_goals(problem)
         if not goals:
@@ -135,7 +217,7 @@ class OverManeuvers:
         query = lattice_query(problem, goals)
         best: Candidate | None = None
         for incumbent in incumbent_words(
-            query, budget=replace(self.now.budget, expansions=problem.search.max_expansions)
+            query, budget=replace(self._for_plans, expansions=problem.search.max_expansions)
         ):
             if incumbent.word is None:
                 continue
@@ -144,17 +226,19 @@ class OverManeuvers:
                 problem, plan_of_word(query, incumbent.word), problem.goals[owner]
             ):
                 one = self.now.candidate(self.now.whole(plan), owner, Origin.SEARCHED)
-                if (best is None or one.cost < best.cost) and self.is_safe(one.plan):
+                if (best is None or one.cost < best.cost) and is_good(one.plan):
                     best = one
                     break
+            if first and best is not None:
+                break
         return best
 
-    def _planned(self) -> Candidate | None:
-        """The plan that a planner finds from the end of the committed part."""
+    def _planned(self, share: float = 1.0) -> Candidate | None:
+        """The plan of a planner, from the end of the committed part on, in a share of the time."""
         now, limit, problem = self.now, self.now.longest, self._onward()
         if problem is None:
             return None
-        result = planned(problem, time_limit=max(now.budget.left, 1e-3))
+        result = planned(problem, time_limit=max(share * self._for_plans.left, 1e-3))
         if result.plan is None or result.goal_index is None:
             self.reason = f": {result.reason}"
             return None
@@ -173,25 +257,63 @@ class OverManeuvers:
         return f"no word was found to the goal from {off:.3g} off the plan{self.reason}"
 
     def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
-        """Fail-safe trajectories: to brake, or to drive the last plan to its end.
+        """Fail-safe trajectories: to go on for a while, to brake, to evade, or the last plan.
 
         The last plan comes first unless obstacles have changed. The committed part is driven in
         any case.
         """
         rest, here = self.now.rest, self.here
+        for plan in self._ambitions() if here.moves else ():
+            for share in SHARES:
+                towards = self._continued(plan, share * self.settings.step)
+                if towards is not None:
+                    yield towards, Deed.APPROACHED
         motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
-        self.tried = [plan for plan in motions if plan is not None and plan.trims]
-        ahead = min(here.start_time + self.settings.look_ahead, last_event(here))
-        for until in (ahead, -math.inf):
-            for plan in self.tried:
+        kept = [plan for plan in motions if plan is not None and plan.trims]
+        self.tried = [*kept]
+        for until in (self.until, -math.inf):
+            for plan in kept:
                 if not self._hit(plan, until=until):
                     yield plan, Deed.APPROACHED if moves_on(plan) else Deed.STOPPED
+            if here.moves and until == self.until:
+                yield from self._evasions()
+
+    def _ambitions(self) -> Iterator[Plan]:
+        """Plans to the goal that may be followed for a moment."""
+        yield from self.unsafe
+        now, onward = self.now, self._onward()
+        if now.last is not None and now.last.deed.leads and now.rest is not None:
+            yield now.rest
+        if onward is None or now.budget.is_over:
+            return
+        static = tuple(one for one in onward.obstacles if not moves(one))
+        anyhow = Horizon(max_trims=onward.horizon.max_trims, min_coast=onward.horizon.min_coast)
+        calm = replace(onward, obstacles=static, horizon=anyhow)
+        found = self._best_on_lattice(calm, lambda plan: allowed(self.here, plan), first=True)
+        if found is not None:
+            yield found.plan
+
+    def _evasions(self) -> Iterator[tuple[Plan, Deed]]:
+        """Motions from the end of the committed part that stay free, or from that of the last plan.
+
+        One that does not stay free for long enough may be the one that is hit last.
+        """
+        for begun in (self._standing(0.0), self.now.rest):
+            if begun is None or not begun.trims:
+                continue
+            found = self._fail_safe_after(begun)
+            if found is None:
+                continue
+            plan = followed_by(begun, found.plan)
+            if found.complete and not self._hit(plan, until=self.until):
+                yield plan, Deed.EVADED if moves_on(found.plan) else Deed.STOPPED
+            self.tried.append(plan)
 
     def _braking(self) -> Plan | None:
         """The committed part, then the quickest maneuvers to rest; None if there are none."""
         begin, automaton = self.now.trim, self.here.automaton
         if begin.is_rest or (self.now.last is None and not self.anew):
-            return self._standing()
+            return self._standing(self.settings.step)
         if automaton.rest is None or begin.name not in automaton.trim_names:
             return None
         library = priced_library(automaton, Cost(time=1.0))
@@ -204,9 +326,9 @@ class OverManeuvers:
         lasting = [0.0] * len(links) + [self.settings.step]
         return self._then(Plan(self.here.start, trims, durations=lasting, maneuvers=maneuvers))
 
-    def _standing(self) -> Plan:
-        """The committed part, then a step at rest; no time in a trim that moves."""
-        lasting = self.settings.step if self.now.trim.is_rest else 0.0
+    def _standing(self, lasting: float) -> Plan:
+        """The committed part, then so long [s] at rest; no time in a trim that moves."""
+        lasting = lasting if self.now.trim.is_rest else 0.0
         return self._then(Plan(self.here.start, (self.now.trim,), durations=[lasting]))
 
     def _then(self, plan: Plan) -> Plan:
@@ -217,7 +339,8 @@ class OverManeuvers:
 
     def mitigation(self) -> Mitigation:
         """Of braking and driving on, the motion that is hit later."""
-        found = [self._contact(plan) for plan in self.tried or [self._standing()]]
+        still = self._standing(self.settings.step)
+        found = [self._contact(plan) for plan in self.tried or [still]]
         return max(found, key=lambda one: one.contact)
 
     def _contact(self, plan: Plan) -> Mitigation:
@@ -268,3 +391,20 @@ def with_trims_at_ends(problem: Problem) -> Problem:
         start_trim=problem.start_trim or name,
         goals=tuple(replace(goal, trim=goal.trim or name) for goal in problem.goals),
     )
+
+
+def within_its_margin(here: Problem) -> tuple[Problem, str]:
+    """The problem with a margin that the vehicle's own body keeps, and the one that it breaks.
+
+    One that is closer to an obstacle than the margin keeps half of its clearance.
+    """
+    body = replace(here, parts={}, zones=())
+    nowhere = Plan(here.start, (), durations=[], start_time=here.start_time)
+    if not what_is_hit(body, nowhere, here.goals[0]):
+        return here, ""
+    still = Trim(name="here", body_velocity=np.zeros(here.start.size), control=np.zeros(2))
+    stands = Plan(here.start, (still,), durations=[MOMENT], start_time=here.start_time)
+    found = closest_to(stands, Unicycle(), here.obstacles, footprint=here.footprint)
+    clearance = max(found.distance, 0.0)
+    broken = f"the clearance is {clearance:.3g} m, need {here.margin:g} m"
+    return replace(here, margin=0.5 * min(clearance, here.margin)), broken

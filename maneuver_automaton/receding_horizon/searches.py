@@ -13,6 +13,7 @@ from maneuver_automaton.receding_horizon.over_maneuvers import (
     OverManeuvers,
     needs_maneuvers,
     with_trims_at_ends,
+    within_its_margin,
 )
 from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Situation
@@ -36,6 +37,8 @@ def started(
     maneuvers, broken = needs_maneuvers(here), ""
     if maneuvers:
         here = with_trims_at_ends(here)
+        if here.margin and here.obstacles and here.start.size == 3:
+            here, broken = within_its_margin(here)
     elif here.obstacles:
         here, broken = as_it_stands(here)
     now = Situation(settings, here, last, passed=passed, budget=budget, changed=changed)
@@ -53,6 +56,8 @@ def load_search(problem: Problem) -> None:
         load_linked_words()
         if problem.obstacles or problem.zones:
             load_maneuver_kernels()
+        if problem.moves:
+            load_fail_safe()
     elif problem.obstacles:
         load_lattice()
         load_fail_safe()

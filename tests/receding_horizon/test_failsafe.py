@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds
+from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.receding_horizon import search_fail_safe
 from maneuver_automaton.receding_horizon.mitigation import mitigate
+from tests.inertia import unicycle_automaton
+from tests.matrix.vehicles import VEHICLES
 from tests.receding_horizon.scenes import among, cannot_stop, crossing, moving_obstacle
 from tests.scenes import moving_scene
 from tests.solids import World, driven, outside
@@ -112,3 +115,93 @@ class TestMitigation:
         found = mitigate(among(wall, robot=cannot_stop()), step=0.5, until=6.0)
         assert "rest" not in found.plan.word
         assert found.contact == 6.0
+
+
+def with_inertia(*obstacles, automaton=None, **changed) -> Problem:
+    """A robot of half a metre that needs a second to reach its speed, and as long to stop."""
+    robot = automaton or unicycle_automaton()
+    return Problem(
+        robot,
+        changed.pop("start", [0.0, 0.0, 0.0]),
+        Goal(pose=[5.0, 0.0, 0.0], trim=changed.pop("goal_trim", None)),
+        obstacles=obstacles,
+        footprint=Box([0.5, 0.3]),
+        **changed,
+    )
+
+
+class TestWithInertia:
+    @pytest.mark.parametrize("trim", [None, "1, 0", "0.8, 0.8", "-0.6, 0"])
+    @pytest.mark.parametrize("margin", [0.0, 0.1])
+    def test_it_goes_out_of_the_way_by_maneuvers(self, trim, margin):
+        problem = with_inertia(COMING, start_trim=trim, margin=margin)
+        found = search_fail_safe(problem, until=12.0)
+        assert found.complete
+        assert any(found.plan.maneuvers)
+        assert found.plan.trims[0].name == (trim or "rest")
+        assert found.plan.trims[-1].is_rest
+        assert found.plan.duration >= 12.0 - 1e-9
+        audit = audit_plan(
+            found.plan,
+            Goal(pose=found.plan.end),
+            problem.automaton.model,
+            footprint=problem.footprint,
+            obstacles=problem.obstacles,
+            margin=margin,
+        )
+        assert audit.passed, audit.reason
+
+    def test_where_nothing_moves_it_brakes(self):
+        found = search_fail_safe(with_inertia(start_trim="1, 0"), until=3.0)
+        assert found.complete
+        assert found.plan.trims[-1].is_rest
+        assert 0.0 < found.plan.end[0] < 2.0
+
+    def test_before_a_wall_it_turns_off(self):
+        """It needs half a metre to stop, there is less: a turn on the way leads past."""
+        edge = Box([0.2, 2.0], [0.75, -1.12])
+        found = search_fail_safe(with_inertia(edge, start_trim="1, 0"), until=10.0)
+        assert found.complete
+        assert found.plan.end[1] > 0.0
+
+    def test_a_moved_scene_has_the_moved_trajectory(self):
+        move = SE2(np.array([-20.0, 7.0, 2.5]))
+        problem = with_inertia(COMING, start_trim="1, 0")
+        one, two = (search_fail_safe(p, until=12.0) for p in (problem, problem.moved(move)))
+        assert [m and m.name for m in one.plan.maneuvers] == [
+            m and m.name for m in two.plan.maneuvers
+        ]
+        assert two.plan.durations == pytest.approx(one.plan.durations, abs=1e-6)
+        assert (move @ SE2(one.plan.end)).pose[:2] == pytest.approx(two.plan.end[:2], abs=1e-6)
+
+    def test_inside_bounds_there_may_be_none(self):
+        problem = with_inertia(COMING, start_trim="1, 0", bounds=LANE)
+        found = search_fail_safe(problem, until=40.0)
+        assert not found.complete
+        assert found.free_until > 1.0
+
+    def test_one_that_cannot_rest_drives_on(self):
+        states = ((1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
+        problem = with_inertia(
+            COMING, automaton=unicycle_automaton(states), start_trim="1, 0", goal_trim="1, 0",
+        )  # fmt: skip
+        found = search_fail_safe(problem, until=12.0)
+        assert found.complete
+        assert found.plan.duration == pytest.approx(12.0)
+        assert not any(trim.is_rest for trim in found.plan.trims)
+
+    def test_with_a_trailer_both_parts_are_free(self):
+        vehicle = VEHICLES["car_with_trailer"]
+        coming = moving_obstacle([0.0, 40.0], [(-40.0, 0.0), (40.0, 0.0)], Disc(2.0))
+        problem = vehicle.problem(obstacles=[coming])
+        found = search_fail_safe(problem, until=40.0)
+        assert found.complete
+        audit = audit_plan(
+            found.plan,
+            Goal(pose=found.plan.end),
+            problem.automaton.model,
+            footprint=problem.footprint,
+            parts=problem.parts,
+            obstacles=problem.obstacles,
+        )
+        assert audit.passed, audit.reason
