@@ -285,6 +285,7 @@ WITH_INERTIA = {
     "robot_with_inertia",
     "tpcap_full",
     "trailer",
+    "yard_loop",
 }
 
 
