@@ -1,10 +1,11 @@
 """Queries between random poses of one map, many of them, and a picture of what they cost.
 
-``python tests/benchmarks/reachable.py --queries 1000000 --jobs 2`` (some hours) makes first plans,
-each checked by FCL and the audit, from pose to pose anywhere on the map, and draws where goals are
-reached, and how long the way is over the straight line. Called again after an interruption it goes
-on. ``--compare`` plans the first thousand one by one, in two processes and on a local Dask cluster
-of two workers: queries a second, and whether all answers are the same to the last bit.
+``python tests/benchmarks/reachable.py --queries 1000000 --jobs 2`` (half an hour) makes first
+plans, each checked by FCL and the audit, from pose to pose anywhere on the map, and draws where
+goals are reached, and how long the way is over the straight line. Called again after an
+interruption it goes on. ``--compare`` plans the first thousand one by one, in two processes and on
+a local Dask cluster of two workers: queries a second, and whether all answers are the same to the
+last bit.
 """
 
 from __future__ import annotations
@@ -107,15 +108,17 @@ def draw(planner: Planner, starts: np.ndarray, goals: np.ndarray, rows: list, pa
     longer = np.bincount(at[far], cost[far] / straight[far], n) / np.maximum(
         np.bincount(at[far], minlength=n), 1
     )
-    figure = Figure(figsize=(11.0, 4.6), layout="constrained")
-    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    tall = shape[0] / shape[1] > 0.7
+    figure = Figure(figsize=(11.0, 4.6) if tall else (7.5, 7.8), layout="constrained")
+    left, right = figure.subplots(*((1, 2) if tall else (2, 1)), sharex=True, sharey=True)
+    most = max(float(np.percentile(longer[longer > 0], 99.5)), 1.05) if far.any() else 2.0
     area = (low[0], low[0] + extent[0], low[1], low[1] + shape[0] * size)
     for axes, values, label, title, known in (
         (left, share, "share of queries", "goals that are reached", asked > 0),
         (right, longer, "cost over straight line [-]", "how long the way is", longer > 0),
     ):
         shown = np.where(known, values, np.nan).reshape(shape)
-        limits = {"vmin": 0.0, "vmax": 1.0} if axes is left else {"vmin": 1.0, "vmax": 3.0}
+        limits = {"vmin": 0.0, "vmax": 1.0} if axes is left else {"vmin": 1.0, "vmax": most}
         image = axes.imshow(
             shown, origin="lower", extent=area, cmap="viridis", aspect="equal", **limits
         )
@@ -124,7 +127,7 @@ def draw(planner: Planner, starts: np.ndarray, goals: np.ndarray, rows: list, pa
         whole = (cells.origin[0], far_x, cells.origin[1], far_y)
         axes.imshow(blocked, origin="lower", extent=whole, cmap="gray_r", aspect="equal", vmin=0)
         axes.set(xlim=area[:2], ylim=area[2:])
-        figure.colorbar(image, ax=axes, label=label, shrink=0.8)
+        figure.colorbar(image, ax=axes, label=label, fraction=0.024, pad=0.02)
         axes.set(title=title, xlabel="x [m]", ylabel="y [m]")
     figure.savefig(path, dpi=150)
 
