@@ -20,6 +20,8 @@ _kernels = _kept / "kernels"
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels))
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
 
+SOME = 3  # of the slow parameters of a test every third is tried with `-m 'slow and not exhaustive'`
+
 for name, examples in (("few", FEW), ("many", MANY)):
     settings.register_profile(
         name,
@@ -48,8 +50,17 @@ def pytest_configure(config: pytest.Config) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+@pytest.hookimpl(tryfirst=True)  # before marks are chosen from
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Let `-m slow` try the laws again, with more numbers."""
+    """Let `-m slow` try the laws again, with more numbers, and few of many parameters."""
+    several: dict[str, list[pytest.Item]] = {}
     for item in items:
         if _takes_long(config) and hasattr(getattr(item, "obj", None), "hypothesis"):
             item.add_marker("slow")
+        one_by_one = item.path.name == "test_readme.py"  # each is another page
+        if item.get_closest_marker("slow") and hasattr(item, "callspec") and not one_by_one:
+            several.setdefault(item.nodeid.split("[")[0], []).append(item)
+    for rows in several.values():
+        for number, item in enumerate(rows):
+            if number % SOME:
+                item.add_marker("exhaustive")
