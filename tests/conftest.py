@@ -20,7 +20,7 @@ _kernels = _kept / "kernels"
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels))
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
 
-SOME = 3  # of the slow parameters of a test every third is tried with `-m 'slow and not exhaustive'`
+SOME = 3  # every third of the slow parameters of a test is tried before a change is offered
 
 for name, examples in (("few", FEW), ("many", MANY)):
     settings.register_profile(
