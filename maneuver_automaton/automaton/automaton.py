@@ -338,6 +338,11 @@ class Automaton:
         )
 
 
+def same_state(one: Array, other: Array) -> bool:
+    """Whether two reduced states (n_z,) are the same to within rounding."""
+    return bool((np.abs(one - other) <= FITS * np.maximum(1.0, np.abs(other))).all())
+
+
 def _check_fit(maneuver: Maneuver, source: Trim, target: Trim) -> None:
     """A maneuver moves poses of the vehicle, and its course leads from trim to trim."""
     if maneuver.displacement.shape != source.body_velocity.shape:
@@ -350,8 +355,7 @@ def _check_fit(maneuver: Maneuver, source: Trim, target: Trim) -> None:
     ends = (maneuver.course.reduced_state[0], maneuver.course.reduced_state[-1])
     for word, state, trim in zip(("begins", "ends"), ends, (source, target), strict=True):
         fits = state.shape == trim.reduced_state.shape
-        scale = np.maximum(1.0, np.abs(trim.reduced_state))
-        if not fits or (np.abs(state - trim.reduced_state) > FITS * scale).any():
+        if not fits or not same_state(state, trim.reduced_state):
             raise InvalidAutomaton(
                 f"maneuver {maneuver.name!r}: {word} at the reduced state {vector_text(state)}, "
                 f"but trim {trim.name!r} has {vector_text(trim.reduced_state)}"

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton.cutting import begin_state
 from maneuver_automaton.automaton.plan import Plan
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.models import Model
@@ -57,7 +58,7 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         return replace(plan, start=behind.pose)
     states = np.array([trim.reduced_state for trim in plan.trims])
     adjoints = frame(states).inverse().adjoint()
-    start = group(plan.start) @ frame(_first_state(plan))
+    start = group(plan.start) @ frame(begin_state(plan))
     return replace(
         plan,
         start=start.pose,
@@ -67,15 +68,6 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         ),
         maneuvers=_maneuvers(plan.maneuvers, frame),
     )
-
-
-def _first_state(plan: Plan) -> Array:
-    """Reduced state at the begin of a plan, which may be cut within a maneuver."""
-    first = plan.primitives[0] if plan.primitives else plan.trims[0]
-    if isinstance(first, Maneuver) and first.course is not None:
-        begin: Array = first.course.reduced_state[0]
-        return begin
-    return plan.trims[0].reduced_state
 
 
 def _maneuvers(

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.plan import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
@@ -158,15 +159,56 @@ def last_times(durations: Sequence[float], after: float) -> list[float]:
 
 
 def committed(plan: Plan, after: float) -> float:
-    """Seconds until the maneuver ends that is under way `after` seconds; 0 in a trim."""
+    """Seconds until the maneuver ends that is under way `after` seconds; 0 in a trim.
+
+    What is left of a plan may start within a maneuver: then that is under way from its start on.
+
+    Examples
+    --------
+    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0], reduced_state=[0])
+    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0], reduced_state=[1])
+    >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1, 0, 0], duration=2,
+    ...     course=Trajectory(time=np.array([0.0, 1.0, 2.0]), control=np.ones((3, 1)),
+    ...                       pose=np.array([[0, 0, 0], [0.25, 0, 0], [1.0, 0, 0]]),
+    ...                       reduced_state=np.array([[0.0], [0.5], [1.0]])))
+    >>> plan = Plan([0, 0, 0], (rest, ahead), durations=[0.0, 3.0], maneuvers=(go,))
+    >>> [committed(plan, time) for time in (0.0, 0.5, 2.0)], committed(tail_of(plan, 1.0), 0.0)
+    ([0.0, 1.5, 0.0], 1.0)
+    """
     if not any(plan.maneuvers):
         return 0.0
     begins = plan.switching_times - plan.start_time
     for k, piece in enumerate(plan.primitives):
-        inside = begins[k] + NOTHING < after < begins[k + 1] - NOTHING
-        if inside and isinstance(piece, Maneuver):
+        begun = begins[k] + NOTHING < after or (k == 0 and _starts_within(plan))
+        if begun and after < begins[k + 1] - NOTHING and isinstance(piece, Maneuver):
             return float(begins[k + 1] - after)
     return 0.0
+
+
+def begin_state(plan: Plan) -> Array:
+    """Reduced state (n_z,) in which a plan of at least one trim starts, say within a maneuver."""
+    first = plan.primitives[0] if plan.primitives else plan.trims[0]
+    if isinstance(first, Maneuver) and first.course is not None:
+        begin: Array = first.course.reduced_state[0]
+        return begin
+    return first.reduced_state if isinstance(first, Trim) else plan.trims[0].reduced_state
+
+
+def end_state(plan: Plan) -> Array:
+    """Reduced state (n_z,) in which a plan of at least one trim ends, say within a maneuver."""
+    last = plan.primitives[-1] if plan.primitives else plan.trims[-1]
+    if isinstance(last, Maneuver) and last.course is not None:
+        end: Array = last.course.reduced_state[-1]
+        return end
+    return last.reduced_state if isinstance(last, Trim) else plan.trims[-1].reduced_state
+
+
+def _starts_within(plan: Plan) -> bool:
+    """Whether a plan starts within a maneuver: not in the state of the trim before it."""
+    number = next(k for k, one in enumerate(plan.maneuvers) if one is not None)
+    if not isinstance(plan.primitives[0], Maneuver):
+        return False
+    return not same_state(begin_state(plan), plan.trims[number].reduced_state)
 
 
 def joined(first: Plan, second: Plan) -> Plan:

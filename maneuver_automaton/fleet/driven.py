@@ -16,11 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import audit_plan, closest_to
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import begin_state, end_state
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape
@@ -29,6 +31,7 @@ from maneuver_automaton.fleet.result import Closest
 from maneuver_automaton.fleet.verdict import CONTACT, NEAR, plan_of_motion
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Omnidirectional
+from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.problem import Goal, Problem
 
 STEP_S = 0.005  # between the times at which bodies are placed
@@ -185,13 +188,24 @@ def _clearance(
 
 
 def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
-    """Why a piece is none of the model's motions; those of another vehicle are not looked at."""
+    """Why what was driven is none of the model's motions; trims of others are not looked at.
+
+    Each piece is one. With inertia it begins with the speed, or whatever else is no pose, with
+    which the one before it ended.
+    """
+    before: Plan | None = None
     for piece in pieces:
         if piece.trims and _is_nominal(piece, problem.automaton):
             goal = Goal(pose=piece.end)
             audit = audit_plan(piece, goal, problem.automaton.model, footprint=(), obstacles=())
             if not audit.passed:
                 return f"at {piece.start_time:.6g} s: {audit.reason}"
+        if has_inertia(problem) and piece.trims:
+            was = problem.first_trim.reduced_state if before is None else end_state(before)
+            now, before = begin_state(piece), piece
+            if not same_state(now, was):
+                at, states = piece.start_time, (vector_text(was), vector_text(now))
+                return f"at {at:.6g} s: its reduced state jumps from {states[0]} to {states[1]}"
     return ""
 
 

@@ -169,7 +169,10 @@ class Exchanges:
         found: dict[int, Found] = {}
         for n, j in enumerate(group):
             here = [*others, *found.items()]
-            still = [(i, resting(now.vehicles[i], now.poses[i], now.time)) for i in group[n + 1 :]]
+            still = [
+                (i, resting(now.vehicles[i], now.poses[i], now.time, now.held[i]))
+                for i in group[n + 1 :]
+            ]
             one = search(now, j, now.held[j], [*here, *still], math.inf)[0]
             if one is None and still:
                 one = search(now, j, now.held[j], here, math.inf)[0]

@@ -44,12 +44,19 @@ CONTACT = 1e-9  # [m] what is closer touches
 LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
 
 
-def resting(vehicle: Vehicle, pose: Array, time: float) -> Found:
-    """A vehicle's plan if it has none: it stays where it is, and does not arrive."""
-    rest = next((one for one in vehicle.problem.automaton.trims if one.is_rest), None)
-    trims, lasting = ((), []) if rest is None else ((rest,), [0.0])
-    plan = Plan(pose, trims, durations=lasting, start_time=time)
-    return _not_leading(vehicle, plan)
+def resting(vehicle: Vehicle, pose: Array, time: float, found: Found | None = None) -> Found:
+    """A vehicle's plan if it has none: it stays where it is, and does not arrive.
+
+    What it carries stays as it is too: as at the end of a plan, or else as in its first trim.
+    """
+    rests = [one for one in vehicle.problem.automaton.trims if one.is_rest]
+    word = () if found is None else found.plan.trims
+    if not rests:
+        return _not_leading(vehicle, Plan(pose, (), durations=[], start_time=time))
+    last = word[-1] if word else vehicle.problem.first_trim
+    off = [np.abs(one.reduced_state - last.reduced_state).sum() for one in rests]
+    rest = rests[int(np.argmin(off))]
+    return _not_leading(vehicle, Plan(pose, (rest,), durations=[0.0], start_time=time))
 
 
 def _not_leading(vehicle: Vehicle, plan: Plan) -> Found:
@@ -239,16 +246,18 @@ def _after(vehicle: Vehicle, head: Plan | None, found: Found) -> Found:
 def rejoined(
     vehicle: Vehicle, found: Found, time: float, pose: Array, tube_m: float
 ) -> Iterator[Found]:
-    """A plan made to start where the vehicle was measured, in several ways; it arrives.
+    """A plan made to start where the vehicle was measured, in several ways; it arrives if that did.
 
     As it is, if it then ends where the vehicle arrives from anywhere in its tube; the same word
     with other times; three trims to one of its next joints; or as it is, if it ends within the
     goal's tolerance at all.
     """
-    if not leads(found):
-        yield resting(vehicle, pose, time)
-        return
     rest = rest_of_plan(vehicle, found, time)
+    if not leads(found):
+        stands = switches_at_will(vehicle.problem) or not moves_on(rest)
+        still = replace(rest, start=pose)
+        yield resting(vehicle, pose, time, found) if stands else _not_leading(vehicle, still)
+        return
     goal = vehicle.problem.goals[found.goal_index]
     here = vehicle.problem.starting_at(pose, time=rest.start_time)
     moved = replace(rest, start=pose)
@@ -267,7 +276,7 @@ def rejoined(
 def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
     """The plan that comes to rest soonest; what is held where the library cannot stop it."""
     if switches_at_will(vehicle.problem) or not moves_on(rest_of_plan(vehicle, found, time)):
-        return resting(vehicle, pose, time)
+        return resting(vehicle, pose, time, found)
     head, problem = onward(vehicle, found, time)
     if problem is None:  # it is driven to its end
         return given_up(found)
@@ -278,7 +287,7 @@ def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
             return given_up(found)
         plan = brake if head is None else joined(head, brake)
     if plan is None:
-        return resting(vehicle, pose, time)
+        return resting(vehicle, pose, time, found)
     plan = replace(plan, start=pose)
     return _not_leading(vehicle, plan)
 

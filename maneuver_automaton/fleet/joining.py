@@ -59,7 +59,7 @@ def note_arrivals(now: Moment) -> None:
             now.state.arrived.add(k)
             continue
         # It stays where it is, or where its plan ends, and looks for another one.
-        stay = resting(now.vehicles[k], now.poses[k], now.time)
+        stay = resting(now.vehicles[k], now.poses[k], now.time, found)
         if not (now.is_proven(k, stay, now.expected_by(k)) and now.agreed(k, stay)):
             stay = given_up(found)
         now.hold(k, stay)

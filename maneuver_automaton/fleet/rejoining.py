@@ -5,7 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.automaton import same_state
+from maneuver_automaton.automaton.cutting import end_state
 from maneuver_automaton.fleet.conflicts import meetings
 from maneuver_automaton.fleet.held import (
     begin_of,
@@ -21,6 +26,7 @@ from maneuver_automaton.fleet.nearby import near_pairs
 from maneuver_automaton.fleet.tracking import back_onto
 from maneuver_automaton.fleet.vehicle import Found
 from maneuver_automaton.fleet.verdict import nearest
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 
 NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the same one
 SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
@@ -130,9 +136,16 @@ def _drives_beside(now: Moment, k: int, found: Found, choices: Sequence[Found]) 
         times = [now.time + share * step for share in SHARES]
         return max(off_plan(vehicle, found, time, plan.pose_at(time)) for time in times)
 
-    tube = now.state.settings.tube_m
+    def state_after(plan: Plan) -> Array:
+        begin = begin_of(vehicle, plan, step)
+        return end_state(begin) if begin.trims else np.zeros(0)
+
+    tube, here = now.state.settings.tube_m, now.from_here(k).plan
     back = back_onto(vehicle, found, now.time, now.poses[k], step, tube)
-    plans = [now.from_here(k).plan, *(one.plan for one in choices)]
+    # A step later all but the pose must be as the plan that is held has it.
+    at_will, wanted = switches_at_will(vehicle.problem), state_after(here)
+    ways = [one.plan for one in choices]
+    plans = [here, *(one for one in ways if at_will or same_state(state_after(one), wanted))]
     for plan in [*([] if back is None else [back]), *sorted(plans, key=farthest)]:
         if not why_not_free(vehicle, vehicle.course_of(begin_of(vehicle, plan, step)), 0.0):
             now.beside[k] = plan

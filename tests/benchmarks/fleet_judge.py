@@ -20,6 +20,7 @@ from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.fleet import FleetLog, FleetProblem, FleetStep
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
 LOOK = 0.005  # [s] between two looks
@@ -54,13 +55,15 @@ def judged(log: FleetLog) -> Least:
         name: {round(one.start_time, 9): one for one in some} for name, some in log.driven.items()
     }
     least = Least()
+    stood = {name: problem.first_trim for name, problem in problems.items()}
     for step in log.steps:
         times = step.time + np.append(np.arange(0.0, log.step, LOOK), log.step)
         here = []
         for name, some in pieces.items():
             piece = some.get(round(step.time, 9))
             if piece is not None:
-                here.append(_body(name, problems[name], piece, times))
+                stood[name] = piece.trims[-1] if piece.trims else stood[name]
+                here.append(_body(name, problems[name], piece, times, stood[name]))
         for body in here:
             still = _to_obstacles(body, problems[body.name])
             if still < least.still_m:
@@ -90,17 +93,18 @@ def distance_to(
     return _between(driven, replace(body, centre=centre, parts=parts))[0]
 
 
-def _body(name: str, problem: Problem, piece: Plan, times: Array) -> _Body:
+def _body(
+    name: str, problem: Problem, piece: Plan, times: Array, stood: Trim | None = None
+) -> _Body:
+    """A vehicle's bodies; where it did nothing its parts are as in the trim in which it stood."""
     clock = np.minimum(times, piece.start_time + piece.duration)
     plans = [(problem.footprint or (Disc(1e-6),), piece)]
-    if piece.trims:
-        for part, shapes in problem.parts.items():
-            plans.append((shapes, carried(piece, problem.automaton.model, part)))
-    elif problem.parts:  # it stands: the rest of its library says where its parts are
-        rest = next(one for one in problem.automaton.trims if one.is_rest)
-        still = Plan(piece.start, (rest,), durations=[0.0], start_time=piece.start_time)
-        for part, shapes in problem.parts.items():
-            plans.append((shapes, carried(still, problem.automaton.model, part)))
+    whole = piece
+    if not piece.trims:
+        still = stood or problem.first_trim
+        whole = Plan(piece.start, (still,), durations=[0.0], start_time=piece.start_time)
+    for part, shapes in problem.parts.items():
+        plans.append((shapes, carried(whole, problem.automaton.model, part)))
     parts, centre, reach, travel = [], np.zeros((len(times), 2)), 0.0, 0.0
     for number, (shapes, plan) in enumerate(plans):
         poses = plan.pose_at(np.minimum(clock, plan.start_time + plan.duration))[:, :3]

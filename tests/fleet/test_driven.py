@@ -16,8 +16,10 @@ from maneuver_automaton.fleet import FleetProblem, simulate_fleet, verify_driven
 from maneuver_automaton.fleet.driven import FINE
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import Disturbance
 from tests.fleet.robots import crossing, least_distance
+from tests.inertia import unicycle_automaton
 
 NOISE = Disturbance(position_m=0.003, heading_rad=0.003)
 
@@ -140,6 +142,28 @@ def test_who_drives_otherwise_than_its_model_is_told(log):
     assert not verdict.passed
     assert list(verdict.defects) == [a]
     assert "off the model's equations" in verdict.defects[a]
+
+
+@pytest.mark.parametrize("jumps", [True, False])
+def test_whose_speed_jumps_is_told(log, jumps):
+    """From rest a robot with inertia speeds up to 1 m/s, and then goes on with that, or slower."""
+    a, b = log.problem.names
+    robot = unicycle_automaton()
+    heavy = Problem(robot, [0, 0, 0], [9, 0, 0], footprint=Disc(0.3))
+    fleet = FleetProblem([heavy, log.problem.problems[1]], names=[a, b], margin=0.1)
+    rest, on, slow = robot["rest"], robot["1, 0"], robot["-0.6, 0"]
+    up = next(one for one in robot.maneuvers if (one.source, one.target) == ("rest", "1, 0"))
+    first = Plan([0, 0, 0], (rest, on), durations=[0.0, 1.0], maneuvers=(up,))
+    then = Plan(first.end, (slow if jumps else on,), durations=[2.0], start_time=2.0)
+    away = [Plan([50, 0, 0], (), durations=[], start_time=time) for time in (0.0, 2.0)]
+    steps = tuple(replace(log.steps[k], number=k, time=2.0 * k) for k in (0, 1))
+    pieces = {a: (first, then), b: tuple(away)}
+    verdict = verify_driven(
+        replace(log, problem=fleet, steps=steps, step=2.0, driven=pieces, arrived_s={})
+    )
+    assert verdict.passed is not jumps
+    if jumps:
+        assert verdict.defects == {a: "at 2 s: its reduced state jumps from (1, 0) to (-0.6, 0)"}
 
 
 @pytest.mark.parametrize("leaves", [True, False])

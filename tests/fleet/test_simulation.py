@@ -16,6 +16,7 @@ from maneuver_automaton import (
     load_scenario,
     plan_fleet,
     simulate_fleet,
+    verify_driven,
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
@@ -189,6 +190,7 @@ def test_vehicles_with_inertia():
     log = loop_of(FleetProblem(problems, names="ab", margin=0.1), steps=40, time_limit=10.0)
     assert log.reached
     assert_free(log, 0.1 - 1e-6)
+    assert verify_driven(log).passed
 
 
 def test_wrong_arguments():
