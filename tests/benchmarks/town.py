@@ -181,7 +181,7 @@ def picture(traffic: Traffic, path: Path) -> None:
     for block in traffic.town.blocks.values():
         (x, y), (wide, high) = block.center, block.size
         ax.fill(
-            [x - wide / 2, x + wide / 2] * 1 + [x + wide / 2, x - wide / 2],
+            [x - wide / 2, x + wide / 2, x + wide / 2, x - wide / 2],
             [y - high / 2, y - high / 2, y + high / 2, y + high / 2],
             color="0.88",
         )
@@ -198,7 +198,7 @@ def picture(traffic: Traffic, path: Path) -> None:
 
 
 def main() -> None:
-    """Drive, and print a line a minute."""
+    """Drive, and print a line every 15 s."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--vehicles", type=int, default=100)
     parser.add_argument("--minutes", type=float, default=1.0)
@@ -239,10 +239,10 @@ def main() -> None:
                 f"messages {agreement.sent / len(times) / n:.2f} a car and step",
                 flush=True,
             )
+            if arguments.picture:
+                picture(traffic, arguments.picture)
     for one in flags[:5]:
         print("  ", one)
-    if arguments.picture:
-        picture(traffic, arguments.picture)
 
 
 if __name__ == "__main__":
