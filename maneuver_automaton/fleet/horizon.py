@@ -230,7 +230,11 @@ class FleetHorizon:
                 f"vehicle {name!r}: its margin is {problem.margin:g} m, need at least the least "
                 "of the fleet: the others are seen larger by what that lacks"
             )
-        (new,) = vehicles_of(FleetProblem([problem], leaves=[old.leaves]))
+        (new,) = vehicles_of(FleetProblem([problem], leaves=[old.leaves]), old.workspace.prepared)
+        if len(self._workspaces) > 2 * len(state.vehicles):
+            used = {id(one.workspace) for one in state.vehicles}
+            rows = self._workspaces.items()
+            self._workspaces = {key: row for key, row in rows if id(row[1]) in used}
         key = tuple(map(id, problem.obstacles))
         kept = self._workspaces.setdefault(key, (problem.obstacles, new.workspace))[1]
         own = replace(new.problem, obstacles=kept.obstacles)

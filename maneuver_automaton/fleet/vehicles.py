@@ -23,9 +23,9 @@ def prepare_vehicles(vehicles: Sequence[Vehicle]) -> None:
     load_meetings()
 
 
-def vehicles_of(fleet: FleetProblem) -> list[Vehicle]:
-    """The vehicles of a fleet; those of one map share what is prepared for it."""
-    prepared = Prepared()
+def vehicles_of(fleet: FleetProblem, prepared: Prepared | None = None) -> list[Vehicle]:
+    """The vehicles of a fleet, which share what is prepared: anew, or with others."""
+    prepared = Prepared() if prepared is None else prepared
     workspaces: dict[tuple[int, ...], Workspace] = {}
     keeps = [problem.margin for problem in fleet.problems]
     # Every search keeps its own margin from what it must not touch: what that lacks of the fleet's,

@@ -274,6 +274,18 @@ def test_another_goal_on_the_way():
         loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], margin=0.0))
 
 
+def test_what_is_prepared_for_obstacles_that_nobody_has_any_more_is_let_go():
+    fleet = crossing(tolerance=0.1)
+    loop = FleetHorizon(fleet, step=0.5, first=at_rest(fleet))
+    for number in range(9):
+        box = Box([1.0, 1.0], [9.0 + number, 9.0])
+        loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], obstacles=(box,)))
+    first, last = loop.state.vehicles[1], loop.state.vehicles[0]
+    assert len(loop._workspaces) <= 2 * len(fleet) + 1
+    assert last.workspace.prepared is first.workspace.prepared
+    assert last.workspace.obstacles[0].shape.center.tolist() == [17.0, 9.0]
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.002])
 def test_who_leaves_is_gone_for_all_at_the_same_time(noise):
     """Beside its goal by what its tube allows it leaves as well: the others count on that."""
