@@ -48,7 +48,7 @@ WITH_TIME = Patience(attempts=400, passes=2)
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
 MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
 LONGEST = 400_000  # expansions for a way alone
-LEAST_S, INERTIA_S, BETTER_S = 0.01, 5.0, 2.0  # [s] of a whole query: at least, and with inertia
+LEAST_S = 0.01  # [s] of a whole query
 POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
 
 
@@ -142,7 +142,7 @@ class Vehicle:
         elif self.at_will:
             self._plan_words(budget, bounded=bounded)
         else:
-            result = self._planned(self.problem, budget, math.inf, improve=False)
+            result = self._planned(self.problem, budget, improve=False)
             self.alone, self.why_none = self._found(result), result.reason
             self.bound = result.bound
 
@@ -162,7 +162,7 @@ class Vehicle:
         if self.ways and self.problem.obstacles:
             self._keep_ways(self._query(self.problem), self.ways[0], budget, WITH_TIME)
         elif not self.at_will and self.alone is not None:
-            better = self._found(self._planned(self.problem, budget, BETTER_S, improve=True))
+            better = self._found(self._planned(self.problem, budget, improve=True))
             if better is not None and better.cost < self.alone.cost:
                 self.alone = better
 
@@ -205,8 +205,7 @@ class Vehicle:
             return self.alone if self.alone is not None and self.alone.cost < known else None
         problem = replace(self.problem, obstacles=(*self.problem.obstacles, *others))
         if not self.at_will:
-            limit = BETTER_S if again else INERTIA_S
-            found = self._found(self._planned(problem, budget, limit, improve=again))
+            found = self._found(self._planned(problem, budget, improve=again))
             return found if found is not None and found.cost < known else None
         own, query = self.problem, self._query(problem)
         best: Word | None = None
@@ -307,9 +306,7 @@ class Vehicle:
         self._count(first.expansions)
         return None if first.word is None else with_waits(query, first.word)
 
-    def _planned(
-        self, problem: Problem, budget: Budget, most_s: float, *, improve: bool
-    ) -> PlanResult:
+    def _planned(self, problem: Problem, budget: Budget, *, improve: bool) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""
         counted = [LONG] if improve or problem is not self.problem else []
         most = [*counted, *filter(None, [problem.search.max_expansions])]
@@ -318,8 +315,8 @@ class Vehicle:
             workspace = self.workspace
         else:
             workspace = Workspace(problem.obstacles, self.workspace.prepared)
-        limit = max(min(budget.left, most_s), LEAST_S)
         wanted = replace(problem, search=search)
+        limit = max(budget.left, LEAST_S)
         result = plan_in(workspace, wanted, time_limit=limit, alternatives=0)
         self._count(result.counts.get("expansions", 0))
         return result
