@@ -69,7 +69,7 @@ def _note_pressed(now: Moment) -> None:
 def _note_crossing(now: Moment) -> None:
     """Plans that lead too near to others since the last step are void, if that is known.
 
-    Whoever had not heard of another one's emergency drove on.
+    Who had not received another one's emergency drove on.
     """
     for one, other in sorted(now.state.crossing):
         if one not in now.held or other not in now.held:
