@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._ceilings import LARGEST_BODY, check_size
+from maneuver_automaton._limits import LARGEST_BODY, check_size
 from maneuver_automaton.collision.geometry import (
     Geometry,
     are_points,

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._ceilings import FASTEST, FASTEST_SPIN
+from maneuver_automaton._limits import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup
 
 Pose = TypeVar("Pose", bound=LieGroup)

@@ -21,7 +21,7 @@ from tests import scenes
 from tests.quickly import quick_are
 from tests.solids import check_plan
 
-LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
+LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 ROBOT, CAR = scenes.differential_robot(), scenes.reeds_shepp(1.0)
 BODY = (Box([0.8, 0.5], [0.1, 0.0]),)
 RING = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
