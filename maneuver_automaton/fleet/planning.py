@@ -194,7 +194,7 @@ class _FleetSearch:
             pass
         for one in self.vehicles:
             if one.alone is None:
-                self.reasons[one.number] = f"it has no way even alone: {one.why_none}"
+                self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
 
     def _plan_together(self, able: Sequence[int], orders: int) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
@@ -409,7 +409,7 @@ class _FleetSearch:
             return f"no time was left to plan it within {self.budget.seconds:.4g} s"
         alone = self.vehicles[k].alone
         if alone is None:
-            return "it has no way even alone"
+            return "it has no path even alone"
         courses: dict[int, Course] = {
             one.number: self.held[one.number].course if one.number in self.held else one.standing
             for one in self.vehicles
@@ -417,7 +417,7 @@ class _FleetSearch:
         met = meetings({**courses, k: alone.course}, keep=self.fleet.margin, among=[k])
         names = [self.vehicles[m.one if m.other == k else m.other].name for m in met]
         listed = ", ".join(names) or "nobody"
-        return f"no way was found past the others; alone it would meet {listed}"
+        return f"no path was found past the others; alone it would meet {listed}"
 
     def _last_at_least(self) -> float:
         """No fleet arrives sooner [s]: each vehicle by itself, where its cost is its time."""

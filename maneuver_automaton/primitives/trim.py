@@ -67,7 +67,7 @@ class Trim:
 
     @property
     def is_rest(self) -> bool:
-        """Whether the trim stands still: zero twist."""
+        """Whether the trim is a rest: zero twist."""
         return not any(self.body_velocity.tolist())
 
     def coast(self, start: Pose, duration: ArrayLike) -> Pose:
