@@ -78,8 +78,8 @@ def serving() -> None:
 
 
 @contextlib.contextmanager
-def unheard() -> Iterator[None]:
-    """A block whose child processes never hear Ctrl-C: this process tells them."""
+def children_ignore_signals() -> Iterator[None]:
+    """A block whose child processes ignore Ctrl-C: this process tells them to stop."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return

@@ -11,7 +11,7 @@ import socket
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, TypeAlias, TypeVar
 
-from maneuver_automaton._interrupts import patient, serving, stopped, unheard
+from maneuver_automaton._interrupts import children_ignore_signals, patient, serving, stopped
 
 LOCAL = "local"  # a cluster on this machine
 PATIENCE = 0.8  # [s] until something must have answered at its address
@@ -100,7 +100,7 @@ def _patiently(
     from joblib.externals.loky import get_reusable_executor
 
     with patient(_tell_children):
-        with unheard():  # the processes begin here
+        with children_ignore_signals():  # the processes begin here
             results = work(delayed(_served)(function, piece) for piece in pieces)
         try:
             yield from results

@@ -163,7 +163,7 @@ class Pace:
     """Steps of a kernel in portions that take a moment each, by what the last one took.
 
     For work that is the same however it is parted. Where time gets short portions get smaller, so
-    that a dear step among cheap ones delays little.
+    that a costly step among cheap ones delays little.
 
     Examples
     --------

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._ceilings import MOST_TURNS, check_heading, check_size
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._limits import MOST_TURNS, check_heading, check_size
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
 from maneuver_automaton.collision import (

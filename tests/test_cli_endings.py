@@ -252,7 +252,7 @@ def test_a_folder_tells_of_every_file(monkeypatch, capfd, jobs):
         for number, row in enumerate(results(function, problems, **settings)):
             yield row
             if number == 0:
-                at_once()  # as the terminal's Ctrl-C, which processes of ours do not hear
+                at_once()  # as the terminal's Ctrl-C, which processes of ours ignore
 
     monkeypatch.setattr(folder_runs, "in_parallel", interrupted)
     with listening():

@@ -184,7 +184,7 @@ def test_dubins_and_reeds_shepp_turn_round():
 
 
 @pytest.mark.parametrize(("dearness", "cost"), [(0.1, math.pi + 0.2), (10.0, 7 * math.pi / 3)])
-def test_dear_changes_of_direction_are_avoided(dearness, cost):
+def test_costly_changes_of_direction_are_avoided(dearness, cost):
     result = found(
         CAR, [0, 0, 0], [0, 0, math.pi],
         cost=Cost(length=1.0, direction_change=dearness), horizon=Horizon(max_trims=3),
@@ -192,14 +192,14 @@ def test_dear_changes_of_direction_are_avoided(dearness, cost):
     assert result.cost == pytest.approx(cost)
 
 
-def test_dear_switches_are_avoided():
+def test_costly_switches_are_avoided():
     free = found(ROBOT, [0, 1, 0], [0, 0, 0], cost=Cost(time=1.0), horizon=Horizon(max_trims=4))
     assert len(free.plan.word) == 4
     cost = Cost(time=1.0, switch=10.0)
-    dear = found(ROBOT, [0, 1, 0], [0, 0, 0], cost=cost, horizon=Horizon(max_trims=4))
+    costly = found(ROBOT, [0, 1, 0], [0, 0, 0], cost=cost, horizon=Horizon(max_trims=4))
     # two half circles of radius 0.25 m in reverse
-    assert dear.plan.word == ("anticlockwise", "clockwise")
-    assert dear.cost == pytest.approx(2 * math.pi + 10.0)
+    assert costly.plan.word == ("anticlockwise", "clockwise")
+    assert costly.cost == pytest.approx(2 * math.pi + 10.0)
 
 
 PRICES = [
@@ -783,8 +783,8 @@ def robot_of_twists(twists):
 @given(problem=problems(FAMILIES["robot, words"]), factor=st.floats(0.01, 100.0))
 def test_the_unit_of_cost_does_not_matter(problem, factor):
     assume(problem.horizon.time is None)
-    dearer = replace(COST, **{k: factor * getattr(COST, k) for k in ("effort", "time", "length")})
-    one, other = (plan(replace(problem, cost=cost), time_limit=LIMIT) for cost in (COST, dearer))
+    costlier = replace(COST, **{k: factor * getattr(COST, k) for k in ("effort", "time", "length")})
+    one, other = (plan(replace(problem, cost=cost), time_limit=LIMIT) for cost in (COST, costlier))
     assert one.plan.word == other.plan.word
     assert other.cost == pytest.approx(factor * one.cost, rel=1e-9, abs=1e-9)
 

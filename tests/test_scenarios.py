@@ -24,7 +24,7 @@ NEED_MORE = {
     "omnidirectional": MANY,
     "parallel_parking": MANY,
 }
-DEAR = {"helicopter_city", "robot_with_inertia", "tpcap_full"}  # seconds to improve them so far
+COSTLY = {"helicopter_city", "robot_with_inertia", "tpcap_full"}  # seconds to improve them so far
 UNHURRIED = 600.0  # [s], so that the clock decides nothing
 NAMES = {path.stem for path in FILES}
 LONG = [
@@ -39,10 +39,10 @@ SHORT = [
     pytest.param(
         (path, NEED_MORE.get(path.stem, FEW), improve),
         id=path.stem if improve else f"{path.stem}, first plan",
-        marks=[pytest.mark.slow] if improve and path.stem in DEAR else [],
+        marks=[pytest.mark.slow] if improve and path.stem in COSTLY else [],
     )
     for path in FILES
-    for improve in ((True, False) if path.stem in DEAR else (True,))
+    for improve in ((True, False) if path.stem in COSTLY else (True,))
 ]
 
 

@@ -106,9 +106,9 @@ def _report(
     worst = by_motion[ranked[0]]
     size = np.abs(worst.defect)
     order = np.argsort(-size, kind="stable")
-    guilty = tuple(int(i) for i in order if size[i] > worst.admitted)
+    violated = tuple(int(i) for i in order if size[i] > worst.admitted)
     if broken:
-        message = _complaint(question, worst, broken, intact, guilty)
+        message = _complaint(question, worst, broken, intact, violated)
     else:
         message = (
             f"{question.what} is invariant under {listed(intact)} "
@@ -122,7 +122,7 @@ def _report(
         state=worst.state,
         control=worst.control,
         group_element=worst.by,
-        components=tuple(question.names(i) for i in guilty),
+        components=tuple(question.names(i) for i in violated),
         broken=broken,
         intact=intact,
         message=message,
@@ -134,9 +134,9 @@ def _complaint(
     worst: Worst,
     broken: tuple[str, ...],
     intact: tuple[str, ...],
-    guilty: tuple[int, ...],
+    violated: tuple[int, ...],
 ) -> str:
-    first = guilty[0]
+    first = violated[0]
     where = f"at x = {vector_text(worst.state)}"
     if worst.control.size:
         where += f", u = {vector_text(worst.control)}"
@@ -144,7 +144,7 @@ def _complaint(
     return (
         f"{question.what} is not invariant under {listed(broken)}: {question.names(first)} changes "
         f"by {abs(worst.defect[first]):.4g}{question.units(first)} {where}, moved by "
-        f"{vector_text(worst.by.pose)}{still}; {question.cause(broken, guilty)}"
+        f"{vector_text(worst.by.pose)}{still}; {question.cause(broken, violated)}"
     )
 
 

@@ -56,7 +56,9 @@ class Dispersion:
     mean: float
     pose: Array  # (3,) the sample that is furthest from all
     reached: int  # poses at which words end
-    most: float  # cost of the dearest of these words [s or m]: less where the search was cut short
+    most: (
+        float  # cost of the costliest of these words [s or m]: less where the search was cut short
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -72,7 +74,7 @@ class SpanningFactor:
 def settings_for(automaton: Automaton, *, measure: str = "time") -> CoverageSettings:
     """Settings to the size of a library: a disc of twice its longest maneuver.
 
-    Words may cost four of the dearest maneuvers, or eight edges of half a second or metre.
+    Words may cost four of the costliest maneuvers, or eight edges of half a second or metre.
     """
     spans = [m.duration if measure == "time" else path_length(m) for m in automaton.maneuvers]
     distances = [float(np.linalg.norm(m.displacement[:2])) for m in automaton.maneuvers]
@@ -240,7 +242,7 @@ def straight_line(automaton: Automaton, *, measure: str = "time") -> Reference:
 def planned(automaton: Automaton, *, measure: str = "time") -> Reference:
     """The cost of the plan that a reference library finds in free space, for each pose.
 
-    For a few trims all words are searched, so the plan is the best; for many it may be dearer than
+    For few trims all words are searched, so the plan is the best; for many it may be costlier than
     that, and a spanning factor against it too small.
 
     Examples

@@ -153,7 +153,7 @@ def _check(
 
 
 def _question(what: str) -> Question:
-    def cause(broken: tuple[str, ...], guilty: tuple[int, ...]) -> str:
+    def cause(broken: tuple[str, ...], violated: tuple[int, ...]) -> str:
         place = any(motion.startswith(("translation", "climb")) for motion in broken)
         depends = "the place" if place else "a direction of the world"
         return f"it depends on {depends}: shift its references along with the problem"

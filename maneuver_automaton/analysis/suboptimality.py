@@ -16,7 +16,7 @@ def discrete_index(growth: ArrayLike, *, applied: int = 1) -> float:
     `growth` holds the least numbers with ``V_k(x) <= growth[k - 1] min_u l(x, u)`` for k = 1 .. N;
     the first `applied` steps of a plan are driven. It may be negative, and is -inf where nothing
     can be said. A positive index makes the closed loop stable where the growth holds, at most
-    1 / alpha times as dear as the best.
+    1 / alpha times as costly as the best.
 
     Source: Grüne, Pannek, Seehafer, Worthmann (2010), *Analysis of unconstrained nonlinear MPC
     schemes with time varying control horizon*, Theorem 5.4.

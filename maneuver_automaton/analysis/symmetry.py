@@ -185,9 +185,9 @@ def _question(what: str, name: str, per: str, region: Region) -> Question:
 def _cause_in(region: Region) -> Callable[[tuple[str, ...], tuple[int, ...]], str]:
     """Words for why the dynamics depend on where they are, from what shows it."""
 
-    def cause(broken: tuple[str, ...], guilty: tuple[int, ...]) -> str:
-        name = region.state_names[guilty[0]]
-        turns, drifts = name.startswith("heading"), guilty[0] < region.group.dof
+    def cause(broken: tuple[str, ...], violated: tuple[int, ...]) -> str:
+        name = region.state_names[violated[0]]
+        turns, drifts = name.startswith("heading"), violated[0] < region.group.dof
         if any(motion.startswith("translation") for motion in broken):
             what = "currents or a map" if drifts else "ground or friction"
             return f"it depends on the place, as with {what} that changes from place to place"

@@ -323,7 +323,7 @@ def _cut_where_motions_change(
 
 
 def frames_at(around: Surroundings, times: Array) -> Array:
-    """Poses (motions, m, 3) of what moves: linear or on arcs between its times, else still."""
+    """Poses (motions, m, 3) of moving bodies: linear or on arcs between its times, else still."""
     knots = around.knots
     if knots is None:
         return np.stack([_frames_of(motion, times) for motion in around.motions])

@@ -56,13 +56,13 @@ class Surroundings:
     outline: Outline
     owners: IntArray  # (n,) which obstacle each edge is of
     heights: Array  # (n, 2) [m] from where to where they stand
-    motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it stands still
+    motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it is static
     motions: tuple[Motion, ...]
     knots: Knots | None  # of all motions side by side, where all coast on arcs or stand
-    present: Array  # (motions, 2) [s] from when until when what moves is there
+    present: Array  # (motions, 2) [s] from when until when a moving obstacle is there
     speeds: Array  # (motions,) [m/s] of the frame at most, where it coasts on arcs; else 0
     bends: Array  # (motions,) [m/s^2] how fast its velocity changes then; else 0
-    still: IntArray  # (k,) numbers of the edges that stand still
+    still: IntArray  # (k,) numbers of the static edges
     moving: IntArray  # those of the others, motion by motion
     firsts: IntArray  # (motions + 1,) where those of each motion begin among them
     groups: tuple[Outline, ...]  # (motions,) the edges of each motion

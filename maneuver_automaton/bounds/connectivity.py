@@ -39,7 +39,7 @@ class Connection(enum.Enum):
     """Whether two sets of poses are connected."""
 
     CONNECTED = "connected"  # through boxes that are free
-    SEPARATED = "separated"  # proven: no way leads through boxes that may be free
+    SEPARATED = "separated"  # proven: no path leads through boxes that may be free
     OPEN = "open"  # not known after the work that was allowed
 
 

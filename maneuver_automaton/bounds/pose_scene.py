@@ -1,4 +1,4 @@
-"""What stands in a vehicle's way for good, as boxes of poses are tested against it."""
+"""The permanent obstacles of a vehicle, as boxes of poses are tested against them."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class PoseArrays(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PoseScene:
-    """What never leaves a vehicle's poses: obstacles that stand throughout, and bounds."""
+    """What never leaves a vehicle's poses: static obstacles, and bounds."""
 
     world: World  # its frame is the one in which boxes are counted
     arrays: PoseArrays

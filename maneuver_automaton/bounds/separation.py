@@ -50,7 +50,7 @@ class Separation:
     def reason(self) -> str:
         """The proof in one line."""
         why = f": {self.narrowest}" if self.narrowest else ""
-        return f"no collision-free way leads from the start to the goal, however it is driven{why}"
+        return f"no collision-free path leads from the start to the goal, however it is driven{why}"
 
 
 def separation(
@@ -78,7 +78,7 @@ def separation(
     >>> problem = Problem(robot, [0, 0, 0], [8, 0, 0], obstacles=walls, footprint=Box([3.0, 2.0]),
     ...                   bounds=Bounds(x=(-2.0, 10.0), y=(-4.0, 4.0)))
     >>> separation(problem).reason  # the walls leave 1.8 m
-    'no collision-free way leads from the start to the goal, however it is driven: the passage at \
+    'no collision-free path leads from the start to the goal, however it is driven: the passage at \
 (4, 0) is 0.22 m too narrow'
     """
     if not lasting_obstacles(problem):

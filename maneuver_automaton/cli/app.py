@@ -53,7 +53,7 @@ Gap = Annotated[
     ),
 ]
 Alternatives = Annotated[
-    int, typer.Option("--alternatives", min=0, metavar="K", help="Dearer plans to list as well.")
+    int, typer.Option("--alternatives", min=0, metavar="K", help="Costlier plans to list as well.")
 ]
 Plot = Annotated[bool, typer.Option("--plot/--no-plot", help="Draw the plan.")]
 Title = Annotated[
@@ -355,7 +355,7 @@ def automaton_design(
     ] = False,
     within: Annotated[
         float | None,
-        typer.Option("--within", min=1.0, metavar="T", help="Factor that words may be dearer."),
+        typer.Option("--within", min=1.0, metavar="T", help="Factor that words may be costlier."),
     ] = None,
     most: Annotated[
         int | None, typer.Option("--most", min=1, metavar="N", help="Trims (or maneuvers) of it.")

@@ -88,7 +88,7 @@ def _parts(whole: Any) -> list[Any]:
 
 
 def _solid_near(obstacles: tuple[AnyObstacle, ...], place: Array, reach: float) -> Any:
-    """What stands still within reach of a place, as one geometry counted from it."""
+    """Static obstacles within reach of a place, as one geometry counted from it."""
     import shapely
 
     seen = SE2(np.array([-place[0], -place[1], 0.0]))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze, wrapped
 from maneuver_automaton._brief import brief
-from maneuver_automaton._ceilings import FASTEST, FASTEST_TURN, check_size
+from maneuver_automaton._limits import FASTEST, FASTEST_TURN, check_size
 from maneuver_automaton.groups import SE2, LieGroup
 
 GAP = 1e-8  # of the size of a motion: how far beside its next pose a twist may lead

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._ceilings import LARGEST_BODY, check_size
+from maneuver_automaton._limits import LARGEST_BODY, check_size
 from maneuver_automaton.collision.geometry import (
     Geometry,
     are_points,
@@ -251,7 +251,7 @@ class Obstacle:
                 raise ValueError(
                     f"obstacle: present_s must be [from, to] with from <= to, got {self.present_s}"
                 )
-            if self.motion is None:  # what comes and goes is looked at over time, like what moves
+            if self.motion is None:  # one that comes and goes counts as a moving one
                 object.__setattr__(self, "motion", STANDS)
 
     @property

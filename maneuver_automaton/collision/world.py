@@ -188,7 +188,7 @@ def _static_arrays(
     frame: tuple[float, ...],
     keep: float,
 ) -> tuple[Solids, Buckets, Field]:
-    """What stands still around a footprint: the same, whatever moves beside it."""
+    """The static obstacles around a footprint: the same beside any moving ones."""
     body, pose = body_of(footprint), np.array(frame)
     maps = [_seen_map(o, pose) for o in static if isinstance(o, OccupancyMap)]
     pieces = pieces_seen_from([o.shape for o in static if isinstance(o, Obstacle)], pose)

@@ -16,7 +16,7 @@ BoolArray = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Choice:
-    """Some of the candidates, and by how much others get dearer where these replace them."""
+    """Some of the candidates, and by how much others get costlier where these replace them."""
 
     chosen: IntArray  # (k,) in the order of the candidates
     factor: float

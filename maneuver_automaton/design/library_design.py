@@ -28,7 +28,7 @@ MOST_CANDIDATES = 2000
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DesignedLibrary:
-    """A library, and the factor by which its words are dearer than those of all candidates.
+    """A library, and the factor by which its words are costlier than those of all candidates.
 
     `factor` is proven; `by_size` are the best libraries of each size, as pairs of a number of trims
     and their factor for words of any length.

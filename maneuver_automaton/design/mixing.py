@@ -55,7 +55,7 @@ def mixing_costs(twists: Array, rates: Array, wanted: Array) -> Array:
 
 
 def mixing_factors(twists: Array, rates: Array, chosen: IntArray) -> Array:
-    """By how much each trim (m,) gets dearer where those `chosen` replace it; at least 1."""
+    """By how much each trim (m,) gets costlier where those `chosen` replace it; at least 1."""
     costs = mixing_costs(twists[chosen], rates[chosen], twists)
     return np.asarray(np.maximum(costs / rates, 1.0))
 

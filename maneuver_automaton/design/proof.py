@@ -22,7 +22,7 @@ SEED = 0  # of the goals that are sampled
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class WordsProof:
-    """How much dearer short words are than the shortest paths, over a disc of goals.
+    """How much costlier short words are than the shortest paths, over a disc of goals.
 
     It concerns goals within `radius` of the start, at all headings, to which the shortest path is
     at least `least` long.

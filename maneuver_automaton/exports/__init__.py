@@ -1,4 +1,4 @@
-"""Ways out: plans, loops and drives as files and messages of other programs, one a file."""
+"""Exports: plans, loops and drives as files and messages of other programs, one a file."""
 
 from typing import TYPE_CHECKING
 

@@ -63,7 +63,7 @@ class Knowledge(Protocol):
 
 
 @dataclass(slots=True, eq=False)
-class AllHeard:
+class Lossless:
     """No message is lost: everybody knows what all hold. Messages are counted, but not stored.
 
     `near` says who may come near a vehicle with a plan: it speaks to nobody else.
@@ -96,7 +96,7 @@ class AllHeard:
         return True
 
     def announce(self, k: int, found: Found) -> None:
-        """Each that is near is told, and says that it heard."""
+        """Each that is near is told, and acknowledges it."""
         self.sent += 2 * self.near(k, found)
 
     def knows(self, j: int, k: int, found: Found) -> bool:
@@ -118,10 +118,10 @@ class Agreement:
 
     names: Sequence[str]
     lost: Lost | None = None
-    tries: int = 3  # to be heard, and to hear an answer, in a step
+    tries: int = 3  # to send a message and to receive its answer, in a step
     expected: dict[int, dict[int, list[Found]]] = field(default_factory=dict)
-    # Of whom an emergency was not heard: the first drives what the second does not expect.
-    unheard: set[tuple[int, int]] = field(default_factory=set)
+    # Emergencies without an acknowledgement: the first drives what the second does not expect.
+    unacknowledged: set[tuple[int, int]] = field(default_factory=set)
     step: int = 0
     sent: int = 0
 
@@ -159,7 +159,7 @@ class Agreement:
         self.expected.pop(k, None)
         for others in self.expected.values():
             others.pop(k, None)
-        self.unheard = {pair for pair in self.unheard if k not in pair}
+        self.unacknowledged = {pair for pair in self.unacknowledged if k not in pair}
 
     def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
         """Whether all others agree that a vehicle drives another plan than the one it holds.
@@ -193,13 +193,13 @@ class Agreement:
     def announce(self, k: int, found: Found) -> None:
         """A vehicle drives another plan, whether the others agree or not.
 
-        It says so until each acknowledges it, some times. Whoever has not heard of it asks in vain
+        It repeats that some times, until each acknowledges it. Who has not received it asks in vain
         for another plan of its own: the vehicle refuses, as that is proven past its old one.
         """
         for j in self.expected:
             if j == k:
                 continue
-            self.unheard.add((k, j))
+            self.unacknowledged.add((k, j))
             for _ in range(self.tries):
                 if not self._say(k, j, "drives"):
                     continue
@@ -214,7 +214,7 @@ class Agreement:
     def _expect(self, j: int, k: int, found: Found) -> None:
         """A vehicle knows for sure what another one drives."""
         self.expected[j][k] = [found]
-        self.unheard.discard((k, j))
+        self.unacknowledged.discard((k, j))
 
     def others_of(self, k: int) -> dict[int, list[Found]]:
         """The plans that a vehicle expects of each of the others."""
@@ -223,13 +223,13 @@ class Agreement:
     def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
         """Pairs of which the first does not expect of the second what that drives.
 
-        But for those that have not heard of an emergency.
+        But for those that have not acknowledged an emergency.
         """
         return [
             (j, k)
             for j in self.expected
             for k, found in held.items()
-            if k != j and (k, j) not in self.unheard and not self.knows(j, k, found)
+            if k != j and (k, j) not in self.unacknowledged and not self.knows(j, k, found)
         ]
 
     def _tell(self, sender: int, found: Found, kind: Kind) -> None:

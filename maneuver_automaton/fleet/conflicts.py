@@ -211,7 +211,7 @@ def first_meetings(
     *,
     heights: Array | None = None,
 ) -> Array:
-    """When a vehicle first comes within a distance [m] of each of what moves (M,) in a span [s].
+    """When a vehicle first comes within a distance [m] of each moving obstacle (M,) in a span [s].
 
     What stands between `heights` (M, 2) [m], any if omitted, is met at those alone.
     """

@@ -81,7 +81,7 @@ def broken(
         fresh = after.fresh is None or k in after.fresh
         if fresh and (said := why_not_free(vehicles[k], after.courses[k])):
             yield FleetViolation(FleetGuarantee.STILL, (names[k],), said)
-    yield from _dearer(vehicles, before, after)
+    yield from _costlier(vehicles, before, after)
     yield from _out_of_order(after.swaps)
     for j, k in agreement.unknown(after.held):
         reason = f"{names[j]} does not know what it drives"
@@ -113,7 +113,9 @@ def _met(after: After) -> list[Meeting]:
     return sorted(found.values(), key=lambda row: (row.time, row.one, row.other))
 
 
-def _dearer(vehicles: Sequence[Vehicle], before: Before, after: After) -> Iterator[FleetViolation]:
+def _costlier(
+    vehicles: Sequence[Vehicle], before: Before, after: After
+) -> Iterator[FleetViolation]:
     """Whose value rose, or who arrives later, and whether the sum did."""
     sum_now = sum_before = 0.0
     fewer_arrive_not = False  # then the sum, which was infinite, has fallen
@@ -126,8 +128,8 @@ def _dearer(vehicles: Sequence[Vehicle], before: Before, after: After) -> Iterat
             sum_now, sum_before = sum_now + now, sum_before + was
         fewer_arrive_not = fewer_arrive_not or now < was == math.inf
         rounding = ACCURACY * (1.0 + abs(was))
-        dearer = now > was + rounding and k not in after.in_group
-        if dearer or was > promised + rounding:
+        costlier = now > was + rounding and k not in after.in_group
+        if costlier or was > promised + rounding:
             reason = f"the value is {now:.9g}, was {was:.9g} and {promised:.9g} a step before"
             yield FleetViolation(FleetGuarantee.DECREASE, (vehicles[k].name,), reason)
         later = arrival(found) - before.arrivals[k] if arrival(found) < math.inf else 0.0

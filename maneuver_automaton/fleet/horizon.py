@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
-from maneuver_automaton.fleet.agreement import Agreement, AllHeard, Knowledge, Lost
+from maneuver_automaton.fleet.agreement import Agreement, Knowledge, Lossless, Lost
 from maneuver_automaton.fleet.arriving import tube_of
 from maneuver_automaton.fleet.asking import Workers
 from maneuver_automaton.fleet.held import given_up
@@ -160,7 +160,7 @@ class FleetHorizon:
     def _knowledge(self, lost: Lost | None) -> Knowledge:
         if lost is not None:
             return Agreement(self.fleet.names, lost)
-        return AllHeard(lambda k, found: self._now.how_many_near(k, found))
+        return Lossless(lambda k, found: self._now.how_many_near(k, found))
 
     def step(
         self,

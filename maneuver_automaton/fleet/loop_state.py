@@ -43,7 +43,7 @@ class LoopState:
     versions: dict[int, int] = field(default_factory=dict)  # how often a plan was exchanged
     # Plans are the same as long as they are only driven, or rejoined at nearly the same cost.
     lineage: dict[int, int] = field(default_factory=dict)
-    settled: dict[int, int] = field(default_factory=dict)  # no way alone is cheaper than this one
+    settled: dict[int, int] = field(default_factory=dict)  # no plan alone is cheaper than this one
     in_vain: dict[int, Around] = field(default_factory=dict)  # past these nothing was found
     attempts: dict[int, int] = field(default_factory=dict)  # in vain, since its last exchange
     gains: dict[int, float] = field(default_factory=dict)  # what the way alone would have saved

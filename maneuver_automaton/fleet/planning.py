@@ -21,7 +21,6 @@ from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet.conflicts import Course, components, meetings
-from maneuver_automaton.fleet.crew import Crew, Done, How, Task
 from maneuver_automaton.fleet.groups import by_conflicts, by_priorities
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
@@ -29,6 +28,7 @@ from maneuver_automaton.fleet.turns import Held, Turns
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
 from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.fleet.verdict import verified
+from maneuver_automaton.fleet.worker_pool import Done, How, Task, WorkerPool
 
 Objective = Literal["sum", "last"]
 
@@ -112,9 +112,9 @@ def plan_fleet(
     apart = jobs > 1 or scheduler is not None
     workers = gathered(jobs=jobs, scheduler=scheduler) if apart else nullcontext()
     with workers as run, patient():
-        crew = Crew(fleet, vehicles_of(fleet), jobs, run)
-        crew.prepare()
-        search = _FleetSearch(crew, objective, Budget.from_now(time_limit), seed, on_better)
+        pool = WorkerPool(fleet, vehicles_of(fleet), jobs, run)
+        pool.prepare()
+        search = _FleetSearch(pool, objective, Budget.from_now(time_limit), seed, on_better)
         return search.run(orders, max_rounds)
 
 
@@ -146,7 +146,7 @@ def _better(turns: Turns, task: Task) -> Done:
 class _FleetSearch:
     """One search for the plans of a fleet."""
 
-    crew: Crew
+    pool: WorkerPool
     objective: Objective
     budget: Budget
     seed: int
@@ -164,12 +164,12 @@ class _FleetSearch:
     @property
     def fleet(self) -> FleetProblem:
         """What is to be planned."""
-        return self.crew.fleet
+        return self.pool.fleet
 
     @property
     def vehicles(self) -> list[Vehicle]:
         """Those of the fleet."""
-        return self.crew.vehicles
+        return self.pool.vehicles
 
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
@@ -190,11 +190,11 @@ class _FleetSearch:
     def _plan_alone(self) -> None:
         """The way of each by itself."""
         tasks = [Task((one.number,), {}) for one in self.vehicles]
-        for _ in self.crew.each(_alone, tasks, self.budget.stage(ALONE_SHARE)):
+        for _ in self.pool.each(_alone, tasks, self.budget.stage(ALONE_SHARE)):
             pass
         for one in self.vehicles:
             if one.alone is None:
-                self.reasons[one.number] = f"it has no way even alone: {one.why_none}"
+                self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
 
     def _plan_together(self, able: Sequence[int], orders: int) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
@@ -237,9 +237,9 @@ class _FleetSearch:
         begin, size = 0, 1
         while begin < orders:
             chosen = drawn[begin : begin + size]
-            begin, size = begin + size, self.crew.jobs
+            begin, size = begin + size, self.pool.jobs
             tasks = [Task(tuple(order), self.held) for order in chosen]
-            found = list(self.crew.each(_in_order, tasks, until))
+            found = list(self.pool.each(_in_order, tasks, until))
             for order, done in zip(chosen, found, strict=True):
                 planned = done.held or {}
                 self.queries += done.queries
@@ -295,7 +295,7 @@ class _FleetSearch:
             self.rounds += len(tasks)
             taken: set[int] = set()
             known = {k: self._known(k) for k in ways}
-            for task, done in zip(tasks, self.crew.each(_better, tasks, self.budget), strict=True):
+            for task, done in zip(tasks, self.pool.each(_better, tasks, self.budget), strict=True):
                 self.queries += done.queries
                 if task.how == "alone":
                     self.versions.update(k for k in task.numbers if self._known(k) != known[k])
@@ -409,7 +409,7 @@ class _FleetSearch:
             return f"no time was left to plan it within {self.budget.seconds:.4g} s"
         alone = self.vehicles[k].alone
         if alone is None:
-            return "it has no way even alone"
+            return "it has no path even alone"
         courses: dict[int, Course] = {
             one.number: self.held[one.number].course if one.number in self.held else one.standing
             for one in self.vehicles
@@ -417,7 +417,7 @@ class _FleetSearch:
         met = meetings({**courses, k: alone.course}, keep=self.fleet.margin, among=[k])
         names = [self.vehicles[m.one if m.other == k else m.other].name for m in met]
         listed = ", ".join(names) or "nobody"
-        return f"no way was found past the others; alone it would meet {listed}"
+        return f"no path was found past the others; alone it would meet {listed}"
 
     def _last_at_least(self) -> float:
         """No fleet arrives sooner [s]: each vehicle by itself, where its cost is its time."""

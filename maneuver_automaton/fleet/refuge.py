@@ -1,4 +1,4 @@
-"""A way by a refuge: where a vehicle stands aside until those that need its place have passed."""
+"""A path by a refuge: where a vehicle stands aside until those that need its place have passed."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def by_a_refuge(
     way: Plan,
     budget: Budget,
 ) -> Word | None:
-    """The cheapest way found past what moves, with a stop where nothing ever passes; None if none.
+    """The cheapest path past moving obstacles, with a stop where none ever passes; None if none.
 
     Places beside the `way` alone, the nearest first; the vehicle drives there, waits, and goes on,
     as soon as rests along that way allow.

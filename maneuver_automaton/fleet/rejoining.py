@@ -28,7 +28,7 @@ from maneuver_automaton.fleet.vehicle import Found
 from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.receding_horizon.settings import switches_at_will
 
-NEARLY = 0.005  # share of its cost: a plan rejoined that is no dearer is the same one
+NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
 SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
 REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
 
@@ -69,7 +69,7 @@ def _note_pressed(now: Moment) -> None:
 def _note_crossing(now: Moment) -> None:
     """Plans that lead too near to others since the last step are void, if that is known.
 
-    Whoever had not heard of another one's emergency drove on.
+    Who had not received another one's emergency drove on.
     """
     for one, other in sorted(now.state.crossing):
         if one not in now.held or other not in now.held:

@@ -152,7 +152,7 @@ class Vehicle:
         first = first_plan(query, budget=replace(budget, expansions=LONGEST))
         self._count(first.expansions)
         if first.word is None:
-            self.why_none = first.enclosed or "no way was found"
+            self.why_none = first.enclosed or "no path was found"
             return
         self._keep_ways(query, first.word, budget, AT_ONCE)
         self.bound = lattice_bound(query) if bounded else None

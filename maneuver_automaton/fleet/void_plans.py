@@ -66,7 +66,7 @@ def plan_anew(now: Moment) -> None:
                 now.make_void(j)
             else:
                 when = now.first_meeting(j, other, [(k, found)])
-                reason = f"at {when:.6g} s it meets a vehicle that has not heard of it"
+                reason = f"at {when:.6g} s it meets a vehicle that did not receive its new plan"
                 now.flag(FleetGuarantee.SAFETY, [k, j], reason)
 
 

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._ceilings import MOST_HEADING
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.yaml_source import Document, Where, shown

@@ -23,8 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray, freeze
-from maneuver_automaton._ceilings import FASTEST, STEEPEST_STEERING
 from maneuver_automaton._files import open_input, write_text_atomically
+from maneuver_automaton._limits import FASTEST, STEEPEST_STEERING
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.formats.levels import levels_of, nearest_level

@@ -20,7 +20,7 @@ from typing import TypeAlias
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._ceilings import MOST_HEADING
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.formats.dynobench_models import (
     StatedModel,

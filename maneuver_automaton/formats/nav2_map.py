@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._ceilings import MOST_HEADING
 from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import bounds_around, check_cell

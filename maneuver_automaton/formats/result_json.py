@@ -76,7 +76,7 @@ def _result_of(document: Mapping[str, Any], problem: Problem) -> PlanResult:
 
 
 def _alternative(entry: Mapping[str, Any], problem: Problem) -> Alternative | None:
-    """A dearer plan of trims; None where it has maneuvers."""
+    """A costlier plan of trims; None where it has maneuvers."""
     plan = _coasted(entry, problem.start, problem.start_time, problem.automaton)
     error = _error(entry.get("terminal_error"))
     if plan is None or error is None:

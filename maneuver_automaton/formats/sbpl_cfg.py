@@ -1,7 +1,7 @@
 """Environments of SBPL: a header of keys, then the costs of all cells (.cfg, .env, .nav3d).
 
 x runs along a row and y along the rows, so the first row is the lowest, and the corner of its first
-cell is the origin. Cells of cost `obsthresh` and above are blocked; those between are dear for
+cell is the origin. Cells of cost `obsthresh` and above are blocked; those between are costly for
 SBPL, but free here. With `cellsize(meters)` (nav3d) start and end are poses in metres and radians.
 Without it (nav2d) they are cells, of 1 m here: a point starts and ends in the middle of a cell, at
 a heading that is drawn from a fixed seed.

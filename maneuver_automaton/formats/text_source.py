@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from maneuver_automaton._ceilings import FARTHEST as FARTHEST
 from maneuver_automaton._files import open_input
+from maneuver_automaton._limits import FARTHEST as FARTHEST
 from maneuver_automaton.errors import InvalidScenario
 
 MAX_BYTES = 5_000_000  # of a file that people write

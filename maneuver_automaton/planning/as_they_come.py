@@ -27,7 +27,7 @@ def plans(
     time_limit : float
         [s] as of `plan`.
     alternatives : int
-        How many dearer plans the last one has beside it.
+        How many costlier plans the last one has beside it.
     gap : float, optional
         Share of the cost that is small enough, as of `plan`.
 

@@ -26,7 +26,7 @@ from maneuver_automaton.words.word import word_of_plan
 
 WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no plan yet
 LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
-OTHERS = 6  # dearer words that are looked at where bounds or obstacles may refuse the cheapest
+OTHERS = 6  # costlier words that are looked at where bounds or obstacles may refuse the cheapest
 IN_SPACE = 23  # the same where some may pass above or below
 
 

@@ -143,7 +143,7 @@ class Incumbents:
         return False
 
     def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
-        """Check candidates, the cheapest first, until as many plans as are asked for are no dearer.
+        """Check candidates, the cheapest first, until as many plans as asked for are no costlier.
 
         Once the time is over they are checked only until there is a plan at all: at least one of
         them, and a few more if they take no more than a moment.
@@ -272,5 +272,5 @@ class Incumbents:
 
 
 def _slack(cost: float) -> float:
-    """By how much a plan may be dearer than its word was found to be."""
+    """By how much a plan may be costlier than its word was found to be."""
     return CHEAPER * abs(cost)

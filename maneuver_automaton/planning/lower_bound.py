@@ -109,7 +109,7 @@ def _with_few_changes(
     """Bound of plans with at most so many changes of direction.
 
     Where every change costs a price more, such a plan costs at most so many prices more: what is
-    proven of the dearer costs, less these prices, holds for it. The best of some prices counts.
+    proven of the costlier costs, less these prices, holds for it. The best of some prices counts.
     """
     best, cost = known_bound(problem), problem.cost
     if not isinstance(cost, Cost):
@@ -117,10 +117,10 @@ def _with_few_changes(
     scale = incumbent if incumbent < math.inf else 2.0 * best.value
     for number, share in enumerate(SHARES):
         price = share * scale / (1 + most)
-        dearer = replace(cost, direction_change=cost.direction_change + price)
+        costlier = replace(cost, direction_change=cost.direction_change + price)
         limit = incumbent + most * price
         one = Proving(
-            replace(problem, cost=dearer),
+            replace(problem, cost=costlier),
             budget.part(1.0 / (len(SHARES) - number)),
             Watch(gap=0.0, cost=limit),
             max_work=None if work is None else work // len(SHARES),

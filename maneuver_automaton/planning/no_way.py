@@ -82,7 +82,7 @@ def too_long(problem: Problem, budget: Budget) -> str:
     if least <= longest * (1.0 + ROUNDING):
         return ""
     return (
-        f"every plan takes at least {least:.4g} s, and the horizon admits {longest:g} s: no way "
+        f"every plan takes at least {least:.4g} s, and the horizon admits {longest:g} s: no path "
         "that leads to the goal is short enough"
     )
 

@@ -38,7 +38,7 @@ def plan(
         [s] for the whole call: searches end early enough for the checks of what they find.
         Compiling and loading what all problems of a vehicle share do not count.
     alternatives : int
-        How many dearer plans to return beside the cheapest, as far as there are so many.
+        How many costlier plans to return beside the cheapest, as far as there are so many.
     gap : float, optional
         Share of the cost: end as soon as no plan is proven to be cheaper by more. A proof then
         runs beside the search, for as long as the time limit says.

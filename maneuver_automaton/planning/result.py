@@ -57,7 +57,7 @@ class LowerBound:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Alternative:
-    """Another locally optimal plan, dearer than the best."""
+    """Another locally optimal plan, costlier than the best."""
 
     plan: Plan
     cost: float
@@ -110,5 +110,5 @@ class Answer(Protocol):
     def __call__(
         self, problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
     ) -> PlanResult:
-        """The cheapest plan found, and so many dearer ones."""
+        """The cheapest plan found, and so many costlier ones."""
         ...

@@ -42,7 +42,7 @@ class Tracked:
     reason: str = ""
     expansions: int = 0
     queries: int = 0  # collision queries
-    others: tuple[Plan, ...] = ()  # dearer plans of other words, cheapest first
+    others: tuple[Plan, ...] = ()  # costlier plans of other words, cheapest first
     enclosed: bool = False  # proven: obstacles enclose the start or every goal
 
 

@@ -1,4 +1,4 @@
-"""Draw by how much short words of a designed library are dearer than the shortest paths."""
+"""Draw by how much short words of a designed library are costlier than the shortest paths."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import as_array
 from maneuver_automaton.plotting.colors import GREY, INK
 from maneuver_automaton.plotting.style import SMALL_PT
 
-COLORMAP = "viridis_r"  # pale for cheap, dark for dear; made for colour-blind readers too
+COLORMAP = "viridis_r"  # pale for cheap, dark for costly; made for colour-blind readers too
 TICK_IN = 0.05  # [in] length of a tick
 
 

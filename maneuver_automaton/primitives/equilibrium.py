@@ -1,4 +1,4 @@
-"""Trims of a model: where its reduced dynamics stand still, point by point of a grid."""
+"""Trims of a model: where its reduced dynamics are at equilibrium, point by point of a grid."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._ceilings import LONGEST_STROKE
+from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives.bang_bang import check_limited_rates

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._ceilings import FASTEST, FASTEST_SPIN
+from maneuver_automaton._limits import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup
 
 Pose = TypeVar("Pose", bound=LieGroup)
@@ -67,7 +67,7 @@ class Trim:
 
     @property
     def is_rest(self) -> bool:
-        """Whether the trim stands still: zero twist."""
+        """Whether the trim is a rest: zero twist."""
         return not any(self.body_velocity.tolist())
 
     def coast(self, start: Pose, duration: ArrayLike) -> Pose:

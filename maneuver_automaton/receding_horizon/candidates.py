@@ -57,9 +57,9 @@ def candidate(
     fixed = bool(here.obstacles or here.zones or any(plan.maneuvers))
     ordered = plan if fixed else costliest_first(plan, here.rates_of(plan))
     if ordered is not plan:
-        dearer = here.cost_of(ordered)
-        if dearer <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
-            plan, cost = ordered, dearer
+        costlier = here.cost_of(ordered)
+        if costlier <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
+            plan, cost = ordered, costlier
     return Candidate(
         plan=plan,
         cost=cost,

@@ -1,4 +1,4 @@
-"""Safe plans: collision-free, and followed by standing still or by a fail-safe trajectory."""
+"""Safe plans: collision-free, and followed by a rest or by a fail-safe trajectory."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def looked_at(here: Problem, settings: Settings) -> float:
 def settled(problem: Problem) -> Problem:
     """The problem without what is gone by its start, and with what has come to rest as it stands.
 
-    A search is quicker among obstacles that stand still.
+    A search is quicker among static obstacles.
 
     Examples
     --------

@@ -17,7 +17,7 @@ from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.result import plan_of
 
 MOST_STEPS = 4  # that a plan within the goal's set may take
-ALTERNATIVES = 1  # dearer plans, of which one may stay in the set
+ALTERNATIVES = 1  # costlier plans, of which one may stay in the set
 CALM = 0.5  # share of the tolerance that a plan of several steps may use up at the next step
 FINE = 0.01  # [m, rad] between the poses that are looked at
 

@@ -23,7 +23,7 @@ from maneuver_automaton.search.result import SearchStatus, plan_of
 from maneuver_automaton.words.word import is_word_of
 
 SECOND_OPINION = 0.02  # [s] for short words beside insertion
-PACES = 5  # dearer plans, which may be cheaper at another pace
+PACES = 5  # costlier plans, which may be cheaper at another pace
 
 
 class InFreeSpace:

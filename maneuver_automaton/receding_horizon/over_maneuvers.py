@@ -49,7 +49,7 @@ PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the l
 LATE = 0.8  # share of a step's time after which no plan is searched where something moves
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
 MOMENT = 1e-6  # [s]
-OTHERS = 3  # dearer words that are tried where the cheapest ones are not free
+OTHERS = 3  # costlier words that are tried where the cheapest ones are not free
 HALVINGS = 10  # of a plan's duration, to find out when it is hit
 
 

@@ -89,8 +89,7 @@ class Settings:
             )
         if problem.moves:
             raise ValueError(
-                f"receding horizon: {what} meet what moves at other times; need obstacles "
-                "that stand still"
+                f"receding horizon: {what} meet moving obstacles at other times; need static ones"
             )
         if self.pieces and (self.retimed or problem.horizon.max_trims is not None):
             raise ValueError(

@@ -132,13 +132,13 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
     moving = [k for k, move in enumerate(moves) if move]
     order: list[int] = []
     block: list[int] = []
-    dear: list[float] = (-rates).tolist()
+    costly: list[float] = (-rates).tolist()
     for k in moving:
         if not all(commute(twists[j], twists[k]) for j in block):  # a climb commutes with both
-            order += block if len(block) == 1 else sorted(block, key=dear.__getitem__)
+            order += block if len(block) == 1 else sorted(block, key=costly.__getitem__)
             block = []
         block.append(k)
-    order += sorted(block, key=dear.__getitem__)
+    order += sorted(block, key=costly.__getitem__)
     order += [k for k, move in enumerate(moves) if not move]
     if order == list(range(len(twists))):
         return plan

@@ -78,7 +78,7 @@ def improve(
     better: Better = lambda word: None,
     **more: Any,
 ) -> Improved:
-    """The cheapest word found from `word` on, which must be free; `better` hears of each gain.
+    """The cheapest word found from `word` on, which must be free; `better` gets each gain.
 
     See `Improvement` for the other settings.
     """

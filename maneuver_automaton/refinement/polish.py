@@ -44,7 +44,7 @@ LONGER = 3  # times the usual iterations, for free lines: among many obstacles t
 ROOM = 20.0  # times the usual distance from all limits, where closing the end needed more
 EVEN = 1e-9  # [s] by which equal steps may differ
 SHUFFLED = 0.01  # radii of the body: shorter stretches in one gear are none that a plan names
-STEADY = 1e-3  # share of the cost by which a motion without them may be dearer
+STEADY = 1e-3  # share of the cost by which a motion without them may be costlier
 FINER = 0.6  # share of the step with which the best is solved once more
 
 

@@ -180,7 +180,7 @@ def _ending(
     if stood is not None:
         first, last = stood
         since = f"at {first:.6g} s" if first == last else f"from {first:.6g} s to {last:.6g} s"
-        why += f"; no way on was found {since}"
+        why += f"; no continuation was found {since}"
     if over:
         return "missed", f"no goal was reached until {now:.6g} s, when the last one is over; {why}"
     return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s; {why}"

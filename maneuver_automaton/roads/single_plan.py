@@ -137,7 +137,7 @@ def _searched(planner: RoadPlanner) -> RoadPlanResult:
 def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
     """How near the plan that leads furthest comes to a goal."""
     if found is None or not found.lasting:
-        return "; there is no way on from the start"
+        return "; no motion leads on from the start"
     ticks = np.arange(0, found.lasting + 1, planner.horizon.goals.every)
     times = np.array([planner.time_of(k) for k in ticks.tolist()])
     why = nearest_miss(planner.local.goals, planner.vehicle, times, found.states[ticks])

@@ -21,7 +21,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from maneuver_automaton._ceilings import FARTHEST
+from maneuver_automaton._limits import FARTHEST
 
 
 def need(text: str) -> PydanticCustomError:
@@ -72,13 +72,13 @@ class Several:
         return value
 
 
-def _below_ceiling(value: float) -> float:
+def _within_limits(value: float) -> float:
     if abs(value) > FARTHEST:
         raise need(f"a number of at most {FARTHEST:g} in size")
     return value
 
 
-_Small = AfterValidator(_below_ceiling)
+_Small = AfterValidator(_within_limits)
 Number = Annotated[float, Strict(), AllowInfNan(False), Need("a finite number"), _Small]
 Positive = Annotated[float, Strict(), AllowInfNan(False), Gt(0), Need("a positive number"), _Small]
 NotNegative = Annotated[

@@ -23,7 +23,7 @@ class DesignPart(Part):
     cost: CostPart = Field(
         default_factory=lambda: CostPart(length=1.0), description="as in a scenario; its length"
     )
-    within: Factor = Field(1.05, description="how much dearer words may be than all candidates'")
+    within: Factor = Field(1.05, description="how much costlier words may be than all candidates'")
     most: Count = Field(24, description="trims that the library may have")
     max_trims: Count | None = Field(None, description="of a word, at least 3; left out: any number")
     radius_m: Positive | None = Field(None, description="of the disc of goals; with max_trims")

@@ -24,11 +24,11 @@ def in_order(words: Iterable[Word]) -> Iterator[Word]:
 
     Examples
     --------
-    >>> dear, long, short = (
+    >>> costly, long, short = (
     ...     Word(trims=trims, durations=[1.0] * len(trims), cost=cost)
     ...     for trims, cost in (([0], 2.0), ([0, 1], 1.0), ([2], 1.0 + 1e-12))
     ... )
-    >>> [word.trims.tolist() for word in in_order([dear, long, short])]
+    >>> [word.trims.tolist() for word in in_order([costly, long, short])]
     [[2], [0, 1], [0]]
     """
     equal: list[Word] = []

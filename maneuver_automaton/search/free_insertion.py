@@ -166,7 +166,7 @@ def _fitting(work: _Work, rounds: int) -> int:
 
 
 def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
-    """The solutions of words; where only the cheapest is asked for, no dearer ones.
+    """The solutions of words; where only the cheapest is asked for, no costlier ones.
 
     Once the time is over, that of the cheapest word that has one.
     """

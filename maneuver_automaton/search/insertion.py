@@ -53,7 +53,7 @@ def search_insertion(
         A plan of this library from start to goal, improved before any seed.
     upper_bound : float
         Cost of a plan that is known: what costs as much is left out. Insertion still begins with
-        words that are a little dearer.
+        words that are a little costlier.
 
     Returns
     -------

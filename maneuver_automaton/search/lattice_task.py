@@ -228,7 +228,7 @@ def _slack(library: LatticeLibrary) -> float:
 
 
 def _tick(query: LatticeQuery, resolution: Resolution) -> float:
-    """Length in time of a cell [s]; 0 where a dearer node is never the one that is in time."""
+    """Length in time of a cell [s]; 0 where a costlier node is never the one that is in time."""
     if not (query.moves or math.isfinite(query.most_time)):
         return 0.0
     durations = query.library.arrays.edge_durations

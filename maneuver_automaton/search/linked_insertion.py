@@ -39,7 +39,7 @@ FEW = 2  # trims of a word that may be taken out at once
 CLOSED_FORM = 3  # trims of a word whose times follow in closed form
 SCANNED_TRIMS = 14  # that words of four trims are made of
 SCAN_SHARE = 0.4  # of the time that is left, for scanning
-SEED_SLACK = 0.1  # share by which words may be dearer than a plan that is known, and yet be seeds
+SEED_SLACK = 0.1  # share by which words may be costlier than a plan that is known, and yet be seeds
 SEEDS = 4  # words of three trims that insertion begins with, beside the cheapest one
 
 

@@ -31,7 +31,7 @@ ALPHABET = 24  # trims that words are made of, of a larger library those that di
 LONGEST = 4  # trims of a scanned word, unless fewer are asked for
 NODES = 12  # grid nodes per scanned time: a rough answer will do, insertion follows
 HEADINGS = 24  # a free heading is tried at so many
-SLACK = 0.1  # share by which a word may be dearer than what is asked for before it is made good
+SLACK = 0.1  # share by which a word may be costlier than what is asked for before it is made good
 WORDS_AN_EXPANSION = 16  # that are looked at in the time of one expansion of the lattice
 EXPANSIONS_A_WORD = 8  # in place of solving one word for its times
 STEERED = 2000  # words between the first looks at the clock, some ms
@@ -95,9 +95,9 @@ def scan_linked_words(
     """Words from the problem's first trim to the goal's last one, with transitions in between.
 
     Between two trims stands the cheapest chain of maneuvers, so a word of the library's graph with
-    dearer ones, or with maneuvers that lead from a trim to itself, is not among them. All trims of
-    a word coast for a while. With an upper bound, or a number of alternatives, a word of four trims
-    is left out where no node of its scanned time is nearly cheap enough.
+    costlier ones, or with maneuvers that lead from a trim to itself, is not among them. All trims
+    of a word coast for a while. With an upper bound, or a number of alternatives, a word of four
+    trims is left out where no node of its scanned time is nearly cheap enough.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def scan_linked_words(
         The search ends with what it has once its time is over; ``search.max_expansions`` of the
         problem limits it by the number of words instead: the same at every call.
     upper_bound : float
-        Cost of a plan that is known: what is dearer may be left out.
+        Cost of a plan that is known: what is costlier may be left out.
     max_trims : int
         Trims of a word that coast, at most; the horizon's ``max_trims`` may be less.
     alphabet : int
@@ -185,10 +185,10 @@ def _made_good(
     prices = list[float]()
     slack = 1.0 + SLACK * refined + TIE
     for n, found in enumerate(rough):
-        dearest = upper_bound
+        costliest = upper_bound
         if alternatives is not None and len(prices) > alternatives:
-            dearest = min(upper_bound, sorted(prices)[alternatives])
-        if found.cost > dearest * slack:
+            costliest = min(upper_bound, sorted(prices)[alternatives])
+        if found.cost > costliest * slack:
             return
         if budget.is_over and (prices or n >= LATE_WORDS):
             return

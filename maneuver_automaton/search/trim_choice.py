@@ -118,9 +118,9 @@ def paced_trims(
 ) -> tuple[IntArray, IntArray]:
     """Rows of the few trims at the two paces that suit a word which may last so long.
 
-    Time gets a price. The dearer it is, the faster are the `coarse_trims`; so there is a least one
-    at which the word, driven by those of its own directions, ends in time. The trims for the step
-    below, and those for it: between the two paces words fill the time.
+    Time gets a price. The costlier it is, the faster are the `coarse_trims`; so there is a least
+    one at which the word, driven by those of its own directions, ends in time. The trims for the
+    step below, and those for it: between the two paces words fill the time.
 
     Parameters
     ----------

@@ -126,7 +126,7 @@ class WordScan:
         self.not_first = None if not_first is None else _row_of(setup, not_first)
         self._gridded = False
         width = MOST_TRIMS + 1
-        # a user's own price of switches is added afterwards: what is cheap now may be dear then
+        # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = not isinstance(problem.cost, Cost)
         if self.own_prices:
             alternatives = None
@@ -267,7 +267,7 @@ class WordScan:
     def modes(self) -> Iterator[Mode]:
         """A fixed time padded by rest; free; a fixed or longest time met exactly.
 
-        The last one not where the cheapest trim for so long is too dear.
+        The last one not where the cheapest trim for so long is too costly.
         """
         horizon, setup = self.problem.horizon, self.setup
         exact = horizon.time if horizon.time is not None else horizon.max_time
@@ -342,9 +342,9 @@ class WordScan:
     def _rows(self) -> Iterator[tuple[IntArray, Array, float]]:
         """Moving trims, their times and cost of what was found, by rising cost."""
         costs: list[float] = self.found.costs[: self.n_found].tolist()
-        dearest = math.inf if self.own_prices else tied(float(self.found.best[-1]))
+        costliest = math.inf if self.own_prices else tied(float(self.found.best[-1]))
         for k in sorted(range(len(costs)), key=costs.__getitem__):
-            if self.pruned and costs[k] > dearest:
+            if self.pruned and costs[k] > costliest:
                 break
             numbers = self.found.words[k]
             size = sum(number >= 0 for number in numbers.tolist()) - int(self.setup.free_heading)

@@ -49,7 +49,7 @@ def search_words(
     nodes : int
         Grid nodes per scanned time.
     upper_bound : float
-        Cost of a plan that is known: what is dearer may be left out, and so there may be none.
+        Cost of a plan that is known: what is costlier may be left out, and so there may be none.
     ties : bool
         Whether to list, beside the solutions asked for, all that cost as much as the last of them.
     not_first : int, optional

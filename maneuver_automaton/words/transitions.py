@@ -15,7 +15,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 
 SWITCH = -1  # the maneuver of a switch at will: the identity
-HOP = 1e-9  # of the dearest maneuver: of equally cheap chains the one with the fewest maneuvers
+HOP = 1e-9  # of the costliest maneuver: of equally cheap chains the one with the fewest maneuvers
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

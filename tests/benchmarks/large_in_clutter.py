@@ -4,7 +4,7 @@
 
 A car in fields of 25 and 150 boxes (`scenes.field_query`), with the six trims of Reeds and Shepp
 and a rest, and with 41 speeds times 41 steering angles, the two side by side in one run. Costs:
-time; time and effort, the effort as dear and four times as dear; the effort in a fixed time, 1.6
+time; time and effort, the effort as costly and four times so; the effort in a fixed time, 1.6
 times the shortest. Medians over the queries: time to the first plan; cost, in that of six trims,
 with the mean and the largest; when the cost is that of six trims at their end (but for 0.1 %), and
 that in the time six trims took. A ratio below 1 is a gain.
@@ -33,7 +33,7 @@ FIELDS = {"25 boxes": (50.0, 35.0), "150 boxes": (122.0, 85.0)}  # [m] side, apa
 COSTS = {
     "time": Cost(time=1.0),
     "mixed": Cost(time=1.0, effort=1.0),
-    "dear effort": Cost(time=1.0, effort=4.0),
+    "costly effort": Cost(time=1.0, effort=4.0),
     "effort in T": Cost(effort=1.0),
 }
 LONGER = 1.6  # the fixed time, in that of the shortest plan

@@ -134,7 +134,7 @@ def show(case: Case, rows: Sequence[Row]) -> None:
             if holds(row.grid, other.grid) and excess > 1e-6:
                 print(
                     f"  {row.trims} trims hold all {other.trims}, yet their first value is "
-                    f"{excess:.2%} dearer: the search by insertion has not found the best word"
+                    f"{excess:.2%} costlier: the search by insertion has not found the best word"
                 )
 
 

@@ -1,10 +1,10 @@
 """Random closed loops among moving obstacles, of every kind of vehicle, judged by shapely.
 
 ``python tests/benchmarks/moving_loops.py FILE [--vehicles ...] [--count N] [--from SEED]
-[--time-limit S] [--changes]``: movers by a seed across the way of the vehicles of the feature
+[--time-limit S] [--changes]``: moving obstacles across the paths of the feature
 matrix, and some that stand; one line of JSON a loop. What is driven is looked at every 5 ms: the
 distance of the body, and of what it carries, from every obstacle, and whether the vehicle stood
-still when it was hit. ``--changes``: every other mover is predicted to stand still until it sets
+still when it was hit. ``--changes``: every other one is predicted to stand still until it sets
 off. ``--report FILE`` prints a table. The clock of the package is that of the processor.
 """
 
@@ -40,13 +40,13 @@ from tests.solids import Rounded  # noqa: E402
 
 TICK = 5e-3  # [s] between two looks
 STILL = 1e-6  # [m, rad] that a vehicle moves in a tick at most where it stands still
-MOVERS, STANDING = 4, 2
+MOVING, STATIC = 4, 2
 PIECES = 8  # steps that a drive straight to the goal takes, about
 STEPS = 50
 
 
-def drawn(vehicle: Vehicle, seed: int, *, movers: int = MOVERS) -> Problem:
-    """A vehicle's task with movers across its way by a seed, and some obstacles that stand."""
+def drawn(vehicle: Vehicle, seed: int, *, moving: int = MOVING) -> Problem:
+    """A vehicle's task with moving obstacles across its path by a seed, and some static ones."""
     rng = np.random.default_rng([seed, len(vehicle.name), 77])
     far, size = vehicle.reach, vehicle.size
     goal = np.array(vehicle.goal)
@@ -58,7 +58,7 @@ def drawn(vehicle: Vehicle, seed: int, *, movers: int = MOVERS) -> Problem:
         goal[2] = rng.uniform(-0.5, 0.5)
     takes = far / vehicle.fastest  # [s] straight to the goal
     found: list[Obstacle] = []
-    while len(found) < movers:
+    while len(found) < moving:
         shape = _shape(rng, rng.uniform(0.4, 1.2) * size)
         begin = rng.uniform(0.0, 0.8) * takes
         speeds = rng.uniform(0.15, 0.8, 2) * vehicle.fastest
@@ -76,7 +76,7 @@ def drawn(vehicle: Vehicle, seed: int, *, movers: int = MOVERS) -> Problem:
         reach = 2.0 * size + _radius(shape)
         if np.hypot(*places[0]) > 2.0 * reach and np.hypot(*(places[2] - goal[:2])) > 2.0 * reach:
             found.append(Obstacle(shape, motion=motion))
-    while len(found) < movers + STANDING:
+    while len(found) < moving + STATIC:
         shape = _shape(rng, rng.uniform(0.3, 0.9) * size)
         at = np.array([rng.uniform(0.1, 1.0) * far, rng.uniform(-0.4, 0.4) * far])
         clear = 2.5 * size + _radius(shape)
@@ -96,7 +96,7 @@ def _radius(shape: Any) -> float:
 
 
 def seen_later(problem: Problem, step: float) -> Any:
-    """What is predicted at a step: every other mover stands still until it sets off."""
+    """What is predicted at a step: every other moving obstacle stands still until it sets off."""
 
     def seen(number: int) -> list[Any]:
         now, there = number * step, []

@@ -3,7 +3,7 @@
 ``python tests/benchmarks/paper_loops.py [--first N]``: the rows that Table 1 prints beside ours;
 its control grids in exact fractions under its own tie rule, which shows that 3.000 belongs to
 another grid than the one it is printed for; Section 5.3 with Table 2 as printed and with trim 5
-reversed, from the best first word and from every dearer one, of which the N cheapest are shown.
+reversed, from the best first word and from every costlier one, of which the N cheapest are shown.
 """
 
 from __future__ import annotations
@@ -184,13 +184,13 @@ def replanned_at(loop: ClosedLoop) -> list[int]:
 
 
 def dearer_first_words(problem: Problem, step: float, shown: int) -> None:
-    """The loop from every dearer first word: what it saves, and where it replans."""
+    """The loop from every costlier first word: what it saves, and where it replans."""
     others = plan(problem, alternatives=ALTERNATIVES).alternatives
     assert len(others) < ALTERNATIVES, "there are more alternatives than were asked for"
     loops = [
         simulate(problem, step=step, steps=30, first=other.plan, audit=False) for other in others
     ]
-    print(f"  From the {shown} cheapest of {len(others)} dearer first words:")
+    print(f"  From the {shown} cheapest of {len(others)} costlier first words:")
     print("    first cost  closed loop    saving  replanned at  first word")
     for other, loop in list(zip(others, loops, strict=True))[:shown]:
         at = ", ".join(f"{number * step:g}" for number in replanned_at(loop)) or "-"
@@ -212,7 +212,7 @@ def dearer_first_words(problem: Problem, step: float, shown: int) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--first", type=int, default=10, help="dearer first words to show")
+    parser.add_argument("--first", type=int, default=10, help="costlier first words to show")
     options = parser.parse_args()
     table_1()
     fractions_on_grids()

@@ -4,7 +4,7 @@
 goal, last as long as its primitives, cost what it says, move as its vehicle's equations say
 (integrated here from sample to sample, and from the start to the end), touch nothing at any of its
 samples or between them, and keep the clearance that it states? Of a closed loop: does every piece
-do so, begin where the piece before ended, and is the loop where, when and as dear as its file says?
+do so, begin where the piece before ended, and is the loop where, when and as costly as stated?
 With a second file of the same problems: which costs differ.
 """
 
@@ -305,7 +305,7 @@ def judged(answers: dict[tuple[str, int], dict[str, Any]]) -> None:
 def compared(ours: dict[Any, dict[str, Any]], other: dict[Any, dict[str, Any]]) -> None:
     """Costs and times of the first file over those of the second, where both have plans."""
     print("\nfirst over second: problems, only first finds, only second finds, sum of costs, "
-          "dearer by 0.1 %, cheaper by 0.1 %, median ratio of times")  # fmt: skip
+          "costlier by 0.1 %, cheaper by 0.1 %, median ratio of times")  # fmt: skip
     for vehicle in dict.fromkeys(name for name, _ in ours):
         keys = [key for key in ours if key[0] == vehicle and key in other]
         costs = [(ours[k]["plan"]["cost"], other[k]["plan"]["cost"]) for k in keys]

@@ -283,7 +283,7 @@ def show_costs(
     print_ratio("IPOPT from a line", from_line / best)
     worse = from_line > many.first_values * (1.0 + SAME)
     print(
-        f"  IPOPT from a line is dearer than 1681 trims from {worse.sum()} of {len(starts)} "
+        f"  IPOPT from a line is costlier than 1681 trims from {worse.sum()} of {len(starts)} "
         "starts: another local optimum"
     )
     below = many.first_values < best * (1.0 - SAME)

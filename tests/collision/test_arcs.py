@@ -1,4 +1,4 @@
-"""What moves on arcs, or is there for a while: everybody who looks sees the same."""
+"""Obstacles that move on arcs, or are there for a while: everybody who looks sees the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words that get lost: whichever one it is, nobody drives what another does not expect."""
+"""Messages that get lost: whichever one it is, nobody drives what another does not expect."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_all_agree():
 
 
 @pytest.mark.parametrize("lost", range(4))
-def test_who_does_not_hear_from_all_holds_on(lost):
+def test_without_all_acknowledgements_the_plan_is_held(lost):
     agreement, held, _ = three(lost)
     assert not agreement.agree(0, found(9.0), held[0], never)
     assert agreement.unknown(held) == []
@@ -66,7 +66,7 @@ def test_who_does_not_hear_from_all_holds_on(lost):
 
 
 def test_it_is_said_again():
-    agreement, held, drops = three(0, 2)  # the first word to b, and the first answer of b
+    agreement, held, drops = three(0, 2)  # the first message to b, and the first answer of b
     agreement.tries = 3
     assert agreement.agree(0, found(9.0), held[0], never)
     assert [one.kind for one in drops.seen[:5]] == ["asks", "asks", "agrees", "asks", "agrees"]

@@ -13,10 +13,10 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.fleet.conflicts import meetings
-from maneuver_automaton.fleet.crew import Crew
 from maneuver_automaton.fleet.planning import _FleetSearch
 from maneuver_automaton.fleet.turns import Turns
 from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.worker_pool import WorkerPool
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Horizon, Problem
@@ -206,7 +206,9 @@ def test_vehicles_that_cannot_turn_drive_ahead():
 def test_by_turns_everybody_has_a_plan_without_a_search_in_time():
     """What is returned where there is no time for more: one drives at a time."""
     fleet = fleets.random_fleet(6, 2)
-    search = _FleetSearch(Crew(fleet, vehicles_of(fleet)), "sum", Budget.from_now(30.0), 0, None)
+    search = _FleetSearch(
+        WorkerPool(fleet, vehicles_of(fleet)), "sum", Budget.from_now(30.0), 0, None
+    )
     search._plan_alone()
     held = Turns(search.vehicles, 0.0, search.budget).by_turns(range(6))
     assert sorted(held) == list(range(6))

@@ -237,8 +237,8 @@ def test_who_was_to_leave_but_has_no_plan_stays():
 
 
 @pytest.mark.slow
-def test_an_emergency_that_is_not_heard():
-    """All words of three steps are lost as one breaks down: nobody swaps, all is flagged."""
+def test_an_emergency_that_is_not_acknowledged():
+    """All messages of three steps are lost as one breaks down: nobody swaps, all is flagged."""
 
     def lost(message):
         return 6 <= message.step < 9

@@ -180,7 +180,7 @@ class TestReading:
             (lambda d: d["steps"][0].pop("pose"), "steps[0].pose: is missing, need a list"),
             (lambda d: d["steps"][0].update(pose=[0.0, 1.0]), "steps[0].pose: need 3 numbers"),
             (lambda d: d["steps"][1].update(pose="here"), "steps[1].pose: got 'here'"),
-            (lambda d: d["steps"][0].update(value="dear"), "dear"),
+            (lambda d: d["steps"][0].update(value="costly"), "costly"),
             (lambda d: d["steps"][0].update(value=None), ""),
             (lambda d: d["steps"][0].update(value=10**400), ""),
             (lambda d: d["steps"][0].update(origin="heaven"), "heaven"),

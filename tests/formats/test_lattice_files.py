@@ -185,12 +185,12 @@ def test_a_cost_multiplier_of_a_part_is_for_no_mprim(tmp_path):
         mprim_of_automaton(half)
 
 
-@pytest.mark.parametrize("dear", [1, 9])
-def test_a_plan_keeps_away_from_dear_primitives(tmp_path, dear):
-    """To a cell ahead and one to the left: two steps aside, or a diagonal one that may be dear."""
+@pytest.mark.parametrize("costly", [1, 9])
+def test_a_plan_keeps_away_from_costly_primitives(tmp_path, costly):
+    """To a cell ahead and one to the left: two steps aside, or a costlier diagonal one."""
     rows = []
     for number, (columns, lines) in enumerate([(1, 0), (0, 1), (1, 1)]):
-        multiplier = dear if (columns, lines) == (1, 1) else 1
+        multiplier = costly if (columns, lines) == (1, 1) else 1
         rows.append(
             f"primID: {number}\nstartangle_c: 0\nendpose_c: {columns} {lines} 0\n"
             f"additionalactioncostmult: {multiplier}\nintermediateposes: 2\n0.0 0.0 0.0\n"
@@ -202,8 +202,8 @@ def test_a_plan_keeps_away_from_dear_primitives(tmp_path, dear):
     library = load_library(tmp_path / "a.json")
     result = plan(Problem(library, [0, 0, 0], [0.5, 0.5, 0.0]), time_limit=60.0)
     straight = result.plan.word == ("2 from heading 0",)
-    assert straight == (dear == 1)
-    assert result.cost == pytest.approx(np.sqrt(0.5) if dear == 1 else 1.0)
+    assert straight == (costly == 1)
+    assert result.cost == pytest.approx(np.sqrt(0.5) if costly == 1 else 1.0)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from tests.matrix.features import FEATURES
-from tests.matrix.measuring import Dearer, Nothing
+from tests.matrix.measuring import Costlier, Nothing
 from tests.matrix.rows import Feature
 from tests.matrix.vehicles import VEHICLES, Vehicle
 
-WORKS, NOTHING, IGNORED, ERROR, REFUSED, DEARER, SENSELESS = (".", "F", "I", "E", "R", "p", "-")
+WORKS, NOTHING, IGNORED, ERROR, REFUSED, COSTLIER, SENSELESS = (".", "F", "I", "E", "R", "p", "-")
 SECONDS = 60  # of one cell, at most
 
 
@@ -65,7 +65,7 @@ def tried(feature: str, vehicle: str, *, seconds: int = SECONDS) -> Outcome:
 def sign_of(error: Exception) -> str:
     """What kind of fault an exception is."""
     kinds: tuple[tuple[type[Exception], str], ...] = (
-        (Dearer, DEARER),
+        (Costlier, COSTLIER),
         (Nothing, NOTHING),
         (TooLong, NOTHING),
         (AssertionError, IGNORED),

@@ -28,7 +28,7 @@ class Nothing(AssertionError):
     """No plan, or no other answer, was found."""
 
 
-class Dearer(AssertionError):
+class Costlier(AssertionError):
     """It works, but costs more than a plan that is known."""
 
 
@@ -68,7 +68,7 @@ def no_dearer(result: PlanResult, than: float, what: str, *, share: float = SAME
     """Fail if a plan costs more than a known one."""
     assert result.cost is not None
     if result.cost > than * (1.0 + share):
-        raise Dearer(f"costs {result.cost:.6g}, but {what} costs {than:.6g}")
+        raise Costlier(f"costs {result.cost:.6g}, but {what} costs {than:.6g}")
 
 
 def cost_of(cost: Cost, motion: Plan | None) -> float:

@@ -1,6 +1,6 @@
 """Print the matrix, vehicle by feature: ``python -m tests.matrix.table``.
 
-``.`` works, ``p`` works but dearer than a known plan, ``F`` finds nothing, ``I`` accepted and
+``.`` works, ``p`` works but costlier than a known plan, ``F`` finds nothing, ``I`` accepted and
 ignored or done wrongly, ``R`` refused, ``E`` a traceback of another kind, ``-`` makes no sense.
 """
 

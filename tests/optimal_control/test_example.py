@@ -79,7 +79,7 @@ def test_shooting_by_pontryagins_conditions_agrees(examples, shot):
 def test_the_other_rule_agrees(shot):
     example = solve_uniform_effort_example(200, rule="rk4")
     exact = pontryagin.motion(shot)[0][-1, 3]
-    assert exact < example.cost < exact + 5e-5  # constant controls can only be dearer
+    assert exact < example.cost < exact + 5e-5  # constant controls can only be costlier
     assert example.spread < 1e-3  # and the ends are not spoilt
 
 

@@ -21,7 +21,7 @@ from tests import scenes
 from tests.quickly import quick_are
 from tests.solids import check_plan
 
-LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
+LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 ROBOT, CAR = scenes.differential_robot(), scenes.reeds_shepp(1.0)
 BODY = (Box([0.8, 0.5], [0.1, 0.0]),)
 RING = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -455,12 +455,12 @@ def test_among_what_moves():
 @pytest.mark.slow
 @pytest.mark.parametrize("price", [24.0, 240.0])
 @pytest.mark.parametrize("name", ["car", "dubins"])
-def test_a_dear_price_of_a_switch_is_no_wall(name, price):
+def test_a_costly_price_of_a_switch_is_no_wall(name, price):
     problem = replace(KINDS[name], cost=Cost(time=1.0, switch=price), obstacles=(BLOCKS[1],))
-    dear = found(replace(problem, search=SearchSettings(max_expansions=4000)))
+    costly = found(replace(problem, search=SearchSettings(max_expansions=4000)))
     plain = found(replace(problem, cost=Cost(time=1.0)))
-    assert len(dear.plan.word) <= len(plain.plan.word)
-    assert len(dear.plan.word) <= 5
+    assert len(costly.plan.word) <= len(plain.plan.word)
+    assert len(costly.plan.word) <= 5
 
 
 @pytest.mark.slow

@@ -133,8 +133,8 @@ def test_times_and_prices():
     scene = replace(BASE, obstacles=(TOWER,))
     fixed = found(replace(scene, horizon=Horizon(time=17.0)))
     assert fixed.plan.duration == pytest.approx(17.0, abs=1e-9)
-    dear = found(replace(scene, cost=Cost(time=1.0, switch=5.0)))
-    assert len(dear.plan.word) <= len(found(scene).plan.word)
+    costly = found(replace(scene, cost=Cost(time=1.0, switch=5.0)))
+    assert len(costly.plan.word) <= len(found(scene).plan.word)
 
 
 @pytest.mark.exhaustive
@@ -152,8 +152,8 @@ def test_a_longest_time_and_few_trims_are_kept():
 
 def test_the_search_knows_what_a_switch_costs():
     """A word of three trims, at 15 for its switches; twelve would cost 45."""
-    dear = found(replace(BASE, obstacles=(TOWER,), cost=Cost(time=1.0, switch=5.0)))
-    assert dear.cost < 40.0
+    costly = found(replace(BASE, obstacles=(TOWER,), cost=Cost(time=1.0, switch=5.0)))
+    assert costly.cost < 40.0
 
 
 def test_any_trim_will_do_at_both_ends():

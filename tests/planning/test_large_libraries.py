@@ -23,7 +23,7 @@ from tests.search.cases import compiled_only
 from tests.solids import check_plan
 
 pytestmark = compiled_only
-LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
+LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 SEARCH = SearchSettings(max_expansions=1500)
 AXIS = np.round(np.linspace(-1.0, 1.0, 41), 12)
 GRID = Automaton.of_grid(Unicycle(), [AXIS, AXIS])

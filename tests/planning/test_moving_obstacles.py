@@ -19,7 +19,7 @@ from tests.planning.test_among_obstacles import assert_consistent
 from tests.quickly import quick_are
 from tests.solids import check_plan, driven
 
-LIMIT = 60.0  # [s] a ceiling that a busy machine does not reach
+LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 ROBOT = scenes.differential_robot(speed=1.0)
 DISC = (Disc(0.3),)
 

@@ -29,7 +29,7 @@ def test_a_plan_for_a_gap_that_is_too_narrow_does_not_exist(tmp_path):
     settings = SearchSettings(max_expansions=300)
     result = plan(dataclasses.replace(gap(1.6), search=settings), time_limit=30.0)
     assert result.status is PlanStatus.UNREACHABLE
-    assert result.reason.startswith("no collision-free way leads from the start to the goal")
+    assert result.reason.startswith("no collision-free path leads from the start to the goal")
     written = plan_to_dict(result)
     assert written["status"] == "unreachable"
     assert written["narrowest"]["place"] == pytest.approx([10.0, 0.0], abs=0.5)
@@ -61,7 +61,7 @@ def test_no_plan_is_as_quick_as_the_horizon_admits():
         short = dataclasses.replace(problem, horizon=Horizon(max_time=share * duration))
         result = with_proof(ended(short), Budget.from_now(1e3))
         assert result.status is status
-        assert ("s: no way that leads to the goal is short enough" in result.reason) == (
+        assert ("s: no path that leads to the goal is short enough" in result.reason) == (
             status is PlanStatus.UNREACHABLE
         )
 

@@ -182,7 +182,7 @@ FREE = {
 @pytest.mark.parametrize("cost", [Cost(effort=1.0), Cost(length=1.0)], ids=["effort", "length"])
 @pytest.mark.parametrize("name", quick_are(["single_track"], FREE))
 def test_words_come_first_where_nothing_is_in_the_way(name, cost):
-    """No plan is dearer than what the search over words finds by itself."""
+    """No plan is costlier than what the search over words finds by itself."""
     problem = replace(FREE[name], cost=cost)
     words = search_insertion(problem, problem.goals[0], budget=Budget.from_now(60.0))
     result = plan(problem, time_limit=60.0)

@@ -208,10 +208,10 @@ def test_the_body_and_what_moves_grow_darker_in_colours_of_their_own():
     plan = parking_plan()
     _, artists = drawn(plan, problem=slalom_problem(plan))
     bodies = artists.moment_bodies.get_facecolor()[:, :3]
-    movers = artists.obstacles.moving.get_facecolor()[:, :3]
+    moving = artists.obstacles.moving.get_facecolor()[:, :3]
     assert (np.diff(bodies.sum(axis=1)) < 0.0).all()
-    assert (np.diff(movers.sum(axis=1)) < 0.0).all()
-    assert np.linalg.norm(bodies[:, None] - movers, axis=-1).min() > 0.15
+    assert (np.diff(moving.sum(axis=1)) < 0.0).all()
+    assert np.linalg.norm(bodies[:, None] - moving, axis=-1).min() > 0.15
     assert len(np.unique(bodies, axis=0)) == len(bodies) == 5
     middles = [outline[:4].mean(axis=0) for outline in outlines(artists.moment_bodies)]
     np.testing.assert_allclose(middles, plan.pose_at([0, 2, 4, 6, 8])[:, :2], atol=1e-3)

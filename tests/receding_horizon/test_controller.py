@@ -92,7 +92,7 @@ class TestOneStep:
         assert step.gap == 0.0
 
     def test_the_tie_rule_within_a_word(self):
-        # 1.7 for 0.2 s and 1.6 for 0.8 s: either order is optimal, the dearer one comes first
+        # 1.7 for 0.2 s and 1.6 for 0.8 s: either order is optimal, the costlier one comes first
         problem = Problem(
             robot({"rest": (0.0, 0.0), "slow": (1.6, 0.0), "fast": (1.7, 0.0)}),
             [-1.62, 0.0, 0.0],
@@ -448,8 +448,8 @@ class TestLowerBound:
 
     def test_a_margin_keeps_a_dearer_plan_and_does_not_call_it_the_best(self):
         problem = parking_loop()
-        dearer = plan(problem, alternatives=1).alternatives[0]
-        loop = controller(problem, step=0.5, first=dearer.plan, margin=1.0)
+        costlier = plan(problem, alternatives=1).alternatives[0]
+        loop = controller(problem, step=0.5, first=costlier.plan, margin=1.0)
         _, step = loop.step(problem.start)
         _, kept = loop.step(step.predicted)
         _, best = controller(replace(problem, start=step.predicted), step=0.5).step(step.predicted)

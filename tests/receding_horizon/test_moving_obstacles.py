@@ -182,7 +182,7 @@ class TestPredictions:
         assert two.poses == pytest.approx(one.poses, abs=1e-6)
 
 
-class TestHarm:
+class TestCollisionMitigation:
     def test_what_cannot_be_evaded_is_flagged(self):
         wall = moving_obstacle([0.0, 1.0], [(0.0, -3.0), (0.0, 3.0)], Box([20.0, 0.2]))
         loop = simulate(among(wall), step=0.5)
@@ -232,5 +232,5 @@ def test_a_loop_goes_on_from_its_file(tmp_path, after):
 
 def test_retimed_plans_among_moving_obstacles_are_refused():
     settings = {"cost": Cost(effort=1.0), "horizon": Horizon(time=20.0)}
-    with pytest.raises(ValueError, match="retimed plans meet what moves at other times"):
+    with pytest.raises(ValueError, match="retimed plans meet moving obstacles at other times"):
         RecedingHorizon(among(crossing(), **settings), step=1.0, retimed=True)

@@ -158,9 +158,9 @@ class TestParking:
     @pytest.mark.parametrize("controls", [None, REVERSED_SPIN])
     def test_from_a_dearer_word_it_replans_and_ends_cheaper(self, controls):
         problem = parking_loop(controls)
-        dearer = plan(problem, alternatives=6).alternatives
+        costlier = plan(problem, alternatives=6).alternatives
         better = 0
-        for one in dearer:
+        for one in costlier:
             loop = simulate(problem, step=1.0, steps=12, first=one.plan)
             assert loop.steps[0].origin is Origin.FIRST
             assert loop.steps[0].value == pytest.approx(one.cost, abs=1e-9)

@@ -103,9 +103,9 @@ def test_limits_are_kept():
 
 def test_weights_of_the_effort_count():
     plan = random_plan(np.random.default_rng(6))
-    dear = Cost(effort=2.0, time=1.0, effort_matrix=[[1.0, 0.0], [0.0, 25.0]])
-    problem = Problem(ROBOT, plan.start, plan.end, cost=dear, horizon=Horizon(time=plan.duration))
-    assert problem.cost_of(least_effort(plan, Unicycle(), cost=dear)) < problem.cost_of(
+    costly = Cost(effort=2.0, time=1.0, effort_matrix=[[1.0, 0.0], [0.0, 25.0]])
+    problem = Problem(ROBOT, plan.start, plan.end, cost=costly, horizon=Horizon(time=plan.duration))
+    assert problem.cost_of(least_effort(plan, Unicycle(), cost=costly)) < problem.cost_of(
         least_effort(plan, Unicycle())
     )
 

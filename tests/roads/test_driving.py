@@ -72,7 +72,7 @@ def test_it_stops_behind_what_blocks_the_road(tmp_path):
     assert drive.driven.end[0] < 39.0
 
 
-def test_a_goal_out_of_reach_is_missed_without_harm(tmp_path):
+def test_a_goal_out_of_reach_is_missed_without_a_collision(tmp_path):
     goal = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
     drive = driven(scene_of(tmp_path, *LANES, problem(goal=goal)))
     assert (drive.reached, drive.status) == (False, "missed")
@@ -96,7 +96,7 @@ def test_a_car_at_rest_with_no_way_on_stands_and_says_so(tmp_path):
     stood = [step for step in drive.steps if step.decision.stands]
     assert stood
     assert all(step.control.tolist() == [0.0, 0.0] for step in stood)
-    assert "; no way on was found from " in drive.reason
+    assert "; no continuation was found from " in drive.reason
     assert len(drive.steps) == 40
 
 

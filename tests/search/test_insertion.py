@@ -420,11 +420,11 @@ def test_what_costs_as_much_as_a_known_plan_is_left_out(name):
 @pytest.mark.parametrize("name", VEHICLES)
 def test_a_known_plan_is_improved(name):
     problem = VEHICLES[name]()
-    dear = search_insertion(problem, problem.goals[0], alternatives=8).solutions[-1]
-    known = plan_of(problem, dear)
+    costly = search_insertion(problem, problem.goals[0], alternatives=8).solutions[-1]
+    known = plan_of(problem, costly)
     first = replace(problem, search=SearchSettings(max_expansions=1))
     found = search_insertion(first, first.goals[0], known=known).solutions
-    assert found[0].cost <= dear.cost + 1e-9
+    assert found[0].cost <= costly.cost + 1e-9
 
 
 @compiled_only

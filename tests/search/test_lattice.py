@@ -111,7 +111,7 @@ def test_nodes_are_ends_of_free_ways(name, resolution, sign):
     children = np.flatnonzero(links[:, PARENT] >= 0)
     if not (
         one.arrays.state[layout.FOUND] or problem.horizon.max_trims
-    ):  # what is dearer than a connection is left out
+    ):  # what is costlier than a connection is left out
         assert len(children) > (40 if COMPILED else 5)
     elif not len(children):
         return

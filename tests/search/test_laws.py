@@ -1,4 +1,4 @@
-"""What holds for every search: a moved problem has the moved plan, and more is never dearer."""
+"""What holds for every search: a moved problem has the moved plan, and more is never costlier."""
 
 from __future__ import annotations
 

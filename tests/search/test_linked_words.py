@@ -41,13 +41,13 @@ def first_plan(one: Problem, **options):
     return plan_of(one, searched(one, **options).solutions[0])
 
 
-def by_brute_force(one: Problem, letters: int, starts: int):
+def by_brute_force(one: Problem, most_trims: int, starts: int):
     """Cheapest cost over all words, each from many random times."""
     setup = word_setup(one, one.goals[0], most_trims=99)
     moving = [k for k, trim in enumerate(one.automaton.trims) if not trim.is_rest]
     rng = np.random.default_rng(0)
     best = np.inf
-    for n in range(1, letters + 1):
+    for n in range(1, most_trims + 1):
         for word in itertools.product(moving, repeat=n):
             if any(a == b for a, b in itertools.pairwise(word)):
                 continue

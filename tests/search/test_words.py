@@ -304,8 +304,8 @@ def test_price_of_a_switch():
         assert_valid(priced, solution)
     plain = search(parking(), alternatives=None)
     assert result.solutions[0].cost == pytest.approx(plain.solutions[0].cost + 6.0, abs=1e-9)
-    dear = search(parking(cost=Cost(effort=1.0, norm=0.5, switch=20.0)))
-    assert names(priced, dear.solutions[0]) == ("acw", "cw", "rest")  # fewest switches
+    costly = search(parking(cost=Cost(effort=1.0, norm=0.5, switch=20.0)))
+    assert names(priced, costly.solutions[0]) == ("acw", "cw", "rest")  # fewest switches
 
 
 def test_price_of_a_direction_change():

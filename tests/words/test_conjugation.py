@@ -59,7 +59,7 @@ def test_a_word_with_maneuvers_is_a_word_of_conjugated_twists(seed, dof):
 
 
 def test_agrees_with_slsqp_on_the_word_as_it_is():
-    dearer = 0
+    costlier = 0
     for twists, rates, displacements, planted in words(40, seed=2):
         goal = joined(twists, displacements, planted)
         solved = solve_switching_times(
@@ -81,8 +81,8 @@ def test_agrees_with_slsqp_on_the_word_as_it_is():
             options={"maxiter": 300, "ftol": 1e-12},
         )
         met = np.abs(off(joined(twists, displacements, reference.x), goal)).max() < 1e-7
-        dearer += reference.success and met and solved.cost > reference.fun + 1e-6
-    assert dearer <= 4  # both are local
+        costlier += reference.success and met and solved.cost > reference.fun + 1e-6
+    assert costlier <= 4  # both are local
 
 
 @pytest.mark.parametrize("dof", [3, 4])

@@ -170,10 +170,10 @@ def test_chains_of_maneuvers_are_transitions():
     first, second = (SE2(maneuvers[k].displacement) for k in (0, 1))
     assert np.allclose(library.displacements([0, 2])[0, :3], (first @ second).pose, atol=1e-15)
     assert np.isfinite(library.arrays.cost).all()
-    dear = library_of(
+    costly = library_of(
         Automaton(model_of_kinds(), trims, maneuvers), maneuver_costs=[9.0, 9.0, 1.0, 1.0]
     )
-    assert dear.chain(0, 2) == ((2, 2),)
+    assert costly.chain(0, 2) == ((2, 2),)
 
 
 def test_trims_without_a_way_between_them_are_named():

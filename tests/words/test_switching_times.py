@@ -51,7 +51,7 @@ def assert_optimal(word: reference.Word, solved: SwitchingTimes) -> None:
 
 @pytest.mark.parametrize("total", quick_are([True], [False, True]), ids=["free", "fixed"])
 def test_agrees_with_slsqp(total):
-    dearer = 0
+    costlier = 0
     for word, planted in random_words(60, total=total, seed=7):
         solved = solve(word, guesses=[planted])
         assert solved.status is TimesStatus.OPTIMAL
@@ -59,8 +59,8 @@ def test_agrees_with_slsqp(total):
         improved = word.slsqp(np.array(solved.durations))
         assert improved is None or word.cost(improved) > solved.cost - 1e-6
         warm = word.slsqp(planted)
-        dearer += warm is not None and solved.cost > word.cost(warm) + 1e-6
-    assert dearer <= 6  # both are local: now and then one ends in a dearer valley
+        costlier += warm is not None and solved.cost > word.cost(warm) + 1e-6
+    assert costlier <= 6  # both are local: now and then one ends in a costlier valley
 
 
 @pytest.mark.parametrize("total", quick_are([False], [False, True]), ids=["free", "fixed"])

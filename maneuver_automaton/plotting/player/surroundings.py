@@ -17,7 +17,7 @@ from maneuver_automaton.plotting.limits import bound_lines
 from maneuver_automaton.plotting.player.local import PLACE_DIGITS, POSE_DIGITS, Local, rounded
 from maneuver_automaton.problem import Bounds, Goal
 
-TURN = 0.05  # [rad] of what moves on an arc, between two of its poses
+TURN = 0.05  # [rad] of an obstacle that moves on an arc, between two of its poses
 
 
 def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: bool) -> list[Any]:

@@ -17,7 +17,7 @@ from maneuver_automaton.formats.closed_loop_json import load_steps, save_closed_
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, simulate
 from tests.matrix import outside
-from tests.matrix.measuring import EXACT, SAME, SAMPLED, Dearer, Nothing, close, found, obeys
+from tests.matrix.measuring import EXACT, SAME, SAMPLED, Costlier, Nothing, close, found, obeys
 from tests.matrix.outside import Course
 from tests.matrix.rows import Engine, feature, without
 from tests.matrix.scenes import base, crossing, fixed_duration, midway, pillar, slow_speed
@@ -73,7 +73,7 @@ def loop(vehicle: Vehicle, engine: Engine) -> None:
     ended = driven(vehicle, engine)
     promised = ended.steps[0].value
     if ended.cost > promised * (1.0 + SAME):
-        raise Dearer(f"it spends {ended.cost:.6g}, its first plan cost {promised:.6g}")
+        raise Costlier(f"it spends {ended.cost:.6g}, its first plan cost {promised:.6g}")
 
 
 @feature(without("obstacles"), says="clearance")

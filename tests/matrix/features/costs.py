@@ -18,7 +18,7 @@ from tests.matrix.vehicles import Vehicle
 
 
 def _cheapest(vehicle: Vehicle, engine: Engine, cost: Cost, **changes: object) -> PlanResult:
-    """A plan at a cost is no dearer than the quickest one, priced so."""
+    """A plan at a cost is no costlier than the quickest one, priced so."""
     result = asked(vehicle, engine, cost=cost, **changes)
     quick = cost_of(cost, found(base(vehicle)))
     no_dearer(result, quick, "the quickest plan", share=SAMPLED)
@@ -94,7 +94,7 @@ def fine_turns(motion: Plan) -> Course:
 
 @feature(without("cost"), says="cost: ")
 def stage_cost(vehicle: Vehicle, engine: Engine) -> None:
-    """A user's own cost is what the plan costs, and it is no dearer than the quickest plan."""
+    """A user's own cost is what the plan costs, and it is no costlier than the quickest plan."""
     cost: StageCost = Calm(0.3 * base(vehicle).cost)
     assert isinstance(cost, Calm)
     result = asked(vehicle, engine, cost=cost)

@@ -196,9 +196,9 @@ def _just_beside(vehicle: Vehicle, pose: np.ndarray, bodies: Bodies, side: float
     applies=lambda vehicle: vehicle.has_heading,
 )
 def free_heading_among_obstacles(vehicle: Vehicle, engine: Engine) -> None:
-    """With any heading it is no dearer than with the one that suits, and ends with another."""
+    """With any heading it is no costlier than with the one that suits, and ends with another."""
     pose = np.array(vehicle.goal)
-    pose[2] += 2.5  # a heading to which to turn would be dear
+    pose[2] += 2.5  # a heading to which to turn would be costly
     goal = vehicle.target(pose=pose, free_heading=True)
     result = asked(vehicle, engine, goals=goal, obstacles=[pillar(vehicle)])
     _, turn = outside.off_goal(result.plan.end, goal)

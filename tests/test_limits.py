@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton import Automaton, Problem, Unicycle
-from maneuver_automaton._ceilings import FARTHEST, FASTEST
+from maneuver_automaton._limits import FARTHEST, FASTEST
 from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygon
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import SecondOrderCar
@@ -131,7 +131,7 @@ def test_a_library_of_maneuvers_without_number_is_refused(monkeypatch):
         ),
     ],
 )
-def test_a_scenario_file_says_where_it_is_beyond_a_ceiling(start, obstacle, says):
+def test_a_scenario_file_says_where_it_is_beyond_a_limit(start, obstacle, says):
     text = SCENARIO.format(start=start, obstacle=obstacle)
     with pytest.raises(InvalidScenario, match=says) as error:
         scenario_of_text(text, name="file")

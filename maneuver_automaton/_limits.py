@@ -1,7 +1,7 @@
-"""Ceilings of what is planned for: no vehicle is so far away, so large or so fast.
+"""Upper limits of numbers that are planned with: no vehicle is so far away, so large or so fast.
 
 Coordinates may be counted from far away: published parking cases lie 7e9 m from their origin.
-Beyond the ceilings numbers have no digits left for a body's size, fields and swept solids have no
+Beyond these limits numbers have no digits left for a body's size, fields and swept solids have no
 end, and the proof that two bodies do not meet takes steps without number.
 """
 

@@ -87,7 +87,7 @@ class _Reply(NamedTuple):
 
 
 @dataclass(slots=True, eq=False)
-class Crew:
+class WorkerPool:
     """Who does the work for a fleet: this process, or as many others as `jobs`."""
 
     fleet: FleetProblem

@@ -7,11 +7,10 @@ import pickle
 import pytest
 
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet
-from maneuver_automaton.fleet import crew as crews
-from maneuver_automaton.fleet.crew import Crew, Done, Task
+from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet, worker_pool
 from maneuver_automaton.fleet.planning import _alone, _better, _in_order
 from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.worker_pool import Done, Task, WorkerPool
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet import fleets
 from tests.fleet.test_levels import over_a_truck
@@ -32,25 +31,25 @@ def answers(result):
     }
 
 
-def planned(crew):
+def planned(pool):
     """Ways alone, then plans in an order, then better ones of two groups and of one by itself."""
-    n, budget = len(crew.vehicles), Budget.from_now(100.0)
-    list(crew.each(_alone, [Task((k,), {}) for k in range(n)], budget))
+    n, budget = len(pool.vehicles), Budget.from_now(100.0)
+    list(pool.each(_alone, [Task((k,), {}) for k in range(n)], budget))
     orders = [tuple(range(n)), tuple(reversed(range(n)))]
-    (one, other) = crew.each(_in_order, [Task(order, {}) for order in orders], budget)
+    (one, other) = pool.each(_in_order, [Task(order, {}) for order in orders], budget)
     groups = [(0, 1), (2,)]
     tasks = [
         Task(group, {k: found for k, found in one.held.items() if k not in group})
         for group in groups
     ]
-    better = list(crew.each(_better, [*tasks, Task((3,), {}, "alone")], budget))
-    return [one, other, *better], [vehicle.ways for vehicle in crew.vehicles]
+    better = list(pool.each(_better, [*tasks, Task((3,), {}, "alone")], budget))
+    return [one, other, *better], [vehicle.ways for vehicle in pool.vehicles]
 
 
 def test_what_travels_comes_back_the_same():
     fleet = fleets.random_fleet(4, 3)
-    here = planned(Crew(fleet, vehicles_of(fleet)))
-    away = Crew(fleet, vehicles_of(fleet), 2, in_this_process)
+    here = planned(WorkerPool(fleet, vehicles_of(fleet)))
+    away = WorkerPool(fleet, vehicles_of(fleet), 2, in_this_process)
     there = planned(away)  # not prepared: whoever does not know the fleet is told of it
     assert [one.queries for one in here[0]] == [one.queries for one in there[0]]
     for one, other in zip(here[0], there[0], strict=True):
@@ -63,23 +62,23 @@ def test_what_travels_comes_back_the_same():
     for ways, others in zip(here[1], there[1], strict=True):
         assert [way.cost for way in ways] == [way.cost for way in others]
         assert [way.trims.tolist() for way in ways] == [way.trims.tolist() for way in others]
-    assert len(crews._FLEETS) <= crews.KEPT
+    assert len(worker_pool._FLEETS) <= worker_pool.KEPT
 
 
 def test_nothing_comes_of_what_a_signal_broke_off():
     fleet = fleets.random_fleet(4, 3)
-    crew = Crew(fleet, vehicles_of(fleet), 2, lambda function, pieces: iter(()))
+    pool = WorkerPool(fleet, vehicles_of(fleet), 2, lambda function, pieces: iter(()))
     tasks = [Task((k,), {}) for k in range(4)]
-    assert list(crew.each(_alone, tasks, Budget.from_now(1.0))) == [Done(None)] * 4
+    assert list(pool.each(_alone, tasks, Budget.from_now(1.0))) == [Done(None)] * 4
 
 
 def test_expansions_are_counted_wherever_they_are():
     fleet = fleets.random_fleet(4, 3)
     counts = []
     for run in (None, in_this_process):
-        crew = Crew(fleet, vehicles_of(fleet), 2, run)
-        planned(crew)
-        counts.append([one.expansions for one in crew.vehicles])
+        pool = WorkerPool(fleet, vehicles_of(fleet), 2, run)
+        planned(pool)
+        counts.append([one.expansions for one in pool.vehicles])
     assert counts[0] == counts[1]
     assert min(counts[0]) > 0
 
