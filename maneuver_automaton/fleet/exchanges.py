@@ -20,10 +20,10 @@ from maneuver_automaton.fleet.log import Swap
 from maneuver_automaton.fleet.loop_state import Around
 from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.questions import answers_to, question_of, search
-from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found
 
 WORTH = 1e-6  # share of its cost that another plan saves at least
-AGAIN = 4  # steps until who has no plan looks again past the same plans
+AGAIN, AGAIN_LONG = 4, 16  # steps until who has no plan looks again past the same plans
 
 
 class Exchanges:
@@ -100,6 +100,12 @@ class Exchanges:
         again = not leads(now.held[k]) and (now.number + k) % AGAIN == 0
         return again or now.state.in_vain.get(k) != self._around()
 
+    def _most_of(self, k: int) -> int:
+        """How many expansions a search may take: many now and then, for who has no plan."""
+        now = self.now
+        long = not leads(now.held[k]) and (now.number + k) % AGAIN_LONG == 0
+        return LONG if long else QUICK
+
     def _look_for_better(self, batch: Sequence[int]) -> None:
         """Some look for better plans at once, past the same ones; then one after another swaps."""
         now = self.now
@@ -107,7 +113,7 @@ class Exchanges:
         bases = [now.held[k] for k in batch]
         values = [self._better_than(now.left_to_pay(k)) for k in batch]
         questions = [
-            question_of(now, k, base, now.expected_by(k), known)
+            question_of(now, k, base, now.expected_by(k), known, most=self._most_of(k))
             for k, base, known in zip(batch, bases, values, strict=True)
         ]
         self.asked += batch

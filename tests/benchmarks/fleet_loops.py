@@ -8,7 +8,8 @@ late. What was driven is judged by shapely (`fleet_judge.py`). A loop is a line 
 FILE; lines that are there are not driven again, so it may be stopped at any time. Seconds are
 those of one processor.
 
-*lost plans*: a vehicle that is there holds none. *not flagged*: a plan that leads through where
+*lost plans*: a vehicle that is there holds none. *defects*: who did not drive as its model says, or
+whose speed or hitch jumps. *not flagged*: a plan that leads through where
 another one broke down, whose step does not say that it is void. *left behind*: a vehicle that did
 not arrive, though `plan_fleet` finds a way for it from where it stands in the end.
 """
@@ -42,6 +43,7 @@ from maneuver_automaton.fleet import (
     Message,
     plan_fleet,
     simulate_fleet,
+    verify_driven,
 )
 from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
 from maneuver_automaton.problem import Goal
@@ -53,7 +55,7 @@ from tests.fleet.mortal import Mortal
 from tests.fleet.robots import at_rest
 
 STEP = 0.5  # [s]
-STEPS = 400
+STEPS = 400  # at least; a quarter more than the first plans take, if that is more
 NOISE = Disturbance(position_m=0.003, heading_rad=0.003)
 LITTLE = Disturbance(position_m=0.0003, heading_rad=0.0003)  # of those with inertia
 DIES = 0.2  # share of the workers
@@ -103,6 +105,7 @@ def driven(seed: int, case: str, least: int, most: int) -> Row:
     fleet = mixed_fleet(seed, least=least, most=most)
     roomy = fleet_with_room(fleet, tube_of(fleet, None))
     first = plan_fleet(roomy, time_limit=LONG_S, max_rounds=0, seed=seed)
+    latest = max((plan.start_time + plan.duration for plan in first.plans.values()), default=0.0)
     begun = time.process_time()
     times: list[float] = []
 
@@ -114,7 +117,7 @@ def driven(seed: int, case: str, least: int, most: int) -> Row:
     log = simulate_fleet(
         fleet,
         step=STEP,
-        steps=STEPS,
+        steps=max(STEPS, math.ceil(1.25 * latest / STEP)),
         first=first if first.plans else at_rest(fleet),
         seed=seed,
         time_limit=LONG_S,
@@ -147,6 +150,7 @@ def outcome(log: FleetLog) -> Row:
         "pair": [*least.names, least.time_s],
         "still_m": least.still_m,
         "own_m": log.distance_m,
+        "defects": len(verify_driven(log).defects),
         "lost_plans": sum(len(names - gone - set(step.plans)) for step in log.steps),
         "void": sum(len(step.void) for step in log.steps),
         "unavoidable": said.get(FleetGuarantee.SAFETY.value, 0),
@@ -212,8 +216,8 @@ def line(rows: list[Row]) -> str:
     came = sum(row["arrived"] == row["n"] - row["broken"] for row in whole)
     return (
         f"{len(rows):5d} {total('n'):8d} {total('steps'):6d} {hits:4d} {avoidable:5d} {still:5d} "
-        f"{total('lost_plans'):5d} {total('arrived'):5d}/{able:<5d} {came:4d}/{len(whole):<4d} "
-        f"{total('left_behind'):6d} {total('void'):5d} {total('not_flagged'):6d} "
+        f"{total('lost_plans'):5d} {total('defects'):7d} {total('arrived'):5d}/{able:<5d} "
+        f"{came:4d}/{len(whole):<4d} {total('left_behind'):6d} {total('void'):5d} {total('not_flagged'):6d} "
         f"{1e3 * least:8.1f} {total('swaps'):6d} {median:7.3f} {most:6.3f} {times.max():6.2f}  "
         f"{flags}"
     )
@@ -226,7 +230,8 @@ def table(rows: Iterable[Row]) -> None:
         by_case.setdefault(row["case"], []).append(row)
     print(
         f"{'case':12s} {'loops':>5s} {'vehicles':>8s} {'steps':>6s} {'hits':>4s} {'avoid':>5s} "
-        f"{'still':>5s} {'lost':>5s} {'arrived':>11s} {'all came':>9s} {'behind':>6s} {'void':>5s} "
+        f"{'still':>5s} {'lost':>5s} {'defects':>7s} {'arrived':>11s} "
+        f"{'all came':>9s} {'behind':>6s} {'void':>5s} "
         f"{'unsaid':>6s} {'least mm':>8s} {'swaps':>6s} {'median':>7s} {'p99':>6s} {'most':>6s}  "
         "violations"
     )
@@ -236,7 +241,7 @@ def table(rows: Iterable[Row]) -> None:
         for row in some:
             wrong = row["least_m"] <= 0.0 or row["still_m"] <= 0.0 or row["left_behind"]
             came = row["arrived"] == row["n"] - row["broken"] or row["planned"] < row["n"]
-            if wrong or not came or row["lost_plans"] or row["not_flagged"]:
+            if wrong or not came or row["lost_plans"] or row["defects"] or row["not_flagged"]:
                 print(
                     f"  {case} {row['seed']}: {row['arrived']} of {row['n']} arrived, "
                     f"{row['broken']} broke down, {row['planned']} planned, "

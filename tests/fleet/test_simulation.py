@@ -20,6 +20,7 @@ from maneuver_automaton import (
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
+from tests.benchmarks.fleet_loops import driven
 from tests.fleet.robots import (
     at_rest,
     crossing,
@@ -272,6 +273,15 @@ def test_another_goal_on_the_way():
         loop.assign("c", fleet.problems[0])
     with pytest.raises(ValueError, match="its margin is 0 m"):
         loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], margin=0.0))
+
+
+@pytest.mark.slow
+def test_who_lost_its_plan_finds_a_long_way_round():
+    """Beside one that broke down, no way is found with few expansions."""
+    row = driven(68, "breakdown", least=2, most=30)
+    assert (row["arrived"], row["broken"], row["left_behind"]) == (8, 1, 0)
+    assert row["least_m"] > 0.0
+    assert row["defects"] == 0
 
 
 def test_what_is_prepared_for_obstacles_that_nobody_has_any_more_is_let_go():
