@@ -14,9 +14,11 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import (
     NOTHING,
     committed,
+    end_state,
     head_of,
     joined,
     tail_of,
@@ -147,12 +149,15 @@ def onward(
     """What is committed from a time on, `after` seconds at least, and the problem from its end.
 
     With inertia, the maneuver under way is driven to its end, and on to the next trim that the
-    library has; there is no problem where none comes.
+    library has; there is no problem where none comes. Who stands goes on from the trim in which it
+    stands, not from that of its start.
     """
     rest, own = rest_of_plan(vehicle, found, time), vehicle.problem
     if not moves_on(rest):
-        head = _standing(rest, after) if after > NOTHING else None
-        return head, own.starting_at(rest.end, time=rest.start_time + after)
+        here = _from_where_it_stands(own, rest, rest.start_time + after)
+        if here is None:
+            return None, None
+        return _standing(rest, after) if after > NOTHING else None, here
     if switches_at_will(vehicle.problem):
         busy, name = after, None
     else:
@@ -170,6 +175,22 @@ def onward(
         ended = replace(rest, start=rest.end)
         head = followed_by(rest, _standing(ended, busy - rest.duration))
     return head, own.starting_at(head.end, time=rest.start_time + busy, trim=name)
+
+
+def _from_where_it_stands(own: Problem, rest: Plan, time: float) -> Problem | None:
+    """The problem from where a plan is over, in a trim like the one that it ends in; None if none.
+
+    A vehicle that switches at will may begin in any.
+    """
+    here = own.starting_at(rest.end, time=time)
+    if switches_at_will(own) or not rest.trims:
+        return here
+    state = end_state(rest)
+    if same_state(own.first_trim.reduced_state, state):
+        return here
+    alike = (one for one in own.automaton.trims if same_state(one.reduced_state, state))
+    trim = next(alike, None)
+    return None if trim is None else replace(here, start_trim=trim.name)
 
 
 def _next_in_library(vehicle: Vehicle, rest: Plan, busy: float) -> tuple[float, str] | None:

@@ -35,12 +35,13 @@ def problem_of(kind: str) -> Problem:
         parts = {"trailer": (TRAILER,)}
         library = load_stock_library("car_with_trailer")
         return Problem(library, [0, 0, 0], end, footprint=LONG, parts=parts, margin=TUBE)
-    automaton = unicycle_automaton() if kind == "robot" else car_automaton()
+    automaton = car_automaton() if kind == "car" else unicycle_automaton()
     end = Goal(pose=[4.0, 2.0, 0.4], tolerance_m=0.15, tolerance_rad=0.25)
-    return Problem(automaton, [0, 0, 0], end, footprint=Disc(0.3), margin=TUBE)
+    begin = "1, 0" if kind == "moving" else None
+    return Problem(automaton, [0, 0, 0], end, start_trim=begin, footprint=Disc(0.3), margin=TUBE)
 
 
-@pytest.fixture(scope="module", params=["robot", "car", "trailer"])
+@pytest.fixture(scope="module", params=["robot", "moving", "car", "trailer"])
 def driving(request):
     """A vehicle with inertia, and a plan of it."""
     (vehicle,) = vehicles_of(FleetProblem([problem_of(request.param)]))
