@@ -17,6 +17,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import (
     NOTHING,
+    begin_state,
     committed,
     end_state,
     head_of,
@@ -115,6 +116,14 @@ def left_to_pay(vehicle: Vehicle, found: Found, time: float) -> float:
 def is_over(found: Found, time: float) -> bool:
     """Whether nothing of a plan is left but to stay."""
     return time >= found.arrival - NOTHING
+
+
+def goes_on(vehicle: Vehicle, found: Found, other: Found, time: float) -> bool:
+    """Whether another plan has, at a time [s], the reduced state in which the held one then is."""
+    rests = [rest_of_plan(vehicle, one, time) for one in (found, other)]
+    if switches_at_will(vehicle.problem) or not all(one.trims for one in rests):
+        return True
+    return same_state(begin_state(rests[1]), begin_state(rests[0]))
 
 
 def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
