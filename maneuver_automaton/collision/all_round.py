@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -26,11 +26,20 @@ def touched_all_round(
     *,
     margin: float = 0.0,
 ) -> bool:
-    """Whether a footprint whose frame is at a place (2,) [m] is too near at every heading.
+    """Whether a footprint whose frame is at a place is too near to obstacles at every heading.
 
     A point of the body that is deep inside an obstacle stays inside while the body turns a little,
     which proves it for all headings about one. False also where that takes too many headings.
     Obstacles that move do not count.
+
+    Parameters
+    ----------
+    footprint : tuple of Shape
+    obstacles : tuple of obstacles
+    place : (2,) array
+        Of the footprint's frame [m].
+    margin : float
+        Nearer than this is too near [m].
 
     Examples
     --------
@@ -48,8 +57,7 @@ def touched_all_round(
     solid = _solid_near(obstacles, place, reach)
     if solid.is_empty:
         return False
-    body = _joined([part.core for part in parts_of(footprint)],
-                   [part.radius for part in parts_of(footprint)])  # fmt: skip
+    body = _joined((part.core, part.radius) for part in parts_of(footprint))
     half = math.pi / FIRST
     waiting = [((2 * k + 1) * half, half) for k in range(FIRST)]
     for _ in range(MOST):
@@ -92,28 +100,23 @@ def _solid_near(obstacles: tuple[AnyObstacle, ...], place: Array, reach: float) 
     import shapely
 
     seen = SE2(np.array([-place[0], -place[1], 0.0]))
-    cores: list[Any] = []
-    radii: list[float] = []
+    solids: list[tuple[Any, float]] = []
     for far in obstacles:
         obstacle = far.moved(seen)
         if isinstance(obstacle, OccupancyMap):
-            runs = runs_of(obstacle)
-            cores += runs
-            radii += [0.0] * len(runs)
+            solids += [(run, 0.0) for run in runs_of(obstacle)]
         elif obstacle.motion is None:
-            for part in parts_of((obstacle.shape,)):
-                cores.append(part.core)
-                radii.append(part.radius)
+            solids += [(part.core, part.radius) for part in parts_of((obstacle.shape,))]
     here = shapely.Point(0.0, 0.0)
-    near = [k for k, one in enumerate(cores) if one.distance(here) <= reach + radii[k]]
-    return _joined([cores[k] for k in near], [radii[k] for k in near])
+    return _joined(
+        (core, radius) for core, radius in solids if core.distance(here) <= reach + radius
+    )
 
 
-def _joined(cores: list[Any], radii: list[float]) -> Any:
-    """One geometry of polygons, and of points as polygons inside their discs."""
+def _joined(solids: Iterable[tuple[Any, float]]) -> Any:
+    """One geometry of cores, each grown by its radius [m]; discs as polygons inside them."""
     import shapely
 
     return shapely.union_all([
-        core.buffer(radius, quad_segs=32) if radius else core
-        for core, radius in zip(cores, radii, strict=True)
+        core.buffer(radius, quad_segs=32) if radius else core for core, radius in solids
     ])  # fmt: skip

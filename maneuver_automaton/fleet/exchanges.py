@@ -11,6 +11,7 @@ from maneuver_automaton.fleet.conflicts import meetings
 from maneuver_automaton.fleet.held import (
     LATER,
     arrival,
+    goes_on,
     leads,
     left_to_pay,
     rejoined,
@@ -188,8 +189,15 @@ class Exchanges:
         return self._swap(found)
 
     def _swap(self, found: dict[int, Found]) -> bool:
-        """Exchange plans if these pay and are proven past all that is held now, and each other."""
+        """Exchange plans if these pay and are proven past all that is held now, and each other.
+
+        An answer that comes late may be for a plan that was rejoined with other times since: one
+        that has another speed than the vehicle by now is not taken.
+        """
         now = self.now
+        vehicles, time = now.vehicles, now.time
+        if not all(goes_on(vehicles[k], now.held[k], one, time) for k, one in found.items()):
+            return False
         before = math.fsum(now.left_to_pay(k) for k in found)
         after = math.fsum(left_to_pay(now.vehicles[k], one, now.time) for k, one in found.items())
         if not after < self._better_than(before):

@@ -14,9 +14,12 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import (
     NOTHING,
+    begin_state,
     committed,
+    end_state,
     head_of,
     joined,
     tail_of,
@@ -115,6 +118,14 @@ def is_over(found: Found, time: float) -> bool:
     return time >= found.arrival - NOTHING
 
 
+def goes_on(vehicle: Vehicle, found: Found, other: Found, time: float) -> bool:
+    """Whether another plan has, at a time [s], the reduced state in which the held one then is."""
+    rests = [rest_of_plan(vehicle, one, time) for one in (found, other)]
+    if switches_at_will(vehicle.problem) or not all(one.trims for one in rests):
+        return True
+    return same_state(begin_state(rests[1]), begin_state(rests[0]))
+
+
 def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
     """How far any point of the body is from where its plan has it [m]: an upper bound."""
     return float(beside(pose, found.plan.pose_at(time), reach_of(found, time)))
@@ -147,12 +158,15 @@ def onward(
     """What is committed from a time on, `after` seconds at least, and the problem from its end.
 
     With inertia, the maneuver under way is driven to its end, and on to the next trim that the
-    library has; there is no problem where none comes.
+    library has; there is no problem where none comes. Who stands goes on from the trim in which it
+    stands, not from that of its start.
     """
     rest, own = rest_of_plan(vehicle, found, time), vehicle.problem
     if not moves_on(rest):
-        head = _standing(rest, after) if after > NOTHING else None
-        return head, own.starting_at(rest.end, time=rest.start_time + after)
+        here = _from_where_it_stands(own, rest, rest.start_time + after)
+        if here is None:
+            return None, None
+        return _standing(rest, after) if after > NOTHING else None, here
     if switches_at_will(vehicle.problem):
         busy, name = after, None
     else:
@@ -170,6 +184,22 @@ def onward(
         ended = replace(rest, start=rest.end)
         head = followed_by(rest, _standing(ended, busy - rest.duration))
     return head, own.starting_at(head.end, time=rest.start_time + busy, trim=name)
+
+
+def _from_where_it_stands(own: Problem, rest: Plan, time: float) -> Problem | None:
+    """The problem from where a plan is over, in a trim like the one that it ends in; None if none.
+
+    A vehicle that switches at will may begin in any.
+    """
+    here = own.starting_at(rest.end, time=time)
+    if switches_at_will(own) or not rest.trims:
+        return here
+    state = end_state(rest)
+    if same_state(own.first_trim.reduced_state, state):
+        return here
+    alike = (one for one in own.automaton.trims if same_state(one.reduced_state, state))
+    trim = next(alike, None)
+    return None if trim is None else replace(here, start_trim=trim.name)
 
 
 def _next_in_library(vehicle: Vehicle, rest: Plan, busy: float) -> tuple[float, str] | None:

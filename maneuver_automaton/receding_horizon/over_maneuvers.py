@@ -94,10 +94,15 @@ class OverManeuvers:
 
         It must be free to stand there for a while, and until a time [s] of the world's clock.
         """
-        if self.here.moves and plan.trims and plan.trims[-1].is_rest:
+        last = self._last_trim(plan)
+        if self.here.moves and last.is_rest:
             arrival = plan.start_time + plan.duration
-            plan = rested(plan, plan.trims[-1], max(self._stand, until - arrival))
+            plan = rested(plan, last, max(self._stand, until - arrival))
         return what_is_hit(self.here, plan, self.here.goals[0])
+
+    def _last_trim(self, plan: Plan) -> Trim:
+        """The trim in which a plan ends; one without trims stays in that of the vehicle."""
+        return plan.trims[-1] if plan.trims else self.now.trim
 
     @property
     def _stand(self) -> float:
@@ -106,9 +111,10 @@ class OverManeuvers:
 
     def _may_stay(self, plan: Plan) -> bool:
         """Whether a vehicle that stands at the end of a free plan can stay, or go away in time."""
-        if not self.here.moves or not plan.trims or not plan.trims[-1].is_rest:
+        last = self._last_trim(plan)
+        if not self.here.moves or not last.is_rest:
             return True  # without rest the end of the plan is the end
-        stood = rested(plan, plan.trims[-1], self._stand)
+        stood = rested(plan, last, self._stand)
         found = self._fail_safe_after(stood)
         return not self._hit(plan, until=self.until) if found is None else found.complete
 

@@ -12,7 +12,7 @@ from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import begin_state, committed, end_state
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.fleet import FleetProblem
+from maneuver_automaton.fleet import FleetHorizon, FleetProblem, plan_fleet
 from maneuver_automaton.fleet.held import (
     given_up,
     onward,
@@ -35,12 +35,13 @@ def problem_of(kind: str) -> Problem:
         parts = {"trailer": (TRAILER,)}
         library = load_stock_library("car_with_trailer")
         return Problem(library, [0, 0, 0], end, footprint=LONG, parts=parts, margin=TUBE)
-    automaton = unicycle_automaton() if kind == "robot" else car_automaton()
+    automaton = car_automaton() if kind == "car" else unicycle_automaton()
     end = Goal(pose=[4.0, 2.0, 0.4], tolerance_m=0.15, tolerance_rad=0.25)
-    return Problem(automaton, [0, 0, 0], end, footprint=Disc(0.3), margin=TUBE)
+    begin = "1, 0" if kind == "moving" else None
+    return Problem(automaton, [0, 0, 0], end, start_trim=begin, footprint=Disc(0.3), margin=TUBE)
 
 
-@pytest.fixture(scope="module", params=["robot", "car", "trailer"])
+@pytest.fixture(scope="module", params=["robot", "moving", "car", "trailer"])
 def driving(request):
     """A vehicle with inertia, and a plan of it."""
     (vehicle,) = vehicles_of(FleetProblem([problem_of(request.param)]))
@@ -110,3 +111,22 @@ def test_who_rests_keeps_what_it_carries_as_it_is():
     begun = resting(vehicle, [1.0, 2.0, 0.3], 0.5)
     held = replace(begun, plan=replace(begun.plan, trims=(bent,)))
     assert resting(vehicle, [1.0, 2.0, 0.3], 1.0, held).plan.trims == (bent,)
+
+
+@pytest.mark.parametrize("ahead_s", [0.0, 0.4])
+def test_a_late_answer_with_another_speed_is_not_taken(ahead_s):
+    """It is for a plan that has been rejoined since: at the same place it would be faster."""
+    fleet = FleetProblem([problem_of("robot")])
+    first = plan_fleet(fleet, time_limit=60.0, max_rounds=0)
+    loop = FleetHorizon(fleet, step=0.25, first=first, delay_steps=1, time_limit=60.0)
+    (name,), (vehicle,) = fleet.names, loop.state.vehicles
+    loop.step({name: fleet.problems[0].start})
+    held, now = loop.state.held[0], 0.25
+    assert not same_state(state_at(vehicle, held, now), state_at(vehicle, held, now + 0.4))
+    pose = held.plan.pose_at(now)
+    plan = replace(rest_of_plan(vehicle, held, now + ahead_s), start=pose, start_time=now)
+    sooner = replace(held, plan=plan, cost=0.5 * held.cost, course=vehicle.course_of(plan))
+    loop.state.due[0] = (1, sooner, held)
+    step = loop.step({name: pose})
+    assert bool(step.swaps) is (ahead_s == 0.0)
+    assert same_state(begin_state(step.driven[name]), state_at(vehicle, held, now))

@@ -130,6 +130,20 @@ def with_inertia(*obstacles, automaton=None, **changed) -> Problem:
     )
 
 
+def assert_audited(problem, plan) -> None:
+    """The audit finds a plan free of all obstacles, with the problem's margin."""
+    audit = audit_plan(
+        plan,
+        Goal(pose=plan.end),
+        problem.automaton.model,
+        footprint=problem.footprint,
+        parts=problem.parts,
+        obstacles=problem.obstacles,
+        margin=problem.margin,
+    )
+    assert audit.passed, audit.reason
+
+
 class TestWithInertia:
     @pytest.mark.parametrize("trim", [None, "1, 0", "0.8, 0.8", "-0.6, 0"])
     @pytest.mark.parametrize("margin", [0.0, 0.1])
@@ -141,15 +155,7 @@ class TestWithInertia:
         assert found.plan.trims[0].name == (trim or "rest")
         assert found.plan.trims[-1].is_rest
         assert found.plan.duration >= 12.0 - 1e-9
-        audit = audit_plan(
-            found.plan,
-            Goal(pose=found.plan.end),
-            problem.automaton.model,
-            footprint=problem.footprint,
-            obstacles=problem.obstacles,
-            margin=margin,
-        )
-        assert audit.passed, audit.reason
+        assert_audited(problem, found.plan)
 
     def test_where_nothing_moves_it_brakes(self):
         found = search_fail_safe(with_inertia(start_trim="1, 0"), until=3.0)
@@ -196,12 +202,4 @@ class TestWithInertia:
         problem = vehicle.problem(obstacles=[coming])
         found = search_fail_safe(problem, until=40.0)
         assert found.complete
-        audit = audit_plan(
-            found.plan,
-            Goal(pose=found.plan.end),
-            problem.automaton.model,
-            footprint=problem.footprint,
-            parts=problem.parts,
-            obstacles=problem.obstacles,
-        )
-        assert audit.passed, audit.reason
+        assert_audited(problem, found.plan)

@@ -500,6 +500,25 @@ class TestAmongWhatMoves:
         assert loop.min_clearance_m > 0.0
         assert not any(step.deed is Deed.MITIGATED for step in loop.steps)
 
+    @pytest.mark.parametrize("begins_there", [True, False])
+    def test_at_its_goal_it_makes_room_for_what_comes(self, begins_there):
+        """It drives to its goal, or stands there at first, and stays until a disc comes."""
+        coming = Motion([4.0, 10.0], [[2.0, -4.0, 0.0], [2.0, 4.0, 0.0]])
+        goal = Goal(pose=[2.0, 0.0, 0.0], tolerance_m=0.1, tolerance_rad=0.1)
+        problem = posed(
+            goal,
+            obstacles=[Obstacle(Disc(0.4), motion=coming)],
+            footprint=Box([0.4, 0.3]),
+            search=SearchSettings(max_expansions=300),
+        )
+        if begins_there:
+            problem = replace(problem, start=goal.pose)
+        loop = simulate(problem, step=0.5, steps=22, stand=2.0, stay=True, time_limit=20.0)
+        assert loop.reached
+        assert loop.min_clearance_m > 0.0
+        assert Deed.MITIGATED not in {step.deed for step in loop.steps}
+        assert_nothing_interrupted(loop)
+
     @pytest.mark.parametrize("static", [True, False])
     def test_pushed_within_its_margin_it_drives_on_and_says_so(self, static):
         wall = Box([4.0, 0.2], [0.0, -0.35])  # 0.1 m beside the body
