@@ -217,9 +217,9 @@ def line(rows: list[Row]) -> str:
     return (
         f"{len(rows):5d} {total('n'):8d} {total('steps'):6d} {hits:4d} {avoidable:5d} {still:5d} "
         f"{total('lost_plans'):5d} {total('defects'):7d} {total('arrived'):5d}/{able:<5d} "
-        f"{came:4d}/{len(whole):<4d} {total('left_behind'):6d} {total('void'):5d} {total('not_flagged'):6d} "
-        f"{1e3 * least:8.1f} {total('swaps'):6d} {median:7.3f} {most:6.3f} {times.max():6.2f}  "
-        f"{flags}"
+        f"{came:4d}/{len(whole):<4d} {total('left_behind'):6d} {total('void'):5d} "
+        f"{total('not_flagged'):6d} {1e3 * least:8.1f} {total('swaps'):6d} "
+        f"{median:7.3f} {most:6.3f} {times.max():6.2f}  {flags}"
     )
 
 
