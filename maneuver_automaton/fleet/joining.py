@@ -11,6 +11,7 @@ from maneuver_automaton.fleet.held import (
 from maneuver_automaton.fleet.log import FleetGuarantee
 from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.receding_horizon.candidates import within
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 
 
 def let_in(now: Moment) -> list[int]:
@@ -22,7 +23,8 @@ def let_in(now: Moment) -> list[int]:
     refused = []
     for k in [k for k in now.poses if k not in now.held]:
         vehicle, pose = now.vehicles[k], now.poses[k]
-        choices = [resting(vehicle, pose, now.time)]
+        stands = switches_at_will(vehicle.problem) or vehicle.problem.first_trim.is_rest
+        choices = [resting(vehicle, pose, now.time)] if stands else []
         first = now.state.first.pop(k, None)
         if first is not None and now.offset_from(k, first) == 0.0:
             choices.insert(0, first)

@@ -13,6 +13,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.collision.motion import planar
 from maneuver_automaton.groups import LieGroup, SE2xR
+from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.problem import Problem
 
 
@@ -21,7 +22,8 @@ class FleetProblem:
     """Problems of several vehicles, of any kind mixed, whose bodies keep apart at all times.
 
     Every vehicle stands at its start until it leaves, at its problem's `start_time` or later, and
-    stays at its goal once it is there, unless it `leaves`. Obstacles and bounds of a problem are
+    stays at its goal once it is there, unless it `leaves`. One that cannot switch at will therefore
+    ends at rest, or leaves, and if it is under way at its start, nobody starts before it. Obstacles and bounds of a problem are
     those of its vehicle alone; times are of one clock. What flies passes above or below another one
     by the `body_height` of both; one in the plane that states none counts at all heights.
 
@@ -41,7 +43,8 @@ class FleetProblem:
     Raises
     ------
     ValueError
-        If there is no vehicle, names are not distinct, or a number is out of its range.
+        If there is no vehicle, names are not distinct, a number is out of its range, or a vehicle
+        with inertia would have to stand where it is in motion.
 
     Examples
     --------
@@ -99,6 +102,27 @@ class FleetProblem:
             if problem.horizon.time is not None:
                 raise ValueError(
                     f"fleet: vehicle {name!r} has a fixed time, need a free final time"
+                )
+        self._check_ends()
+
+    def _check_ends(self) -> None:
+        """Who cannot switch at will stands only in a trim at rest."""
+        first = min(problem.start_time for problem in self.problems)
+        for name, problem, leaves in zip(self.names, self.problems, self.leaves, strict=True):
+            if not has_inertia(problem):
+                continue
+            begin, ends = problem.first_trim, [problem.last_trim(goal) for goal in problem.goals]
+            moving = next((one.name for one in ends if not one.is_rest), None)
+            if moving is not None and not leaves:
+                raise ValueError(
+                    f"fleet: vehicle {name!r} is to stay at its goal, where its trim {moving!r} "
+                    "moves; need a goal at rest, or leaves: true"
+                )
+            if not begin.is_rest and problem.start_time > first:
+                raise ValueError(
+                    f"fleet: vehicle {name!r} starts at {problem.start_time:g} s in the trim "
+                    f"{begin.name!r}, which moves, and would have to stand there from {first:g} s "
+                    "on; need a start at rest, or no vehicle that starts before it"
                 )
 
     def __len__(self) -> int:

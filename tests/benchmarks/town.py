@@ -31,6 +31,8 @@ SPEED = 8.0  # [m/s]
 BODY = ma.Box([4.0, 1.8], [1.2, 0.0])
 STEP = 0.5  # [s]
 EARLY = 5.0  # [s] before a car is at its goal, it gets the next one
+STANDING = 0.01  # [m] in a step
+PATIENCE = 30  # steps that a car stands before it takes another turn
 LOOKS = 200  # of a step, at pairs that come near
 NEAR = 3.0  # [m]
 WAYS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # east, north, west, south
@@ -126,7 +128,7 @@ class Traffic:
         self.poses = {
             name: problem.start for name, problem in zip(self.fleet.names, problems, strict=True)
         }
-        self.served = 0
+        self.served, self.stood = 0, dict.fromkeys(self.poses, 0)
 
     def advance(self) -> FleetStep:
         """A step: goals that are near are moved on, then all drive."""
@@ -134,6 +136,14 @@ class Traffic:
         self.before = self.poses
         self.poses = {name: plan.pose_at(now.time + STEP) for name, plan in now.plans.items()}
         for k, name in enumerate(self.fleet.names):
+            stands = np.hypot(*(self.poses[name] - self.before[name])[:2]) < STANDING
+            self.stood[name] = self.stood[name] + 1 if stands else 0
+            if self.stood[name] >= PATIENCE:
+                self.to[k], self.stood[name] = self.town.after(self.legs[k], self.rng), 0
+                self.loop.assign(
+                    name, self.town.problem(self.legs[k], self.to[k], self.poses[name])
+                )
+                continue
             if now.arrivals[name] <= now.time + EARLY:
                 leg, self.served = self.to[k], self.served + 1
                 self.legs[k], self.to[k] = leg, self.town.after(leg, self.rng)
@@ -214,7 +224,7 @@ def main() -> None:
         f"{n} cars, {traffic.town.size} x {traffic.town.size} blocks, made in "
         f"{time.process_time() - begun:.1f} s"
     )
-    times, least, flags, still, moved, lost = [], math.inf, [], 0, 0.0, 0
+    times, still, least, flags, moved, lost = [], [], math.inf, [], 0.0, 0
     every = max(1, round(15.0 / STEP))
     for number in range(round(60.0 * arguments.minutes / STEP)):
         begun = time.process_time()
@@ -228,14 +238,14 @@ def main() -> None:
             for name in traffic.poses
         ]
         moved += sum(steps)
-        still += sum(one < 0.01 for one in steps)
+        still.append(sum(one < STANDING for one in steps) / n)
         if (number + 1) % every == 0:
             agreement = traffic.loop.state.agreement
             print(
                 f"{now.time + STEP:6.1f} s: a step median {np.median(times):.3f} s, p99 "
                 f"{np.percentile(times, 99):.3f} s; least {least:.3f} m, lost plans {lost}, "
                 f"{len(flags)} flags; {moved / 1e3:.1f} km, standing "
-                f"{100 * still / (n * len(times)):.0f} %; legs {traffic.served}; "
+                f"{100 * np.mean(still[-every:]):.0f} %; legs {traffic.served}; "
                 f"messages {agreement.sent / len(times) / n:.2f} a car and step",
                 flush=True,
             )

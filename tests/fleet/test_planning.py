@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,8 +20,9 @@ from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.fleet.worker_pool import WorkerPool
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.problem import Bounds, Horizon, Problem
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from tests.fleet import fleets
+from tests.inertia import unicycle_automaton
 
 
 def test_cars_whose_ways_cross_let_each_other_pass():
@@ -146,11 +148,24 @@ def test_bad_fleets_are_refused(change, message):
 
 
 def test_times_of_vehicles_are_free():
-    from dataclasses import replace
-
     fixed = replace(fleets.crossing().problems[0], horizon=Horizon(time=20.0))
     with pytest.raises(ValueError, match="vehicle '1' has a fixed time"):
         FleetProblem([fixed])
+
+
+def test_who_cannot_switch_at_will_stands_only_at_rest():
+    """A robot with inertia neither stays where it arrives in motion, nor waits in motion."""
+    robot = unicycle_automaton()
+    on = next(trim.name for trim in robot.trims if trim.reduced_state.tolist() == [1.0, 0.0])
+    still = Problem(robot, [0, 4, 0], [9, 4, 0])
+    passing = replace(still, goals=Goal(pose=[9, 4, 0], trim=on))
+    with pytest.raises(ValueError, match=f"'2' is to stay at its goal, where its trim '{on}'"):
+        FleetProblem([still, passing])
+    assert len(FleetProblem([still, passing], leaves=(False, True))) == 2
+    moving = replace(still, start_trim=on)
+    assert len(FleetProblem([still, moving])) == 2
+    with pytest.raises(ValueError, match=f"'2' starts at 2 s in the trim '{on}', which moves"):
+        FleetProblem([still, replace(moving, start_time=2.0)])
 
 
 def test_bounds_hold_for_every_vehicle():

@@ -147,6 +147,22 @@ def test_who_cannot_stop_in_time_is_flagged():
     }
 
 
+def test_who_begins_in_motion_does_not_stand_at_once():
+    """A robot with inertia, under way at its start: rest is no plan of it, which is said."""
+    robot = unicycle_automaton()
+    on = next(trim.name for trim in robot.trims if trim.reduced_state.tolist() == [1.0, 0.0])
+    goal = Goal(pose=[4, 0, 0], tolerance_m=0.1, tolerance_rad=0.2)
+    begun = Problem(robot, [-4, 0, 0], goal, footprint=Disc(0.3), start_trim=on)
+    fleet = FleetProblem([begun, problem_of([0, 3, 0], [3, 3, 0], tolerance=0.1)], names="ab")
+    log = loop_of(fleet, first=plan_fleet(fleet, time_limit=5.0), steps=30)
+    assert log.reached and [*log.violations] == []
+    assert verify_driven(log).passed
+    without = loop_of(fleet, steps=2)
+    said = [one for _, one in without.violations if one.guarantee is FleetGuarantee.HELD]
+    assert "it cannot stay where it begins" in str(said[0])
+    assert "a" in without.steps[0].refused
+
+
 def test_joining_and_leaving():
     fleet = crossing(tolerance=0.1, leaves=(True, False))
     log = loop_of(fleet, joins_s={"b": 2.0})
