@@ -82,9 +82,10 @@ def least_clearance(
             element, share = np.array([found.element]), np.array([found.share])
             time = float(body.frames.times_at(element, share)[0])
             least = Least(found.distance, found.measured, time)
-    for nearest, pairs in moving_pairs(body, around, places):
+    for nearest, some in moving_pairs(body, around, places, least.measured):
         if not nearest < least.measured:
             break
+        pairs = some()
         known = bounds_of(body, around, pairs)
         least = _sharpened(body, around, pairs, known, least, enough, ask)
     return least._replace(distance=max(least.distance, 0.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -22,7 +23,6 @@ from maneuver_automaton.audit.passages import (
     places_of,
 )
 from maneuver_automaton.audit.surroundings import Surroundings
-from maneuver_automaton.collision.motion import Motion
 
 T = TypeVar("T")
 
@@ -262,51 +262,82 @@ def _off_chords(body: Body, places: Places) -> Array:
     return places.off + places.off_by_reach * body.outline.most_reach
 
 
-def moving_pairs(body: Body, around: Surroundings, places: Places) -> Iterator[tuple[float, Pairs]]:
+def moving_pairs(
+    body: Body, around: Surroundings, places: Places, known: float
+) -> Iterator[tuple[float, Callable[[], Pairs]]]:
     """The stretches, each with all moving edges: a few that are near, then ever more.
 
-    With each a distance [m] that neither they nor what follows comes closer than.
+    With each a distance [m] that neither they nor what follows comes closer than. What is never as
+    near as a distance that is `known` [m], or as another one is, is left out.
     """
-    if not around.motions:
+    near = _near_motions(body, around, places, known)
+    if not near.size:
         return
-    spans, clock = _cut_where_motions_change(body, around, places.spans)
+    spans, clock = _cut_where_motions_change(body, around, near, places.spans)
     places = places_of(body, spans)
-    every = frames_at(around, clock.ravel()).reshape(len(around.motions), 2, -1, 3)
+    every = around.knots.at(near[:, None], clock.ravel()).reshape(near.size, 2, -1, 3)
     middles = places.place + places.turn * body.outline.middle
     away = middles - points_of(every)
     apart = np.sqrt(point_apart(np.zeros(1), away[:, 0], away[:, 1]))
-    reach = body.outline.size + around.reaches[:, None]
+    reach = body.outline.size + around.reaches[near, None]
     bound = apart - reach - _off_chords(body, places)
-    bound -= 0.125 * places.lasts**2 * around.bends[:, None]
+    bound -= 0.125 * places.lasts**2 * around.bends[near, None]
     bound = np.maximum(bound, 0.0)
-    middle = 0.5 * (clock[0] + clock[1])
-    bound[(middle < around.present[:, :1]) | (middle > around.present[:, 1:])] = np.inf
+    middle, present = 0.5 * (clock[0] + clock[1]), around.present[near]
+    bound[(middle < present[:, :1]) | (middle > present[:, 1:])] = np.inf
     order = np.argsort(bound, axis=None, kind="stable")
     order = order[np.isfinite(bound.flat[order])]
     for chosen in np.split(order, NEAREST * 16 ** np.arange(8)):
         if chosen.size:
-            yield float(bound.flat[chosen[0]]), _expanded(around, places, every, chosen)
+            pairs = partial(_expanded, around, places, near, every, chosen)
+            yield float(bound.flat[chosen[0]]), pairs
 
 
-def _expanded(around: Surroundings, places: Places, frames: Array, chosen: IntArray) -> Pairs:
+def _near_motions(body: Body, around: Surroundings, places: Places, known: float) -> IntArray:
+    """Motions, by number, that may come nearer than a distance known [m], and than others do."""
+    if not around.motions:
+        return np.zeros(0, dtype=np.int64)
+    spans = places.spans
+    ends = body.clock + np.stack(
+        [body.frames.times_at(spans.element, share) for share in (spans.begin, spans.end)]
+    )
+    frames = frames_at(around, ends.ravel()).reshape(-1, 2, ends.shape[1], 3)
+    middles = places.place + places.turn * body.outline.middle
+    apart = np.abs(middles - points_of(frames))
+    sizes = body.outline.size + around.reaches[:, None]
+    first, last = around.present[:, :, None].swapaxes(0, 1)
+    if not body.in_space:  # what flies may be far above
+        there = (first[:, None] <= ends) & (ends <= last[:, None])
+        known = min(known, float((apart + sizes[:, None])[there].min(initial=np.inf)))
+    # The middles come nearer until the half of a stretch at most.
+    element = spans.element
+    own = body.frames.speed[element] + abs(body.outline.middle) * body.frames.turn[element]
+    closer = 0.5 * places.lasts * (own + around.fastest[:, None])
+    least = apart.min(axis=1) - closer - sizes - SPARE
+    least[(ends[1] < first) | (ends[0] > last)] = np.inf
+    return np.flatnonzero(least.min(axis=1) <= known)
+
+
+def _expanded(
+    around: Surroundings, places: Places, near: IntArray, frames: Array, chosen: IntArray
+) -> Pairs:
     """Pairs of all edges of some pairs (k,) of motions and stretches, numbered in that order."""
     number, span = np.divmod(chosen, places.lasts.size)
-    firsts = around.firsts
-    count = np.diff(firsts)[number]
+    first = around.firsts[near[number]]
+    count = around.firsts[near[number] + 1] - first
     rows = np.repeat(np.arange(chosen.size), count)
-    place = np.arange(rows.size) - (np.cumsum(count) - count)[rows] + firsts[number][rows]
-    number, span = number[rows], span[rows]
-    return Pairs(places, span, around.moving[place], frames[number, :, span])
+    place = np.arange(rows.size) - (np.cumsum(count) - count - first)[rows]
+    return Pairs(places, span[rows], around.moving[place], frames[number, :, span][rows])
 
 
 def _cut_where_motions_change(
-    body: Body, around: Surroundings, spans: Spans
+    body: Body, around: Surroundings, near: IntArray, spans: Spans
 ) -> tuple[Spans, Array]:
-    """Stretches within which every obstacle runs evenly, and their ends (2, m) on the clock [s]."""
+    """Stretches within which some motions run evenly, and their ends (2, m) on the clock [s]."""
     begin = body.frames.times_at(spans.element, spans.begin)
     end = body.frames.times_at(spans.element, spans.end)
-    comes_or_goes = around.present[np.isfinite(around.present)]
-    changes = [*(motion.time for motion in around.motions), comes_or_goes]
+    present = around.present[near]
+    changes = [*(around.motions[k].time for k in near.tolist()), present[np.isfinite(present)]]
     knots = np.unique(np.concatenate(changes)) - body.clock
     inside = knots[(knots > begin[0]) & (knots < end[-1])]
     times = np.unique(np.concatenate([begin, end, inside]))
@@ -323,41 +354,15 @@ def _cut_where_motions_change(
 
 
 def frames_at(around: Surroundings, times: Array) -> Array:
-    """Poses (motions, m, 3) of moving bodies: linear or on arcs between its times, else still."""
-    knots = around.knots
-    if knots is None:
-        return np.stack([_frames_of(motion, times) for motion in around.motions])
-    k = knots.before(times)
-    since = np.maximum(times - knots.time[k], 0.0)
-    return _coasted(knots.pose[k], knots.twist[k], since)
+    """Poses (motions, m, 3) of all that moves at times (m,)."""
+    return around.knots.at(np.arange(len(around.motions))[:, None], times)
 
 
 def on_arcs(frames: Array, body: Body, around: Surroundings, pairs: Pairs) -> None:
     """Put frames (m, 2, 3) of pairs where they are, for motions that do not run evenly."""
-    motion, spans = around.motion_of_edge[pairs.edge], pairs.places.spans.of(pairs.span)
-    for number, one in enumerate(around.motions):
-        rows = np.flatnonzero(motion == number)
-        if one.twist is None or not rows.size:
-            continue
-        for k, share in enumerate((spans.begin, spans.end)):
-            now = body.clock + body.frames.times_at(spans.element[rows], share[rows])
-            frames[rows, k] = _frames_of(one, now)
-
-
-def _frames_of(motion: Motion, times: Array) -> Array:
-    """Poses (m, 3) of one frame at times (m,)."""
-    if motion.twist is None or motion.time.size == 1:
-        columns = [np.interp(times, motion.time, column) for column in motion.pose.T]
-        return np.stack(columns, axis=1)
-    inside = np.clip(times, motion.time[0], motion.time[-1])
-    k = np.minimum(np.searchsorted(motion.time, inside, side="right"), motion.time.size - 1) - 1
-    return _coasted(motion.pose[k], motion.twist[k], inside - motion.time[k])
-
-
-def _coasted(poses: Array, twists: Array, since: Array) -> Array:
-    """Poses (..., 3) after coasting with twists (..., 3) for some time (...,) [s]."""
-    # A chord of an arc leads in the direction that the frame has half way.
-    half = 0.5 * twists[..., 2] * since
-    chord = since * np.sinc(half / np.pi) * directions(poses[..., 2] + half)
-    place = points_of(poses) + points_of(twists) * chord
-    return np.stack([place.real, place.imag, poses[..., 2] + 2.0 * half], axis=-1)
+    motion = around.motion_of_edge[pairs.edge]
+    rows = np.flatnonzero(around.knots.arcs[motion])
+    spans = pairs.places.spans.of(pairs.span[rows])
+    for k, share in enumerate((spans.begin, spans.end)):
+        now = body.clock + body.frames.times_at(spans.element, share)
+        frames[rows, k] = around.knots.at(motion[rows], now)

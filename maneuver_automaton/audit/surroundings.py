@@ -5,40 +5,20 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.outlines import Outline, joined, map_outline, outline_of
-from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.motion import Knots, Motion
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     OccupancyMap,
 )
 
 GRID = 65536.0  # [m] between the places from where obstacles are counted
-
-
-class Knots(NamedTuple):
-    """Motions that coast on arcs, one after another."""
-
-    time: Array  # (k,) [s]
-    pose: Array  # (k, 3)
-    twist: Array  # (k, 3) after each knot; none after the last of a motion
-    first: IntArray  # (motions + 1,) where those of each begin
-
-    def before(self, times: Array) -> IntArray:
-        """The last knot (motions, m) of each motion at or before times (m,), or its first."""
-        # One search for all: the times of each motion come after those of the motion before it.
-        low = float(self.time.min())
-        width = max(float(self.time.max()), float(times.max())) - min(low, float(times.min())) + 1.0
-        number = np.arange(len(self.first) - 1)
-        keys = self.time - low + width * np.repeat(number, np.diff(self.first))
-        asked = times - low + width * number[:, None]
-        found = np.searchsorted(keys, asked, side="right") - 1
-        return np.clip(found, self.first[:-1, None], self.first[1:, None] - 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -58,9 +38,10 @@ class Surroundings:
     heights: Array  # (n, 2) [m] from where to where they stand
     motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it is static
     motions: tuple[Motion, ...]
-    knots: Knots | None  # of all motions side by side, where all coast on arcs or stand
+    knots: Knots  # of all motions, side by side
     present: Array  # (motions, 2) [s] from when until when a moving obstacle is there
-    speeds: Array  # (motions,) [m/s] of the frame at most, where it coasts on arcs; else 0
+    fastest: Array  # (motions,) [m/s] of the frame at most
+    speeds: Array  # (motions,) the same where it coasts on arcs; else 0
     bends: Array  # (motions,) [m/s^2] how fast its velocity changes then; else 0
     still: IntArray  # (k,) numbers of the static edges
     moving: IntArray  # those of the others, motion by motion
@@ -136,6 +117,8 @@ def surroundings_around(
     heights_of = np.repeat(np.array(heights).reshape(-1, 2), counts, axis=0)
     moving = np.flatnonzero(index >= 0)
     firsts = np.searchsorted(index[moving], np.arange(len(motions) + 1))
+    knots = Knots.of(motions)
+    fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == number) for number in range(len(motions)))
     return Surroundings(
         outline=whole,
@@ -143,9 +126,10 @@ def surroundings_around(
         heights=heights_of,
         motion_of_edge=index,
         motions=tuple(motions),
-        knots=_knots_of(motions),
+        knots=knots,
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
-        speeds=np.array([_fastest(one) for one in motions]),
+        fastest=fastest,
+        speeds=np.where(knots.arcs, fastest, 0.0),
         bends=np.array([float(one.bends.max(initial=0.0)) for one in motions]),
         still=still,
         moving=moving,
@@ -156,25 +140,6 @@ def surroundings_around(
         rounds=bool(whole.radius.any()),
         right=float((whole.begins.real + whole.radius).max(initial=0.0)),
     )
-
-
-def _knots_of(motions: list[Motion]) -> Knots | None:
-    """The knots of motions side by side; None if one runs from pose to pose."""
-    if not motions or any(one.twist is None and one.time.size > 1 for one in motions):
-        return None
-    sizes = [one.time.size for one in motions]
-    twists = [np.vstack([one.rates, np.zeros(3)]) for one in motions]
-    return Knots(
-        time=np.concatenate([one.time for one in motions]),
-        pose=np.concatenate([one.pose for one in motions]),
-        twist=np.concatenate(twists),
-        first=np.cumsum([0, *sizes]),
-    )
-
-
-def _fastest(motion: Motion) -> float:
-    """How fast [m/s] the frame of what coasts on arcs is at most; 0 for one that runs evenly."""
-    return 0.0 if motion.twist is None else float(motion.speeds.max(initial=0.0))
 
 
 def _reach(outline: Outline) -> float:

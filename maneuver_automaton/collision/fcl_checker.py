@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.approach import least_over_poses, travel
@@ -32,7 +32,14 @@ from maneuver_automaton.collision.solids import (
     obstacle_region,
     obstacle_skin,
 )
-from maneuver_automaton.collision.spacetime import CoastingBody, MovingBody, Place, may_meet, meet
+from maneuver_automaton.collision.spacetime import (
+    CoastingBody,
+    MovingBodies,
+    MovingBody,
+    Place,
+    may_meet,
+    meet,
+)
 from maneuver_automaton.collision.swept import (
     STANDING,
     GrownBody,
@@ -52,6 +59,8 @@ from maneuver_automaton.collision.swept import (
 from maneuver_automaton.groups import SE2
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
+PIECE_S = 0.5  # [s] of a coast, that are looked at alone for what moves ...
+MOST_PIECES = 256  # ... unless it has more of them
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
 
@@ -376,36 +385,52 @@ class FclChecker:
         ask: Callable[[], None],
     ) -> tuple[int, int] | None:
         """The first of some coasts, begun at times on a clock, that meets a moving obstacle."""
-        body = self._body
+        body, others = self._body, self._ground.moving
         (x, y), (half_x, half_y) = body.middle.tolist(), body.half.tolist()
-        halves = 0.5 * durations
-        centers = (SE2(starts) @ SE2.exp(halves[:, None] * twists)).act(body.middle)
+        # A coast is followed only where it may meet something, and only for as long.
+        counts = np.clip(np.ceil(durations / PIECE_S), 1.0, MOST_PIECES).astype(np.int64)
+        of = np.repeat(np.arange(counts.size), counts)
+        lasting = (durations / counts)[of]
+        begins = lasting * (np.arange(of.size) - (np.cumsum(counts) - counts)[of])
+        middles = begins + 0.5 * lasting
         speeds = np.hypot(twists[:, 0] - twists[:, 2] * y, twists[:, 1] + twists[:, 2] * x)
         near = may_meet(
-            [one.path for one in self._ground.moving],
-            centers,
-            times=clock + halves,
-            halves=halves,
-            speeds=speeds,
-            reach=body.reach,
+            self._ground.paths,
+            (SE2(starts[of]) @ SE2.exp(middles[:, None] * twists[of])).act(body.middle),
+            times=clock[of] + middles,
+            halves=0.5 * lasting,
+            speeds=speeds[of],
+            reach=body.reach + self.proven,
         )
-        for k in np.flatnonzero(np.any(near, axis=0)).tolist():
+        firsts = np.cumsum(counts) - counts
+        for k in np.unique(of[np.any(near, axis=0)]).tolist():
             ask()
             (v_x, v_y, turn), (at_x, at_y, heading) = twists[k].tolist(), starts[k].tolist()
             start, twist = (at_x, at_y, heading), (v_x, v_y, turn)
             coasting = CoastingBody(start, twist, complex(x, y), body.reach, (half_x, half_y))
-            for number in np.flatnonzero(near[:, k]).tolist():
-                one = self._ground.moving[number]
-                if meet(
-                    coasting,
-                    one.path,
-                    duration=float(durations[k]),
-                    clock=float(clock[k]),
-                    distance=functools.partial(_distance, _standing(body), one.object),
-                    contact=0.5 * self.proven,
-                ):
-                    return k, one.owner
+            pieces = slice(firsts[k], firsts[k] + counts[k])
+            for number in np.flatnonzero(near[:, pieces].any(axis=1)).tolist():
+                for first, last in _runs(near[number, pieces]):
+                    until = float(begins[pieces][last] if last < counts[k] else durations[k])
+                    if meet(
+                        coasting,
+                        others[number].path,
+                        since=float(begins[pieces][first]),
+                        duration=until,
+                        clock=float(clock[k]),
+                        distance=functools.partial(
+                            _distance, _standing(body), others[number].object
+                        ),
+                        contact=0.5 * self.proven,
+                    ):
+                        return k, others[number].owner
         return None
+
+
+def _runs(near: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Where runs of truths (n,) begin and end."""
+    ends = np.flatnonzero(np.diff(near.astype(np.int8), prepend=0, append=0))
+    return [(first, last) for first, last in ends.reshape(-1, 2).tolist()]
 
 
 class Course(NamedTuple):
@@ -431,6 +456,7 @@ class _Ground(NamedTuple):
     static: Any  # one object for all static obstacles, None without
     owners: IntArray  # which obstacle each of its triangles belongs to
     moving: tuple[_Moving, ...]
+    paths: MovingBodies  # of what moves
 
 
 class _Sliced(NamedTuple):
@@ -472,10 +498,11 @@ def _ground_of(
         elif len(region.cover):
             regions.append(region)
             owners.append(index)
+    paths = MovingBodies.of([one.path for one in moving])
     if not regions:
-        return _Ground(None, np.zeros(0, dtype=np.int64), tuple(moving))
+        return _Ground(None, np.zeros(0, dtype=np.int64), tuple(moving), paths)
     skin, which = obstacle_skin(regions)
-    return _Ground(_object(skin), np.array(owners)[which], tuple(moving))
+    return _Ground(_object(skin), np.array(owners)[which], tuple(moving), paths)
 
 
 @functools.lru_cache(maxsize=32)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, freeze, wrapped
+from maneuver_automaton._arrays import Array, IntArray, freeze, wrapped
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import FASTEST, FASTEST_TURN, check_size
 from maneuver_automaton.groups import SE2, LieGroup
@@ -214,6 +216,61 @@ class Motion:
         return Motion(self.time, (planar(by) @ SE2(self.pose)).pose, self.twist)
 
 
+class Knots(NamedTuple):
+    """Several motions side by side, so that all are asked at once.
+
+    Examples
+    --------
+    >>> ahead = Motion([0.0, 2.0], [[0, 0, 0], [4, 0, 0]])
+    >>> left = Motion([0.0, 2.0], [[0, 0, 0], [0, 2, np.pi]], [[np.pi / 2, 0, np.pi / 2]])
+    >>> both = Knots.of([ahead, left])
+    >>> both.at(np.array([[0], [1]]), np.array([1.0, 9.0])).round(6).tolist()
+    [[[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]], [[1.0, 1.0, 1.570796], [0.0, 2.0, 3.141593]]]
+    """
+
+    time: Array  # (k,) [s]
+    pose: Array  # (k, 3)
+    rate: Array  # (k, 3) after each knot, of the pose or as a twist; none after a motion's last
+    first: IntArray  # (motions + 1,) where those of each begin
+    arcs: NDArray[np.bool_]  # (motions,) whether the rates are twists
+
+    @classmethod
+    def of(cls, motions: Sequence[Motion]) -> Knots:
+        """Those of some motions."""
+        none = np.zeros((0, 3))
+        return cls(
+            time=np.concatenate([none[:, 0], *(one.time for one in motions)]),
+            pose=np.concatenate([none, *(one.pose for one in motions)]),
+            rate=np.concatenate([none, *(part for one in motions for part in (one.rates, REST))]),
+            first=np.cumsum([0, *(one.time.size for one in motions)]),
+            arcs=np.array([one.twist is not None for one in motions], dtype=np.bool_),
+        )
+
+    def at(self, motions: IntArray, times: Array) -> Array:
+        """Poses (..., 3) of motions, by number, at times [s]; the shapes of both broadcast."""
+        k = self._before(motions, times)
+        since = np.maximum(times - self.time[k], 0.0)
+        x, y, heading = np.moveaxis(self.pose[k], -1, 0)
+        v_x, v_y, turn = np.moveaxis(self.rate[k], -1, 0)
+        # A chord of an arc leads in the direction that the frame has half way.
+        half = np.where(self.arcs[motions], 0.5 * turn * since, 0.0)
+        along = np.where(self.arcs[motions], heading + half, 0.0)
+        chord = since * np.sinc(half / np.pi)
+        c, s = chord * np.cos(along), chord * np.sin(along)
+        place = x + (v_x * c - v_y * s), y + (v_x * s + v_y * c)
+        return np.stack([*place, heading + turn * since], axis=-1)
+
+    def _before(self, motions: IntArray, times: Array) -> IntArray:
+        """The last knot at or before a time, or the first one of a motion."""
+        # One search for all: the times of each motion come after those of the motion before it.
+        low = min(float(self.time.min()), float(times.min(initial=math.inf)))
+        width = max(float(self.time.max()), float(times.max(initial=low))) - low + 1.0
+        keys = self.time - low + width * np.repeat(np.arange(self.arcs.size), np.diff(self.first))
+        found = np.searchsorted(keys, times - low + width * motions, side="right") - 1
+        return np.clip(found, self.first[motions], self.first[1:][motions] - 1)
+
+
+REST = np.zeros((1, 3))
 STANDS = Motion([0.0], [[0.0, 0.0, 0.0]])
 
 

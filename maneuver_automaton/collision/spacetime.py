@@ -24,10 +24,9 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.motion import Knots, Motion
 from maneuver_automaton.collision.swept import Twist
-from maneuver_automaton.groups import SE2
 
 SHORT_TURN = 0.5  # [rad] of the pieces of arcs whose bulge is bounded
 EVERYWHERE = np.array([-math.inf, -math.inf, math.inf, math.inf])
@@ -99,18 +98,9 @@ class MovingBody(NamedTuple):
             motion, present, reach, speed, turn_rate, middle, size, half, _box(motion, reach)
         )
 
-    @property
-    def fastest_middle(self) -> float:
-        """Greatest speed of the middle of the disc [m/s]."""
-        return self.speed + self.turn_rate * abs(self.middle)
-
     def center(self, pose: Place) -> complex:
         """Where the middle is at a pose."""
         return complex(pose[0], pose[1]) + _direction(pose) * self.middle
-
-    def centers(self, times: Array) -> Array:
-        """Where the middle is (n, 2) at times (n,)."""
-        return SE2(self.motion.at(times)).act(np.array([self.middle.real, self.middle.imag]))
 
     def stretch(self, time: float) -> Stretch:
         """Where the frame is at a `time` [s], and how it goes on from there."""
@@ -153,8 +143,37 @@ class Stretch(NamedTuple):
     bend: float  # [m/s^2] how fast the velocity changes
 
 
+class MovingBodies(NamedTuple):
+    """Several bodies that follow motions, side by side."""
+
+    knots: Knots
+    present: Array  # (m, 2) [s]
+    middle: NDArray[np.complex128]  # (m,) of a disc around each, in its frame [m]
+    radius: Array  # (m,) of that disc [m]
+    speed: Array  # (m,) [m/s] its middle is never faster
+    box: Array  # (m, 4) that each never leaves [m]
+
+    @classmethod
+    def of(cls, bodies: Sequence[MovingBody]) -> MovingBodies:
+        """Those bodies."""
+        return cls(
+            knots=Knots.of([one.motion for one in bodies]),
+            present=np.array([one.present for one in bodies]).reshape(-1, 2),
+            middle=np.array([one.middle for one in bodies], dtype=np.complex128),
+            radius=np.array([one.radius for one in bodies]),
+            speed=np.array([one.speed + one.turn_rate * abs(one.middle) for one in bodies]),
+            box=np.array([one.box for one in bodies]).reshape(-1, 4),
+        )
+
+    def centers(self, rows: IntArray, times: Array) -> NDArray[np.complex128]:
+        """Where the middles of some (r,) are at times (n,): x + i y (r, n) [m]."""
+        poses = self.knots.at(rows[:, None], times)
+        turned = np.exp(1j * poses[..., 2]) * self.middle[rows, None]
+        return np.asarray(poses[..., 0] + 1j * poses[..., 1] + turned)
+
+
 def may_meet(
-    others: Sequence[MovingBody],
+    others: MovingBodies,
     centers: Array,
     *,
     times: Array,
@@ -162,24 +181,25 @@ def may_meet(
     speeds: Array,
     reach: float,
 ) -> NDArray[np.bool_]:
-    """False (m, n) where bodies are too far and too slow to meet others (m,).
+    """False (m, n) where bodies are too far and too slow to meet others (m,), or these not there.
 
     Each lasts from `halves` (n,) [s] before one of `times` (n,) to as long after it; then its
     middle is at one of `centers` (n, 2), and never faster than one of `speeds` (n,) [m/s]. No point
     of it is further than `reach` [m] from its middle.
     """
-    if not others or not len(times):
-        return np.zeros((len(others), len(times)), dtype=np.bool_)
+    found = np.zeros((others.radius.size, times.size), dtype=np.bool_)
+    if not found.size:
+        return found
     low, high = centers.min(axis=0), centers.max(axis=0)
-    most = reach + float((halves * speeds).max(initial=0.0))
-    found = np.zeros((len(others), len(times)), dtype=np.bool_)
-    for row, other in enumerate(others):
-        # What never comes near the place where all of it happens is not followed.
-        gap = np.maximum(other.box[:2] - high, low - other.box[2:]).max()
-        if gap > most:
-            continue
-        apart = np.hypot(*(centers - other.centers(times)).T) - reach - other.radius
-        found[row] = apart <= halves * (speeds + other.fastest_middle)
+    most = reach + float((halves * speeds).max())
+    # What never comes near the place where all of it happens is not followed.
+    gaps = np.maximum(others.box[:, :2] - high, low - others.box[:, 2:]).max(axis=1)
+    rows = np.flatnonzero(gaps <= most)
+    own = centers[:, 0] + 1j * centers[:, 1]
+    apart = np.abs(own - others.centers(rows, times)) - reach - others.radius[rows, None]
+    near = apart <= halves * (speeds + others.speed[rows, None])
+    first, last = others.present[rows, :, None].swapaxes(0, 1)
+    found[rows] = near & (times + halves >= first) & (times - halves <= last)
     return found
 
 
@@ -238,11 +258,12 @@ def meet(
     other: MovingBody,
     *,
     duration: float,
+    since: float = 0.0,
     clock: float = 0.0,
     distance: Callable[[Place, Place], float],
     contact: float,
 ) -> bool:
-    """Whether two bodies come within `contact` > 0 [m] of each other until `duration` [s].
+    """Whether two bodies come within `contact` > 0 [m] of each other, `since` until `duration` [s].
 
     The body begins when the other's clock says `clock` [s]; while the other is not there they do
     not meet. True only if they do; False only if they never touch. `distance` is that of the bodies
@@ -266,7 +287,7 @@ def meet(
     turning = abs(body.twist[2]) * body.reach
     bend = abs(body.velocity) * abs(body.twist[2])
     fastest = abs(body.velocity) + other.speed + turning + other.turn_rate * other.reach
-    time, duration = max(other.present[0] - clock, 0.0), min(duration, other.present[1] - clock)
+    time, duration = max(other.present[0] - clock, since), min(duration, other.present[1] - clock)
     if time > duration:
         return False
     while True:

@@ -23,9 +23,10 @@ class FleetProblem:
 
     Every vehicle stands at its start until it leaves, at its problem's `start_time` or later, and
     stays at its goal once it is there, unless it `leaves`. One that cannot switch at will therefore
-    ends at rest, or leaves, and if it is under way at its start, nobody starts before it. Obstacles and bounds of a problem are
-    those of its vehicle alone; times are of one clock. What flies passes above or below another one
-    by the `body_height` of both; one in the plane that states none counts at all heights.
+    ends at rest, or leaves, and if it is under way at its start, nobody starts before it. Obstacles
+    and bounds of a problem are those of its vehicle alone; times are of one clock. What flies
+    passes above or below another one by the `body_height` of both; one in the plane that states
+    none counts at all heights.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision import Motion
 from maneuver_automaton.collision.spacetime import (
     CoastingBody,
+    MovingBodies,
     MovingBody,
     apart_at_least,
     may_meet,
@@ -39,7 +40,7 @@ def clearance(here, there):
 def possible(rover, other, duration):
     """Whether a rover may meet another within a time."""
     ((near,),) = may_meet(
-        [other],
+        MovingBodies.of([other]),
         np.array([rover.center(rover.at(0.5 * duration))]).view(np.float64).reshape(1, 2),
         times=np.array([0.5 * duration]),
         halves=np.array([0.5 * duration]),
@@ -144,10 +145,8 @@ def test_a_disc_beside_its_frame_is_met_where_a_frame_of_its_own_would_be(start,
     rover = CoastingBody(start, (1.0, 0.0, 0.3), 0j, 0.3)
     other = MovingBody.of(far, 6.3, middle=5.0 + 0j, radius=1.3)
     dense = np.linspace(0.0, duration, 200)
-    centers = other.centers(dense)
-    apart = np.array(
-        [abs(rover.center(rover.at(t)) - complex(*c)) for t, c in zip(dense, centers, strict=True)]
-    )
+    (centers,) = MovingBodies.of([other]).centers(np.array([0]), dense)
+    apart = np.abs([rover.center(rover.at(time)) for time in dense] - centers)
     found = meet(
         rover,
         other,
