@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
@@ -15,7 +17,7 @@ from maneuver_automaton.models import UserModel
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
 from tests.audit.test_guarantee import ANY
-from tests.collision.scenes import FOOTPRINTS, random_pose, random_scene
+from tests.collision.scenes import FOOTPRINTS, random_pose, random_scene, random_traffic
 from tests.quickly import quick_are
 
 FLYER = UserModel(
@@ -56,6 +58,22 @@ def test_what_is_left_out_changes_nothing(seed, monkeypatch):
         assert other.measured == pytest.approx(every.measured, abs=1e-12)
         low = every.measured - max(1e-3, 0.011 * every.measured)
         assert low <= other.distance <= other.measured
+
+
+@pytest.mark.parametrize("seed", quick_are(range(10), range(100)))
+def test_among_many_movers_the_nearest_counts(seed):
+    """Those that never come as near as another one are left out: each by itself tells the same."""
+    rng = np.random.default_rng([23, seed])
+    body = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
+    plan, movers = random_plan(rng, 4), random_traffic(rng, 12)
+    one = closest_to(plan, ANY, movers, footprint=body)
+    own = [closest_to(plan, ANY, (mover,), footprint=body).measured for mover in movers]
+    if math.isinf(min(own)):
+        assert math.isinf(one.distance)
+        return
+    sharp = max(1e-3, 0.011 * min(own))
+    assert one.measured == pytest.approx(min(own), abs=sharp)
+    assert min(own) - 2.0 * sharp <= one.distance <= one.measured
 
 
 @pytest.mark.parametrize("seed", quick_are(range(8), range(60)))

@@ -93,6 +93,26 @@ def random_moving_obstacle(rng):
     return Obstacle(shapes[rng.integers(4)], motion=Motion(time, pose))
 
 
+def random_traffic(rng, n):
+    """Movers far and near, on lines and on arcs, some there for a while only."""
+    found = []
+    for one in (random_moving_obstacle(rng) for _ in range(n)):
+        motion, present = one.motion, None
+        if rng.random() < 0.5:
+            twists = rng.uniform(-2.0, 2.0, (motion.time.size - 1, 3))
+            poses = [motion.pose[0]]
+            for twist, lasting in zip(twists, np.diff(motion.time), strict=True):
+                there = (SE2(poses[-1]) @ SE2.exp(lasting * twist)).pose
+                poses.append(np.append(there[:2], poses[-1][2] + lasting * twist[2]))
+            motion = Motion(motion.time, poses, twists)
+        if rng.random() < 0.3:
+            begin = rng.uniform(-2.0, 6.0)
+            present = (begin, begin + rng.uniform(0.1, 5.0))
+        away = SE2([*rng.uniform(-15.0, 15.0, 2), 0.0])
+        found.append(Obstacle(one.shape, motion=motion.moved(away), present_s=present))
+    return tuple(found)
+
+
 def random_scene(rng, *, moving=0):
     static = tuple(Obstacle(random_shape(rng)) for _ in range(rng.integers(1, 4)))
     maps = (random_map(rng),) if rng.random() < 0.2 else ()

@@ -23,6 +23,7 @@ from tests.collision.scenes import (
     TWISTS,
     random_pose,
     random_scene,
+    random_traffic,
     slow_distance,
 )
 from tests.quickly import quick_are
@@ -122,6 +123,28 @@ def test_motions_among_moving_obstacles_against_shapely(name):
                 assert least <= PROVEN + slack
             counts[hit is None] += 1
     assert min(counts) >= 5
+
+
+@pytest.mark.parametrize("seed", quick_are(range(4), range(40)))
+def test_among_many_movers_those_that_are_far_do_not_count(seed):
+    """Long coasts, followed piece by piece: what is hit is what is hit by itself."""
+    rng = np.random.default_rng([24, seed])
+    footprint = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
+    movers, start, clock = random_traffic(rng, 12), random_pose(rng), rng.uniform(-3.0, 3.0)
+    twist, duration = TWISTS[rng.integers(len(TWISTS))], rng.uniform(3.0, 9.0)
+    coast = start, twist, duration
+    hit = FclChecker(footprint, movers).motion_hit(*coast, start_time=clock)
+    alone = [FclChecker(footprint, (one,)).motion_hit(*coast, start_time=clock) for one in movers]
+    assert hit == next((k for k, one in enumerate(alone) if one is not None), None)
+    for k, mover in enumerate(movers):
+        times, poses = poses_of(*coast, 120)
+        first, last = mover.presence
+        there = [
+            slow_distance(footprint, (mover,), pose, clock + time)
+            for pose, time in zip(poses, times, strict=True)
+            if first <= clock + time <= last
+        ]
+        assert alone[k] is not None or min(there, default=math.inf) > 0.0
 
 
 @settings(max_examples=25)
