@@ -430,3 +430,13 @@ def test_every_scenario_goes_to_yaml_and_back(path, tmp_path):
     assert run(["convert", str(path), str(tmp_path / "a.yaml")]) == 0
     assert run(["convert", str(tmp_path / "a.yaml"), str(tmp_path / "b.yaml")]) == 0
     assert (tmp_path / "a.yaml").read_text() == (tmp_path / "b.yaml").read_text()
+
+
+@pytest.mark.slow
+def test_a_fleet_is_planned_on_dask(folder):
+    pytest.importorskip("distributed")
+    assert run(["plan", "x.yaml", "--quiet", "--no-plot", "--out", "one"]) == 0
+    assert run(["plan", "x.yaml", "--quiet", "--no-plot", "--dask", "local", "--out", "two"]) == 0
+    one, two = (json.loads(Path(name, "plan.json").read_text()) for name in ("one", "two"))
+    assert two["status"] == "found"
+    assert two["vehicles"].keys() == one["vehicles"].keys()

@@ -125,7 +125,7 @@ def test_a_wrong_address_is_told(folder, monkeypatch, capsys, command):
     ("argv", "said"),
     [
         (["plan", "many/a.yaml", "--dask", "local"],
-         "--dask: many/a.yaml is one file, need a folder of them"),
+         "--dask: many/a.yaml is planned in one process, need a folder, or several vehicles"),
         (["mpc", "many", "--resume", "log.json"],
          "--resume: goes on with one loop, and a folder has many; need a file"),
     ],

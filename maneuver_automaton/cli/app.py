@@ -86,7 +86,7 @@ Jobs = Annotated[
 Dask = Annotated[
     str | None,
     typer.Option(
-        "--dask", metavar="ADDRESS", help="Dask scheduler for files of a folder or seeds, or local."
+        "--dask", metavar="ADDRESS", help="Dask scheduler for files, seeds or a fleet, or local."
     ),
 ]
 With = Annotated[
@@ -212,6 +212,7 @@ def plan(
         quiet=quiet,
         gap=gap,
         jobs=1 if file.is_dir() else jobs,
+        scheduler=None if file.is_dir() else dask,
         look=LookOptions(title=title, size=size, style=style),
     )
     parts = Parts(beside=with_file, case=case, model=model)
@@ -219,8 +220,6 @@ def plan(
         return plan_command.plan_folder(
             file, out, settings=settings, parts=parts, jobs=jobs, scheduler=dask
         )
-    if dask is not None:
-        raise InvalidScenario(f"--dask: {file} is one file, need a folder of them")
     return plan_command.plan_file(file, out, settings=settings, parts=parts)
 
 

@@ -137,6 +137,7 @@ class FleetTask:
             orders=said.orders,
             on_better=self.shown.better,
             jobs=self.settings.jobs,
+            scheduler=self.settings.scheduler,
         )
         return self._answered(result)
 

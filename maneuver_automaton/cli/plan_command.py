@@ -17,6 +17,7 @@ from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, probl
 from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, skip_documentation
 from maneuver_automaton.cli.plan_settings import Settings
 from maneuver_automaton.cli.progress import waiting
+from maneuver_automaton.errors import InvalidScenario
 
 PICTURES = (
     "plan.png", "plan_3d.png", "alternatives.png", "plan.gif", "plan.html", "progress.png",
@@ -25,7 +26,10 @@ PICTURES = (
 
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
+    check_address(settings.scheduler)
     if road_command.is_road(path):
+        if settings.scheduler is not None:
+            raise _needs_several(path)
         if road_fleets.states_several(path, parts):
             several = road_fleets.plan_file(path, out, settings=settings, parts=parts)
             if not several.found:
@@ -64,10 +68,18 @@ def _task(path: Path, parts: Parts, settings: Settings) -> Task:
 
     found = problem_of(path, parts)
     if isinstance(found, Scenario):
+        if settings.scheduler is not None:
+            raise _needs_several(path)
         return PlanTask.of(found, settings)
     from maneuver_automaton.cli.fleets import FleetTask
 
     return FleetTask(scenario=found, settings=settings, path=path, parts=parts)
+
+
+def _needs_several(path: Path) -> InvalidScenario:
+    return InvalidScenario(
+        f"--dask: {path} is planned in one process, need a folder, or several vehicles"
+    )
 
 
 def _told(path: Path, answer: Answer, out: Path, settings: Settings) -> int:

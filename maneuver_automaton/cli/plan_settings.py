@@ -21,6 +21,7 @@ class Settings:
     quiet: bool = False
     gap: float | None = None  # share of the cost, None: nothing is proven beside the search
     jobs: int = 1  # processes for one fleet
+    scheduler: str | None = None  # of Dask, for one fleet
     look: LookOptions = field(default_factory=LookOptions)
 
     def __post_init__(self) -> None:
