@@ -25,7 +25,7 @@ from maneuver_automaton.planning.blocked import (
     proven_free,
     why_goal_blocked,
 )
-from maneuver_automaton.planning.bounds import lattice_bound
+from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in
 from maneuver_automaton.planning.result import LowerBound, PlanResult
@@ -136,7 +136,7 @@ class Vehicle:
 
         And below which cost there is none, if that is wanted.
         """
-        blocked = blocked_ends(self.problem)
+        blocked = blocked_ends(self.aimed)
         if blocked is not None:
             self.why_none = blocked.reason
         elif self.at_will:
@@ -148,19 +148,21 @@ class Vehicle:
 
     def _plan_words(self, budget: Budget, *, bounded: bool) -> None:
         """The same for one whose plans are words of the lattice."""
-        query = self._query(self.problem)
+        query = self._query(self.aimed)
         first = first_plan(query, budget=replace(budget, expansions=LONGEST))
         self._count(first.expansions)
         if first.word is None:
             self.why_none = first.enclosed or "no path was found"
             return
         self._keep_ways(query, first.word, budget, AT_ONCE)
-        self.bound = lattice_bound(query) if bounded else None
+        if bounded:
+            exact = self.aimed is self.problem
+            self.bound = lattice_bound(query) if exact else formula_bound(self.problem)
 
     def look_for_better_ways(self, budget: Budget) -> None:
         """Better ways past static obstacles, and others beside them."""
         if self.ways and self.problem.obstacles:
-            self._keep_ways(self._query(self.problem), self.ways[0], budget, WITH_TIME)
+            self._keep_ways(self._query(self.aimed), self.ways[0], budget, WITH_TIME)
         elif not self.at_will and self.alone is not None:
             better = self._found(self._planned(self.problem, budget, improve=True))
             if better is not None and better.cost < self.alone.cost:
@@ -175,11 +177,13 @@ class Vehicle:
         words = sorted(words, key=lambda one: one.cost)
         distinct = {tuple(one.trims.tolist()): one for one in reversed(words)}
         self.ways = list(distinct.values())[::-1][:WAYS]
-        self.alone = self._word_found(query, self.ways[0])
+        self.alone = self._word_found(query, self.ways[0], self.aims)
 
-    def _word_found(self, query: LatticeQuery, word: Word) -> Found:
+    def _word_found(
+        self, query: LatticeQuery, word: Word, aims: Sequence[tuple[int, Goal]]
+    ) -> Found:
         plan = plan_of_word(query, word)
-        goal_index = query.goal_index[word.goal]
+        goal_index = aims[query.goal_index[word.goal]][0]
         return Found(plan, word.cost + query.padding, goal_index, self.course_of(plan))
 
     def _found(self, result: PlanResult) -> Found | None:
@@ -207,7 +211,8 @@ class Vehicle:
         if not self.at_will:
             found = self._found(self._planned(problem, budget, improve=again))
             return found if found is not None and found.cost < known else None
-        own, query = self.problem, self._query(problem)
+        own, aims = self.aimed, self.aims
+        query = self._query(replace(problem, goals=own.goals))
         best: Word | None = None
         for way in self.ways:
             if way.cost >= (best.cost if best else known) or budget.is_over:
@@ -215,16 +220,15 @@ class Vehicle:
             timed = with_waits(query, way)
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
-        aims = tuple(enumerate(problem.goals))
         if best is None:
             calm = self._past_the_arrived(others)
             aims = self._aims(calm)
             if not aims:
                 return None
             goals = tuple(goal for _, goal in aims)
-            if goals != problem.goals:
-                own, calm = replace(own, goals=goals), replace(calm, goals=goals)
-                query = self._query(replace(problem, goals=goals))
+            calm = replace(calm, goals=goals)
+            if goals != own.goals:
+                own, query = replace(own, goals=goals), self._query(replace(problem, goals=goals))
             best = self._round_the_arrived(query, calm, budget)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
             first = first_plan(query, budget=replace(budget, expansions=most))
@@ -238,8 +242,7 @@ class Vehicle:
         best = improve(query, best, budget=budget, patience=AT_ONCE).word
         if not best.cost < known:
             return None
-        found = self._word_found(query, best)
-        return replace(found, goal_index=aims[found.goal_index][0])
+        return self._word_found(query, best, aims)
 
     def past_arrived(
         self, arrived: Sequence[Obstacle], begin: float, budget: Budget
@@ -263,13 +266,9 @@ class Vehicle:
         waits = [(SWITCH, rest, wait)] if wait > 0.0 else []
         drives = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
         steps = [*waits, *((SWITCH, trim, t) for trim, t in drives)]
-        found = self._word_found(query, query.word_of(steps, word.goal))
+        found = self._word_found(query, query.word_of(steps, word.goal), aims)
         # The rest is in no library of a search past static obstacles, and so has no price there.
-        return replace(
-            found,
-            cost=self.problem.cost_of(found.plan),
-            goal_index=aims[found.goal_index][0],
-        )
+        return replace(found, cost=self.problem.cost_of(found.plan))
 
     def _past_the_arrived(self, others: Sequence[Obstacle]) -> Problem:
         """Its problem where those that stay at their goals stand there already."""
@@ -280,20 +279,40 @@ class Vehicle:
         ]
         return replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
 
-    def _aims(self, calm: Problem) -> tuple[tuple[int, Goal], ...]:
-        """Where it may end among those that stay, each with its goal's number; empty if nowhere.
+    @functools.cached_property
+    def aims(self) -> tuple[tuple[int, Goal], ...]:
+        """Where it may end past static obstacles, each with its goal's number.
 
-        The goals themselves, or else poses within their tolerances. Who leaves may be there before.
+        The goals themselves, or else poses within their tolerances; the goals where none is free.
         """
-        goals = tuple(enumerate(calm.goals))
-        if self.leaves or not all(why_goal_blocked(calm, goal) for goal in calm.goals):
+        goals = tuple(enumerate(self.problem.goals))
+        if not all(why_goal_blocked(self.problem, goal) for goal in self.problem.goals):
             return goals
-        still = tuple(one for one in calm.obstacles if not moves(one))
+        return self._within_tolerances(self.problem) or goals
+
+    @functools.cached_property
+    def aimed(self) -> Problem:
+        """Its problem with poses that it may end at for goals."""
+        goals = tuple(goal for _, goal in self.aims)
+        return self.problem if goals == self.problem.goals else replace(self.problem, goals=goals)
+
+    def _aims(self, calm: Problem) -> tuple[tuple[int, Goal], ...]:
+        """Where it may end among those that stay, as `aims`; empty if nowhere.
+
+        Who leaves may be there before.
+        """
+        if self.leaves or not all(why_goal_blocked(calm, goal) for goal in self.aimed.goals):
+            return self.aims
+        return self._within_tolerances(calm)
+
+    def _within_tolerances(self, among: Problem) -> tuple[tuple[int, Goal], ...]:
+        """A few free poses within the tolerance of each goal, with its number."""
+        still = tuple(one for one in among.obstacles if not moves(one))
         found = list[tuple[int, Goal]]()
-        for k, goal in goals:
+        for k, goal in enumerate(among.goals):
             if goal.tolerance_m or goal.tolerance_rad:
-                aims = list(aims_within(calm, goal))
-                free = proven_free(replace(calm, obstacles=still), [one.pose for one in aims])
+                aims = list(aims_within(among, goal))
+                free = proven_free(replace(among, obstacles=still), [one.pose for one in aims])
                 rows = (aim for aim, is_free in zip(aims, free, strict=True) if is_free)
                 found += [(k, aim) for aim in itertools.islice(rows, MOST_AIMS)]
         return tuple(found)

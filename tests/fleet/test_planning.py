@@ -168,6 +168,27 @@ def test_who_cannot_switch_at_will_stands_only_at_rest():
         FleetProblem([still, replace(moving, start_time=2.0)])
 
 
+@pytest.mark.parametrize("leaves", [False, True])
+def test_a_goal_that_is_covered_is_met_within_its_tolerance(leaves):
+    """A crate stands where two robots shall go; only the second one has a tolerance."""
+    robot = Automaton.of_controls(
+        Unicycle(), {"rest": (0, 0), "on": (1, 0), "left": (0.8, 1), "right": (0.8, -1)}
+    )
+    around = {"obstacles": Disc(0.3, center=[4.2, 0.0]), "footprint": Disc(0.3)}
+    loose = Goal(pose=[4, 0, 0], tolerance_m=0.6, tolerance_rad=0.5)
+    one = Problem(robot, [0, 0, 0], loose, **around)
+    other = Problem(robot, [3, -4, np.pi / 2], Goal(pose=[3, 4, np.pi / 2]), **around)
+    fleet = FleetProblem([one, other], margin=0.1, leaves=(leaves, False))
+    result = plan_fleet(fleet, time_limit=60.0, max_rounds=1)
+    assert result.status is FleetStatus.FOUND
+    assert verify_fleet(fleet, result.plans).passed
+    assert np.hypot(*(result.plans["1"].end - loose.pose)[:2]) <= 0.6
+    assert result.lower_bound <= result.cost
+    exact = replace(one, goals=Goal(pose=[4, 0, 0]))
+    refused = plan_fleet(FleetProblem([exact, other]), time_limit=60.0, max_rounds=0)
+    assert "at the goal the vehicle touches obstacle 0" in refused.reasons["1"]
+
+
 def test_bounds_hold_for_every_vehicle():
     bounds = Bounds(x=(-5.0, 5.0), y=(-5.0, 5.0))
     ends = [([-4, 0, 0], [4, 0, 0]), ([4, 0, math.pi], [-4, 0, math.pi])]
