@@ -101,11 +101,10 @@ class Exchanges:
         again = not leads(now.held[k]) and (now.number + k) % AGAIN == 0
         return again or now.state.in_vain.get(k) != self._around()
 
-    def _most_of(self, k: int) -> int:
-        """How many expansions a search may take: many now and then, for who has no plan."""
+    def _tries_hard(self, k: int) -> bool:
+        """Whether who has no plan searches for long, and without room at its goal: now and then."""
         now = self.now
-        long = not leads(now.held[k]) and (now.number + k) % AGAIN_LONG == 0
-        return LONG if long else QUICK
+        return not leads(now.held[k]) and (now.number + k) % AGAIN_LONG == 0
 
     def _look_for_better(self, batch: Sequence[int]) -> None:
         """Some look for better plans at once, past the same ones; then one after another swaps."""
@@ -113,10 +112,12 @@ class Exchanges:
         around = self._around()
         bases = [now.held[k] for k in batch]
         values = [self._better_than(now.left_to_pay(k)) for k in batch]
-        questions = [
-            question_of(now, k, base, now.expected_by(k), known, most=self._most_of(k))
-            for k, base, known in zip(batch, bases, values, strict=True)
-        ]
+        questions = []
+        for k, base, known in zip(batch, bases, values, strict=True):
+            hard = self._tries_hard(k)
+            most = LONG if hard else QUICK
+            others = now.expected_by(k)
+            questions.append(question_of(now, k, base, others, known, most=most, room=not hard))
         self.asked += batch
         answers = answers_to(now, questions)
         for k, base, known, answer in zip(batch, bases, values, answers, strict=True):

@@ -8,9 +8,7 @@ from collections.abc import Collection, Sequence
 import numpy as np
 
 from maneuver_automaton.fleet.asking import Answer, Past, Question, answered
-from maneuver_automaton.fleet.held import (
-    is_over,
-)
+from maneuver_automaton.fleet.held import is_over
 from maneuver_automaton.fleet.moment import Moment, Other
 from maneuver_automaton.fleet.vehicle import QUICK, Found
 from maneuver_automaton.receding_horizon.candidates import within
@@ -28,9 +26,16 @@ def search(
 
 
 def question_of(
-    now: Moment, k: int, base: Found, others: Collection[Other], known: float, *, most: int = QUICK
+    now: Moment,
+    k: int,
+    base: Found,
+    others: Collection[Other],
+    known: float,
+    *,
+    most: int = QUICK,
+    room: bool = True,
 ) -> Question:
-    """What a vehicle is asked for."""
+    """What a vehicle is asked for; without room at its goal, noise may lead it out there."""
     settings = now.state.settings
     goals = now.vehicles[k].problem.goals
     if is_over(base, now.time) and any(within(base.plan.end, goal) for goal in goals):
@@ -44,7 +49,7 @@ def question_of(
         between=now.keep,
         known=known,
         most=most,
-        tube_m=settings.tube_m,
+        tube_m=settings.tube_m if room else 0.0,
         keep=now.near.get(k, math.inf),
     )
 
