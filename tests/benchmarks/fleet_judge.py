@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -77,20 +77,21 @@ def judged(log: FleetLog) -> Least:
 
 
 def distance_to(
-    fleet: FleetProblem, name: str, plan: Plan, other: str, stands: FleetStep, since: float
+    fleet: FleetProblem, name: str, plan: Plan, other: str, step: FleetStep, since: float
 ) -> float:
-    """Least distance [m] of a plan's rest, from a time on, to a vehicle where that stands."""
+    """Least distance [m] of a plan's rest, from a time on, to another vehicle as a step has it.
+
+    Who breaks down within a maneuver drives it to its end.
+    """
     problems = dict(zip(fleet.names, fleet.problems, strict=True))
-    end = max(plan.start_time + plan.duration, since)
+    stops = step.plans[other]
+    end = max(since, *(one.start_time + one.duration for one in (plan, stops)))
     times = np.append(np.arange(since, end, LOOK), end)
-    whole = np.maximum(times, plan.start_time)
-    driven = _body(name, problems[name], plan, whole)
-    still = stands.plans[other]
-    last = np.full(2, still.start_time + still.duration)
-    body = _body(other, problems[other], still, last)
-    centre = np.repeat(body.centre[:1], len(times), axis=0)
-    parts = [(np.repeat(placed[:1], len(times)), grown) for placed, grown in body.parts]
-    return _between(driven, replace(body, centre=centre, parts=parts))[0]
+    bodies = [
+        _body(who, problems[who], one, np.maximum(times, one.start_time))
+        for who, one in ((name, plan), (other, stops))
+    ]
+    return _between(*bodies)[0]
 
 
 def _body(
