@@ -304,22 +304,44 @@ def rejoined(
 
 
 def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
-    """The plan that comes to rest soonest; what is held where the library cannot stop it."""
-    if switches_at_will(vehicle.problem) or not moves_on(rest_of_plan(vehicle, found, time)):
+    """The plan that comes to rest soonest; what is held where nothing stops it."""
+    rest = rest_of_plan(vehicle, found, time)
+    if switches_at_will(vehicle.problem) or not moves_on(rest):
         return resting(vehicle, pose, time, found)
     head, problem = onward(vehicle, found, time)
-    if problem is None:  # it is driven to its end
-        return given_up(found)
-    plan = head
-    if not problem.first_trim.is_rest:
+    plans = [_without_coasts(vehicle, rest)]
+    if problem is not None and problem.first_trim.is_rest:
+        plans.append(head)
+    elif problem is not None:
         brake = _brake(problem)
-        if brake is None:
-            return given_up(found)
-        plan = brake if head is None else joined(head, brake)
-    if plan is None:
-        return resting(vehicle, pose, time, found)
-    plan = replace(plan, start=pose)
-    return _not_leading(vehicle, plan)
+        plans.append(brake if brake is None or head is None else joined(head, brake))
+    able = [plan for plan in plans if plan is not None]
+    if not able:
+        return given_up(found)
+    soonest = min(able, key=lambda plan: plan.duration)
+    return _not_leading(vehicle, replace(soonest, start=pose))
+
+
+def _without_coasts(vehicle: Vehicle, rest: Plan) -> Plan | None:
+    """What is left of a plan, by its maneuvers alone, until it can rest; None if it never can.
+
+    A trim may be left at any moment: its motion is steady.
+    """
+    rests = [one for one in vehicle.problem.automaton.trims if one.is_rest]
+    between = rest.maneuvers or (None,) * (len(rest.trims) - 1)
+    begun = int(committed(rest, 0.0) > NOTHING)
+    for n, trim in [*enumerate(rest.trims)][begun:]:
+        alike = (one for one in rests if same_state(one.reduced_state, trim.reduced_state))
+        stands = trim if trim.is_rest else next(alike, None)
+        if stands is not None:
+            more = () if stands is trim else (stands,)
+            return replace(
+                rest,
+                trims=(*rest.trims[: n + 1], *more),
+                durations=np.zeros(n + 1 + len(more)),
+                maneuvers=(*between[:n], *(None for _ in more)),
+            )
+    return None
 
 
 def _brake(problem: Problem) -> Plan | None:

@@ -92,6 +92,17 @@ def test_whatever_is_driven_next_goes_on_from_the_state_that_it_has(driving):
                     assert same_state(state_at(vehicle, other, time), state)
 
 
+def test_who_stops_leaves_its_trims_at_once(driving):
+    """A trim may be left at any moment, also one that is the plan's own, of no library."""
+    vehicle, found = driving
+    for time in times_of(found.plan, 9)[:-1]:
+        rest = rest_of_plan(vehicle, found, time)
+        stop = stopping(vehicle, found, time, rest.start).plan
+        assert stop.trims[-1].is_rest
+        assert stop.duration <= rest.duration - rest.durations.sum() + 1e-9
+        assert same_state(begin_state(stop), begin_state(rest))
+
+
 def test_another_plan_goes_on_from_the_state_that_it_has(driving):
     vehicle, found = driving
     budget = Budget.from_now(60.0)
