@@ -26,7 +26,6 @@ PICTURES = (
 
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
-    check_address(settings.scheduler)
     if road_command.is_road(path):
         if settings.scheduler is not None:
             raise _needs_several(path)
@@ -71,6 +70,7 @@ def _task(path: Path, parts: Parts, settings: Settings) -> Task:
         if settings.scheduler is not None:
             raise _needs_several(path)
         return PlanTask.of(found, settings)
+    check_address(settings.scheduler)
     from maneuver_automaton.cli.fleets import FleetTask
 
     return FleetTask(scenario=found, settings=settings, path=path, parts=parts)
