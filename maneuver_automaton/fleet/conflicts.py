@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ from maneuver_automaton.collision.shapes import (
     Polygon,
     Shape,
 )
-from maneuver_automaton.collision.world import MovingObstacles, world_of
+from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet import _kernels_meetings as kernels
 from maneuver_automaton.fleet.levels import ALWAYS, Levels, Stage
 
@@ -155,7 +155,7 @@ def meetings(
     courses: Mapping[int, Course],
     *,
     keep: float,
-    among: Sequence[int] | None = None,
+    among: Collection[int] | None = None,
     frame: tuple[float, float, float] | None = None,
 ) -> list[Meeting]:
     """Pairs of vehicles that come closer than a distance [m], the first that does so first.
@@ -166,68 +166,80 @@ def meetings(
     `frame` nearby, that of the first vehicle if omitted: with the same one all that is prepared for
     a course is prepared once.
     """
-    numbers = sorted(courses)
-    if len(numbers) < 2:
-        return []
-    if frame is None:
-        first = courses[numbers[0]].motions[0].pose[0]
-        frame = (float(first[0]), float(first[1]), 0.0)
-    owners, obstacles = [], []
-    for number in numbers:
-        bodies = courses[number].bodies
-        owners += [number] * len(bodies)
-        obstacles += list(bodies)
-    world = world_of(tuple(obstacles), (), frame)
-    # Who begins later stands at its start until then: all are looked at from the first begin on.
-    began = min(float(way.time[0]) for one in courses.values() for way in one.motions)
-    span = (began - AFTER, max(one.quiet_after for one in courses.values()) + AFTER)
-    owner = np.array(owners)
-    heights = np.array([one.height or (-math.inf, math.inf) for one in obstacles])
-    found: dict[tuple[int, int], float] = {}
-    wanted = set(numbers if among is None else among)
-    for number in numbers:
-        if number not in wanted:
-            continue
-        times = first_meetings(
-            world.arrays.moving, courses[number], frame, span, keep, heights=heights
-        )
-        for other in numbers:
-            if other == number or (other in wanted and other < number):
+    return Encounters(courses, frame).within(keep, among)
+
+
+class Encounters:
+    """What vehicles drive, prepared once: who meets whom within one distance, and another one."""
+
+    def __init__(
+        self, courses: Mapping[int, Course], frame: tuple[float, float, float] | None = None
+    ) -> None:
+        self.numbers = sorted(courses)
+        if len(self.numbers) < 2:
+            return
+        if frame is None:
+            first = courses[self.numbers[0]].motions[0].pose[0]
+            frame = (float(first[0]), float(first[1]), 0.0)
+        obstacles = [one for number in self.numbers for one in courses[number].bodies]
+        self._moving = world_of(tuple(obstacles), (), frame).arrays.moving
+        counts = [len(courses[number].bodies) for number in self.numbers]
+        self._firsts = np.cumsum([0, *counts[:-1]])  # bodies of each vehicle are side by side
+        self._heights = np.array([one.height or (-math.inf, math.inf) for one in obstacles])
+        # Who begins later stands at its start until then: all are looked at from the first begin.
+        began = min(float(way.time[0]) for one in courses.values() for way in one.motions)
+        span = (began - AFTER, max(one.quiet_after for one in courses.values()) + AFTER)
+        self._courses, self._frame, self._span = courses, frame, span
+        self._driven: dict[int, list[tuple[Body, Stage, Array]]] = {}
+
+    def within(self, keep: float, among: Collection[int] | None = None) -> list[Meeting]:
+        """Pairs that come closer than a distance [m], the first that does so first.
+
+        Only those with one of the vehicles `among`, if these are given.
+        """
+        found: dict[tuple[int, int], float] = {}
+        wanted = set(self.numbers if among is None else among)
+        for number in self.numbers if len(self.numbers) > 1 else ():
+            if number not in wanted:
                 continue
-            when = float(times[owner == other].min())
-            if when < math.inf:
-                pair = (min(number, other), max(number, other))
-                found[pair] = min(when, found.get(pair, math.inf))
-    rows = [Meeting(*pair, when) for pair, when in found.items()]
-    return sorted(rows, key=lambda row: (row.time, row.one, row.other))
+            times = np.minimum.reduceat(self._first_meetings(number, keep), self._firsts)
+            for other, when in zip(self.numbers, times.tolist(), strict=True):
+                if other == number or (other in wanted and other < number):
+                    continue
+                if when < math.inf:
+                    pair = (min(number, other), max(number, other))
+                    found[pair] = min(when, found.get(pair, math.inf))
+        rows = [Meeting(*pair, when) for pair, when in found.items()]
+        return sorted(rows, key=lambda row: (row.time, row.one, row.other))
 
+    def _first_meetings(self, number: int, keep: float) -> Array:
+        """When a vehicle first comes within a distance [m] of each body (M,).
 
-def first_meetings(
-    moving: MovingObstacles,
-    course: Course,
-    frame: tuple[float, float, float],
-    span: tuple[float, float],
-    keep: float,
-    *,
-    heights: Array | None = None,
-) -> Array:
-    """When a vehicle first comes within a distance [m] of each moving obstacle (M,) in a span [s].
-
-    What stands between `heights` (M, 2) [m], any if omitted, is met at those alone.
-    """
-    least = np.full(moving.speed.size, math.inf)
-    for shapes, motion in zip(course.shapes, course.motions, strict=True):
-        body = body_of(shapes)
-        for stage in course.stages:
-            out = np.empty(moving.speed.size)
-            within = max(span[0], stage.begin), min(span[1], stage.end)
-            rows = _coasts(_left(motion, within[0]), body, frame, within)
-            kernels.first_meetings(moving, body, rows, keep, PROOF, out)
-            if heights is not None:
-                apart = np.maximum(heights[:, 0] - stage.high, stage.low - heights[:, 1])
-                out[apart > keep + PROOF] = math.inf
+        What stands between heights is met at those alone.
+        """
+        heights = self._heights
+        least = np.full(len(heights), math.inf)
+        for body, stage, rows in self._drives(number):
+            out = np.empty(len(heights))
+            kernels.first_meetings(self._moving, body, rows, keep, PROOF, out)
+            apart = np.maximum(heights[:, 0] - stage.high, stage.low - heights[:, 1])
+            out[apart > keep + PROOF] = math.inf
             np.minimum(least, out, out=least)
-    return least
+        return least
+
+    def _drives(self, number: int) -> list[tuple[Body, Stage, Array]]:
+        """What each body of a vehicle drives in each of its stages, as the kernel has it."""
+        known = self._driven.get(number)
+        if known is None:
+            course, span = self._courses[number], self._span
+            known = self._driven[number] = []
+            for shapes, motion in zip(course.shapes, course.motions, strict=True):
+                body = body_of(shapes)
+                for stage in course.stages:
+                    during = max(span[0], stage.begin), min(span[1], stage.end)
+                    rows = _coasts(_left(motion, during[0]), body, self._frame, during)
+                    known.append((body, stage, rows))
+        return known
 
 
 def _coasts(

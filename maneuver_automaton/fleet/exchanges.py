@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from maneuver_automaton.fleet.asking import Answer
 from maneuver_automaton.fleet.conflicts import meetings
@@ -58,6 +59,20 @@ class Exchanges:
                 if self._swap({k: one}):
                     break
 
+    def go_on(self) -> None:
+        """Who stopped goes on along its void plan, as soon as that is proven: nobody searches."""
+        now = self.now
+        stopped = now.state.stopped
+        for k, left in [*stopped.items()]:
+            if k not in now.held or k in now.state.broken or leads(now.held[k]):
+                del stopped[k]
+            elif k not in now.void:
+                again = replace(left, plan=replace(left.plan, start_time=now.time))
+                onward = rejoined(now.vehicles[k], again, now.time, now.poses[k], now.tube)
+                for one in onward:
+                    if now.searches.is_over or self._swap({k: one}):
+                        break
+
     def exchange(self) -> None:
         """Some look for better plans, one after another: who looked in vain least often first.
 
@@ -78,7 +93,7 @@ class Exchanges:
         order.sort(key=lambda k: (state.attempts.get(k, 0), -state.gains.get(k, math.inf)))
         most = len(order) if settings.swaps_per_step is None else settings.swaps_per_step
         waiting = iter([k for k in order if k not in state.silent])
-        while not now.budget.is_over:
+        while not now.searches.is_over:
             turns = min(settings.at_once, most - len(self.asked))
             batch = list(itertools.islice((k for k in waiting if self._may_gain(k)), turns))
             if not batch:
@@ -126,7 +141,7 @@ class Exchanges:
                 continue
             if answer.alone is not None:
                 now.state.gains[k] = known - answer.alone.cost
-            if not self._exchanges(k, base, answer) and not now.budget.is_over:
+            if not self._exchanges(k, base, answer) and not now.searches.is_over:
                 now.state.in_vain[k] = around
                 now.state.attempts[k] = now.state.attempts.get(k, 0) + 1
 
@@ -138,7 +153,7 @@ class Exchanges:
         now = self.now
         settings, (found, alone) = now.state.settings, answer
         if alone is None:
-            if leads(base) and not now.budget.is_over:
+            if leads(base) and not now.searches.is_over:
                 now.state.settled[k] = now.state.lineage[k]
             return False
         if found is not None and found.arrival <= arrival(base) * (1.0 + LATER) + LATER:

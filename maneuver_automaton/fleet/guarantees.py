@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from maneuver_automaton.fleet.agreement import Knowledge
-from maneuver_automaton.fleet.conflicts import Course, Meeting, meetings
+from maneuver_automaton.fleet.conflicts import Course, Encounters, Meeting, meetings
 from maneuver_automaton.fleet.held import (
     CONTACT,
     LATER,
@@ -155,36 +156,87 @@ def _out_of_order(swaps: Sequence[Swap]) -> Iterator[FleetViolation]:
         versions.update(swap.holds)
 
 
-def gap_between(courses: Mapping[int, Course], *, keep: float, frame: Frame) -> float:
+class Gap(NamedTuple):
+    """A distance that any two vehicles are proven to keep from a time on, and what shows it."""
+
+    distance: float  # [m]
+    nearest: Meeting | None  # that comes within 2 cm more; None: nobody is looked at so far out
+    held: Mapping[int, Course]  # the courses of which it is proven
+
+
+def gap_between(
+    courses: Mapping[int, Course],
+    *,
+    keep: float,
+    frame: Frame,
+    time: float = -math.inf,
+    held: Mapping[int, Course] | None = None,
+    last: Gap | None = None,
+) -> Gap:
     """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
 
     At most a metre more than the distance to keep; 0 if not even that is proven.
+
+    Parameters
+    ----------
+    courses : mapping of int to Course
+        What is left of those that are held.
+    keep : float
+        Distance to keep [m].
+    frame : (x, y, 0)
+        What places are counted from.
+    time : float
+        Now [s].
+    held : mapping of int to Course, optional
+        What is held; what is left of it if omitted.
+    last : Gap, optional
+        Of a step before. It still holds if those that hold another plan since keep it too, and the
+        two that come nearest have not passed yet: the value is the same as without it.
     """
+    held = courses if held is None else held
     if len(courses) < 2:
-        return math.inf
+        return Gap(math.inf, None, held)
+    if last is not None and _still_holds(last, courses, frame=frame, time=time, held=held):
+        return last._replace(held=held)
     low, most, more = keep, keep + FAR, 2.0 * FINE
     rows = meetings(courses, keep=most, frame=frame)
     if not rows:
-        return most
+        return Gap(most, None, held)
     near = sorted({k for row in rows for k in (row.one, row.other)})
-    among, courses = sorted({row.one for row in rows}), {k: courses[k] for k in near}
-
-    def met(wanted: float) -> bool:
-        return bool(meetings(courses, keep=wanted, among=among, frame=frame))
-
-    if met(keep):
-        return 0.0
-    high = math.inf
+    among = {row.one for row in rows}
+    met = Encounters({k: courses[k] for k in near}, frame).within
+    if met(keep, among):
+        return Gap(0.0, None, held)
+    nearest, high = rows[0], math.inf
     while high == math.inf:
         wanted = min(low + more, most)
-        if wanted >= most or met(wanted):
-            high = wanted
+        if wanted >= most:
+            high = most
+        elif rows := met(wanted, among):
+            high, nearest = wanted, rows[0]
         else:
             low, more = wanted, 2.0 * more
     while high - low > FINE:
         middle = 0.5 * (low + high)
-        if met(middle):
-            high = middle
+        if rows := met(middle, among):
+            high, nearest = middle, rows[0]
         else:
             low = middle
-    return low
+    return Gap(low, nearest, held)
+
+
+def _still_holds(
+    last: Gap,
+    courses: Mapping[int, Course],
+    *,
+    frame: Frame,
+    time: float,
+    held: Mapping[int, Course],
+) -> bool:
+    """Whether a distance is what was proven a step before."""
+    fresh = {k for k, one in held.items() if last.held.get(k) is not one}
+    if last.nearest is None or last.nearest.time < time:
+        return False
+    if {last.nearest.one, last.nearest.other} & (fresh | (set(last.held) - set(held))):
+        return False
+    return not (fresh and meetings(courses, keep=last.distance, among=fresh, frame=frame))

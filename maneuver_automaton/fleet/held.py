@@ -256,8 +256,10 @@ def proposal(
     spent = 0.0 if head is None else vehicle.problem.cost_of(head)
     if there.alone is None or not there.alone.cost + spent < known:
         return None, None
-    other = there.past(others, budget, most=most, known=known - spent)
     alone = _after(vehicle, head, there.alone)
+    if budget.is_over:
+        return None, alone
+    other = there.past(others, budget, most=most, known=known - spent)
     return None if other is None else _after(vehicle, head, other), alone
 
 

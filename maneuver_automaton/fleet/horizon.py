@@ -242,6 +242,7 @@ class FleetHorizon:
         state.arrived.discard(k)
         for known in (state.settled, state.in_vain, state.due, state.attempts, state.gains):
             known.pop(k, None)
+        state.stopped.pop(k, None)
         if k in state.held:
             state.held[k] = given_up(state.held[k])
             state.lineage[k] += 1

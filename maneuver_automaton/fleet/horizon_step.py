@@ -26,5 +26,9 @@ def step_of(now: Moment, broken_down: set[int]) -> FleetStep:
     note_arrivals(now)
     exchanges = Exchanges(now)
     exchanges.exchange_what_is_due()
+    exchanges.go_on()
     exchanges.exchange()
-    return logged(now, before, exchanges, refused)
+    done = now.budget.elapsed
+    log = logged(now, before, exchanges, refused)
+    now.state.note_end(now.budget.elapsed - min(done, now.searches.seconds))
+    return log

@@ -50,6 +50,7 @@ class Moment:
         self.nearby = Nearby(time)
         self.poses = poses
         self.budget = budget
+        self.searches = budget.before(state.kept_s)  # what follows them takes the rest
         self.number = 0 if state.last is None else state.last.number + 1
         self.void: list[int] = []
         self.violations: list[FleetViolation] = []

@@ -75,9 +75,9 @@ def answers_to(now: Moment, questions: Sequence[Question]) -> list[Answer]:
     """The answers to questions: of workers, or else found here."""
     if now.state.workers is None:
         return [
-            answered(now.vehicles[one.number], one, now.budget, now.left_of) for one in questions
+            answered(now.vehicles[one.number], one, now.searches, now.left_of) for one in questions
         ]
     asked = [one for one in questions if one.number not in now.state.silent]
-    found = dict(zip(map(id, asked), now.state.workers.ask(asked, now.budget), strict=True))
+    found = dict(zip(map(id, asked), now.state.workers.ask(asked, now.searches), strict=True))
     now.state.silent |= {one.number for one in asked if found[id(one)] is None}
     return [found.get(id(one)) or Answer(None, None) for one in questions]

@@ -26,22 +26,28 @@ from maneuver_automaton.fleet.nearby import near_pairs
 from maneuver_automaton.fleet.tracking import back_onto
 from maneuver_automaton.fleet.vehicle import Found
 from maneuver_automaton.fleet.verdict import nearest
-from maneuver_automaton.receding_horizon.settings import switches_at_will
+from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 
 NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
 SHARES = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
 REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
+IN_TIME = 0.4  # share of a step's limit, after which it does not where it can do without
+TENTHS = 10  # of the tube, by which it is said who is farthest beside its plan
 
 
 def rejoin(now: Moment) -> None:
-    """Those off their plans by no more than their tubes rejoin them; the others' are void."""
+    """Those off their plans by no more than their tubes rejoin them; the others' are void.
+
+    The farthest first: where time gets short, the others drive on beside their plans.
+    """
     now.off = {k: now.offset_from(k, found) for k, found in now.held.items()}
     _note_pressed(now)
-    for k, found in now.held.items():
-        off = now.off[k]
+    tube = now.state.settings.tube_m
+    for k in sorted(now.held, key=lambda k: -math.floor(TENTHS * now.off[k] / max(tube, EXACT))):
+        off, found = now.off[k], now.held[k]
         if k in now.state.broken or off == 0.0:
             continue
-        if off > now.state.settings.tube_m:
+        if off > tube:
             now.make_void(k)
         elif k not in now.state.arrived and not _tracks(now, k, found, REJOINS):
             _rejoin_within(now, k, found)
@@ -87,6 +93,9 @@ def _note_crossing(now: Moment) -> None:
 
 
 def _rejoin_within(now: Moment, k: int, found: Found) -> None:
+    is_late = now.budget.elapsed > IN_TIME * now.budget.seconds
+    if is_late and (_tracks(now, k, found) or _drives_beside(now, k, found, ())):
+        return
     others, left = now.expected_by(k), now.left_to_pay(k)
     choices, again = [], None
     for one in rejoined(now.vehicles[k], found, now.time, now.poses[k], now.tube):

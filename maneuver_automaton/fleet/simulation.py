@@ -243,11 +243,12 @@ class _World:
 
     @property
     def _stuck(self) -> set[str]:
-        """Whose workers are gone, and whose plans do not arrive."""
+        """Whose workers are gone, whose plans do not arrive, and who has none to go on along."""
         if not self.steps:
             return set()
         values = self.steps[-1].values
-        return {name for name in self.steps[-1].silent if values[name] == math.inf}
+        waiting = {self.loop.fleet.names[k] for k in self.loop.state.stopped}
+        return {name for name in self.steps[-1].silent if values[name] == math.inf} - waiting
 
     def advance(self, number: int) -> FleetStep:
         """One step: measure, decide, drive."""

@@ -36,7 +36,13 @@ def logged(now: Moment, before: Before, exchanges: Exchanges, refused: Sequence[
     said = list(broken(now.vehicles, state.agreement, before, after))
     now.violations += said
     _note_proven(now, said)
-    gap = gap_between(courses, keep=now.keep, frame=now.frame) if few else now.keep
+    gap = now.keep
+    if few:
+        held = {k: one.course for k, one in now.held.items()}
+        state.gap = gap_between(
+            courses, keep=now.keep, frame=now.frame, time=now.time, held=held, last=state.gap
+        )
+        gap = state.gap.distance
     if state.crossing:
         gap = 0.0
     names = [one.name for one in now.vehicles]

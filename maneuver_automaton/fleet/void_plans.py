@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
-from maneuver_automaton.fleet.held import (
-    rejoined,
-    stopping,
-)
+from maneuver_automaton.fleet.held import leads, rejoined, rest_of_plan, stopping
 from maneuver_automaton.fleet.log import FleetGuarantee
 from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.questions import search
@@ -52,6 +50,9 @@ def plan_anew(now: Moment) -> None:
         found = None if k in anew or k in now.state.silent else _another(now, k, waiting)
         anew.add(k)
         if found is None:
+            if leads(held := now.held[k]):
+                left = rest_of_plan(now.vehicles[k], held, now.time)
+                now.state.stopped[k] = replace(held, plan=left)
             found = _stopped(now, k, stop, stopped)
             stopped.add(k)
         now.hold(k, found)

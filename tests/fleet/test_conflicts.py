@@ -12,7 +12,14 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.collision.surroundings import parts_of
-from maneuver_automaton.fleet.conflicts import Course, Meeting, components, larger, meetings
+from maneuver_automaton.fleet.conflicts import (
+    Course,
+    Encounters,
+    Meeting,
+    components,
+    larger,
+    meetings,
+)
 from maneuver_automaton.fleet.verdict import measured, nearest
 from maneuver_automaton.groups import SE2
 from tests.collision.test_arcs import arcs
@@ -51,6 +58,16 @@ def test_meetings_against_dense_looks(here, parts, there, others, begin, keep):
         assert apart.min() > keep
     if apart.min() > keep + 0.02:
         assert not met
+
+
+@settings(max_examples=30)
+@given(places, runs, places, runs, places)
+def test_what_is_prepared_once_is_met_at_any_distance(here, parts, there, others, stands):
+    ways = {2: course(here, parts), 3: course(there, others), 7: course(stands, [])}
+    prepared = Encounters(ways)
+    for keep in (0.5, 0.0, 2.0):
+        for among in (None, [3], {2, 7}):
+            assert prepared.within(keep, among) == meetings(ways, keep=keep, among=among)
 
 
 @settings(max_examples=30)

@@ -10,13 +10,21 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton import FleetHorizon, FleetProblem, simulate_fleet
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
 from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.conflicts import Course, meetings
 from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
-from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
+from maneuver_automaton.fleet.held import (
+    left_to_pay,
+    off_plan,
+    proposal,
+    rest_of_plan,
+    resting,
+)
+from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.vehicle import Found
 from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.groups import SE2
@@ -125,6 +133,39 @@ def test_whoever_finds_nothing_holds_on():
     assert_kept(log)
     assert [*log.swaps] == []
     assert log.sum_s == pytest.approx(first.sum_s, abs=1e-6)
+
+
+def test_who_has_no_time_drives_on_beside_its_plan():
+    fleet = crossing(tolerance=0.1)
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    noise = ma.Disturbance(position_m=0.003, heading_rad=0.003)
+    log = loop_of(fleet, first=first, time_limit=1e-9, disturbance=noise)
+    assert log.reached
+    assert [*log.violations] == []
+    assert not any(step.void or step.swaps for step in log.steps)
+
+
+def test_searches_leave_time_for_what_follows_them():
+    state = FleetHorizon(crossing(), step=0.5, time_limit=1.0).state
+    assert state.kept_s == 0.5  # nothing is known yet
+    for _ in range(100):
+        state.note_end(0.1)
+    assert 0.1 < state.kept_s < 0.2
+    now = Moment(state, 0.0, {}, Budget.from_now(1.0))
+    assert now.budget.deadline - now.searches.deadline == pytest.approx(state.kept_s)
+    state.note_end(5.0)
+    assert state.kept_s < 1.0
+
+
+def test_without_time_only_the_way_alone_is_looked_for():
+    vehicle = vehicles_of(crossing())[0]
+    rest = resting(vehicle, vehicle.problem.start, 0.0)
+    numbers = {"time": 0.0, "after": 0.0, "known": math.inf, "most": 1500}
+    other = [ma.Obstacle(Disc(0.3, [0.0, 0.0]))]
+    found, alone = proposal(vehicle, rest, others=other, budget=Budget.from_now(60.0), **numbers)
+    assert found.cost > alone.cost
+    found, _ = proposal(vehicle, rest, others=other, budget=Budget.from_now(0.0), **numbers)
+    assert found is None
 
 
 def test_swaps_per_step_and_the_rotating_order():
@@ -277,13 +318,50 @@ def test_known():
     assert said == [(FleetGuarantee.KNOWN, ("a",))]
 
 
+def gap_of(courses, **more):
+    return gap_between(courses, keep=0.1, frame=ORIGIN, **more)
+
+
 def test_the_gap_that_is_proven():
     for gap in (0.15, 0.4, 0.9):
         _, held, _ = pair(gap)
-        proven = gap_between({k: one.course for k, one in held.items()}, keep=0.1, frame=ORIGIN)
+        proven = gap_of({k: one.course for k, one in held.items()}).distance
         assert gap - 0.05 < proven <= gap
     _, held, _ = pair(0.05)
-    assert gap_between({k: one.course for k, one in held.items()}, keep=0.1, frame=ORIGIN) == 0.0
+    assert gap_of({k: one.course for k, one in held.items()}).distance == 0.0
+
+
+def test_a_gap_that_still_holds_is_not_measured_again():
+    _, held, _ = pair(0.4)
+    courses = {k: one.course for k, one in held.items()}
+    proven = gap_of(courses)
+    before, after = proven.nearest.time - 0.1, proven.nearest.time + 0.1
+    assert gap_of(courses, time=before, last=proven).nearest is proven.nearest
+    assert gap_of(courses, time=after, last=proven).nearest is not proven.nearest
+    # Who holds another plan is looked at, and so is what is left where one of the nearest is gone.
+    third = Course(courses[0].shapes, (Motion([0.0], [[0.0, -0.9, 0.0]]),))
+    far = replace(third, motions=(Motion([0.0], [[0.0, -9.0, 0.0]]),))
+    near = gap_of({**courses, 2: third}, time=before, last=proven)
+    assert near.distance == pytest.approx(0.3, abs=0.02)
+    known = gap_of({**courses, 2: far}, time=before, last=proven)
+    assert known.nearest is proven.nearest
+    assert known.held[2] is far
+    assert gap_of({0: courses[0], 2: far}, time=before, last=known).distance == 1.1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
+    fleet = scattered(2 + 3 * seed, seed)
+    steps = loop_of(fleet, steps=60).steps
+    vehicles = dict(zip(fleet.names, vehicles_of(fleet), strict=True))
+    start = fleet.problems[0].start
+    for step in steps:
+        courses = {
+            one.number: one.course_of(step.plans[name]).after(step.time)
+            for name, one in vehicles.items()
+        }
+        anew = gap_between(courses, keep=fleet.margin, frame=(start[0], start[1], 0.0))
+        assert step.gap_m == anew.distance
 
 
 # -- what is left of a plan

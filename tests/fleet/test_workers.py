@@ -75,6 +75,30 @@ def test_who_is_silent_stops_before_one_that_broke_down():
     assert all(set(step.plans) == {"a", "b"} for step in log.steps)
 
 
+@pytest.mark.parametrize("dies", [{}, {0: 0.0}, {0: 0.0, 1: 0.0}])
+def test_who_was_pushed_off_its_plan_goes_on_without_a_worker(dies):
+    fleet = crossing(tolerance=0.1)
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    pushes = {"a": Disturbance(pushes={2: (0.1, 0.2, 0.3)})}
+    loop = loop_of(fleet, first=first, workers=Mortal(fleet, dies), disturbance=pushes)
+    (void,) = [step.void for step in loop.steps if step.void]
+    assert void == (("a", "b") if dies else ("a",))  # where a stops, b would hit it
+    assert loop.reached
+    assert {row.guarantee.value for _, row in loop.violations} == set()
+    assert least_distance(loop) > 0.0
+
+
+def test_who_waits_on_its_void_plan_goes_on_once_that_is_free():
+    """Without a worker one stops where another one would hit it, and goes on behind that."""
+    fleet = crossing(tolerance=0.1)
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    pushes = {"a": Disturbance(pushes={2: (-0.6, 0.0, 0.0)})}
+    workers = Mortal(fleet, {0: 0.0, 1: 0.0})
+    loop = loop_of(fleet, first=first, workers=workers, disturbance=pushes)
+    assert loop.reached
+    assert least_distance(loop) > 0.0
+
+
 @pytest.mark.parametrize("heavy", [False, True])
 def test_a_plan_in_few_bytes(heavy):
     if heavy:
