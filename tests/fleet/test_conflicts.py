@@ -64,7 +64,11 @@ def test_meetings_against_dense_looks(here, parts, there, others, begin, keep):
 @settings(max_examples=30)
 @given(places, runs, places, runs, places)
 def test_what_is_prepared_once_is_met_at_any_distance(here, parts, there, others, stands):
-    ways = {2: course(here, parts), 3: course(there, others), 7: Course((BODY,), (Motion([0.0], [stands]),))}
+    ways = {
+        2: course(here, parts),
+        3: course(there, others),
+        7: Course((BODY,), (Motion([0.0], [stands]),)),
+    }
     prepared = Encounters(ways)
     for keep in (0.5, 0.0, 2.0):
         for among in (None, [3], {2, 7}):
