@@ -194,6 +194,7 @@ def expand(
             t = task.holds[trim]
             if not task.rests and proven >= left:
                 t = left  # one that cannot rest is done where a trim is free to the end
+            goes_on = not task.rests and coast_inside(scene, lib, trim, pose, proven)
             while t > 0.0 and t <= proven and t <= left:
                 if not coast_inside(scene, lib, trim, pose, t):
                     break
@@ -202,7 +203,7 @@ def expand(
                     known = -math.inf
                     if trim == rest:
                         known = nodes[node, SAFE]
-                    elif not task.rests:
+                    elif goes_on:
                         known = clock + proven
                     add_node(task, lib, scene, search, then, clock + t, t, known, node, trim, -1)
                     if state[FOUND] >= 0:
@@ -217,9 +218,10 @@ def expand(
                 continue
             known = -math.inf
             if not task.rests:
-                ahead = max(task.until - later, 0.0)
+                ahead = min(max(task.until - later, 0.0), lib.library.longest[trim])
                 proven, _ = coast_proven(scene, lib, trim, then, ahead, later)
-                known = later + proven
+                if coast_inside(scene, lib, trim, then, proven):
+                    known = later + proven
             add_node(task, lib, scene, search, then, later, 0.0, known, node, trim, edge)
             if state[FOUND] >= 0:
                 return 0

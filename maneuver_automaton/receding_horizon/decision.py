@@ -60,7 +60,7 @@ def decide(now: Situation, search: StepSearch) -> Chosen:
     """The plan to apply."""
     there = _there(now, search)
     if there is not None:
-        return replace(there, free_until=search.free_until)
+        return _known_free(there, search)
     first = now.settings.first
     if now.last is None and first is not None:
         chosen = now.given(first)
@@ -69,7 +69,7 @@ def decide(now: Situation, search: StepSearch) -> Chosen:
                 "receding horizon: first hits an obstacle, or ends where one comes; need a plan "
                 "that is free"
             )
-        return replace(chosen, free_until=search.free_until)
+        return _known_free(chosen, search)
     kept = _kept(now, search)
     found = [] if now.is_near_optimal(kept) else search.cheaper(kept)
     if now.settings.pieces:
@@ -80,7 +80,18 @@ def decide(now: Situation, search: StepSearch) -> Chosen:
         return _without_plan(now, search)
     now.flag_late(best.plan)
     shifted = None if kept is None else kept.cost
-    return replace(now.as_chosen(best, shifted), free_until=search.free_until)
+    return _known_free(now.as_chosen(best, shifted), search)
+
+
+def _known_free(chosen: Chosen, search: StepSearch) -> Chosen:
+    """What is applied, with the time until which it is known to be free [s].
+
+    A plan that ends in motion was looked at to its end alone.
+    """
+    until, plan = search.free_until, chosen.plan
+    if until is not None and plan.trims and not plan.trims[-1].is_rest:
+        until = min(until, plan.start_time + plan.duration)
+    return replace(chosen, free_until=until)
 
 
 def _there(now: Situation, search: StepSearch) -> Chosen | None:
@@ -126,7 +137,7 @@ def _without_plan(now: Situation, search: StepSearch) -> Chosen:
     if not now.here.moves or (now.last is not None and now.last.deed.leads):
         now.flag(Guarantee.FEASIBILITY, search.why_none())
     for plan, deed in search.fail_safe():
-        return _leading_nowhere(now, plan, deed, search.free_until)
+        return _known_free(_leading_nowhere(now, plan, deed, None), search)
     least = search.mitigation()
     now.flag(Guarantee.SAFETY, least.reason)
     return _leading_nowhere(now, least.plan, Deed.MITIGATED, least.contact)

@@ -185,10 +185,10 @@ def _plan(
             _coast(word, times, between, held, float(search.nodes[row, kernels.LASTING]))
     trim = int(search.links[last, kernels.TRIM])
     rest = int(task.rest_of[library.arrays.library.class_of[trim]])
-    goes_on = trim if not task.rests and search.links[last, kernels.EDGE] >= 0 else rest
-    if goes_on >= 0:
-        left = search.nodes[last, kernels.SAFE] - search.nodes[last, kernels.CLOCK]
-        _coast(word, times, between, automaton.trims[library.trims[goes_on]], float(left))
+    goes_on = rest if task.rests else trim
+    left = float(search.nodes[last, kernels.SAFE] - search.nodes[last, kernels.CLOCK])
+    if goes_on >= 0 and (task.rests or left > 0.0):
+        _coast(word, times, between, automaton.trims[library.trims[goes_on]], left)
     if any(between):
         start, at = problem.start, problem.start_time
         return Plan(start, word, durations=times, maneuvers=tuple(between), start_time=at)

@@ -84,6 +84,22 @@ def test_the_number_of_expansions_is_limited():
     assert found.expansions == 3
 
 
+@pytest.mark.parametrize("most", [1, 3, 10, 30, 100])
+@pytest.mark.parametrize("bounds", [LANE, Bounds(x=(-3.0, 3.0), y=(-3.0, 3.0))])
+def test_what_cannot_stop_is_free_and_inside_for_as_long_as_is_said(bounds, most):
+    problem = among(COMING, robot=cannot_stop(), bounds=bounds)
+    assert_kept_as_said(problem, search_fail_safe(problem, until=40.0, max_expansions=most))
+
+
+def assert_kept_as_said(problem, found) -> None:
+    """A motion that never stops lasts until it is said to be free, free of all, inside bounds."""
+    assert found.plan.start_time + found.plan.duration == pytest.approx(found.free_until)
+    if found.plan.trims:
+        assert clearance(problem, found.plan) > 0.0
+        _, poses = driven(found.plan, np.zeros(2), step_m=0.05, step_rad=0.1)
+        assert outside(problem, poses[:, :2]).max() <= 1e-6
+
+
 def test_a_moved_scene_has_the_moved_trajectory():
     move = SE2(np.array([30.0, -4.0, 2.0]))
     one, two = (search_fail_safe(p, until=12.0) for p in (among(COMING), among(COMING).moved(move)))
@@ -195,6 +211,19 @@ class TestWithInertia:
         assert found.complete
         assert found.plan.duration == pytest.approx(12.0)
         assert not any(trim.is_rest for trim in found.plan.trims)
+
+    @pytest.mark.parametrize("most", [1, 3, 10, 30, 100])
+    @pytest.mark.parametrize("half", [1.0, 2.0, 4.0])
+    def test_one_that_cannot_rest_is_free_and_inside_for_as_long_as_is_said(self, half, most):
+        states = ((1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
+        problem = with_inertia(
+            COMING,
+            automaton=unicycle_automaton(states),
+            start_trim="1, 0",
+            goal_trim="1, 0",
+            bounds=Bounds(x=(-half, half), y=(-half, half)),
+        )
+        assert_kept_as_said(problem, search_fail_safe(problem, until=12.0, max_expansions=most))
 
     def test_with_a_trailer_both_parts_are_free(self):
         vehicle = VEHICLES["car_with_trailer"]
