@@ -151,6 +151,7 @@ class SearchSettings:
     weight: float | None = None  # of the cost to go in the first pass, 2 if None
     show_nodes: bool = False  # hand over what the first plan's search expanded
     improve: bool = True  # a plan that was found; otherwise the first that passes is returned
+    polish: bool = True  # plans with inertia, beyond what the library has
 
     def __post_init__(self) -> None:
         if self.method not in SEARCH_METHODS:

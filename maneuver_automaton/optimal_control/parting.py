@@ -15,6 +15,7 @@ from maneuver_automaton.optimal_control.separation import (
     Lines,
     Pairs,
     Reach,
+    Solid,
     facing,
     first_lines,
     near_pairs,
@@ -110,32 +111,40 @@ class Parting(NamedTuple):
         return self._replace(facing=now.joined(self.facing))
 
     def _facing(self, program: Program, point: Point, turned: Array) -> Facing:
-        points, both = program.points(point), program.scene.both
+        points, both = program.points(point), _both(program, point)
         return facing(points, both, self.pairs, self.lines, self.owner, turned=turned)
 
     def _reach(self, program: Program, point: Point) -> Reach:
-        return reaches(program.points(point), program.scene.both, self.pairs, self.lines)
+        return reaches(program.points(point), _both(program, point), self.pairs, self.lines)
 
 
 def parted(program: Program, point: Point, pairs: Pairs) -> Parting:
     """Pairs with first lines at a point, of which pieces behind one another share one."""
     lines = _first(program, point, pairs)
-    points, scene = program.points(point), program.scene
-    reach = reaches(points, scene.both, pairs, lines)
-    owner = shared_lines(scene.pieces, pairs, lines, reach)
+    points, both = program.points(point), _both(program, point)
+    reach = reaches(points, both, pairs, lines)
+    owner = shared_lines(both[1], pairs, lines, reach)
     lines = lines.of(owner)
-    faces = facing(points, scene.both, pairs, lines, owner, turned=TURNED)
+    faces = facing(points, both, pairs, lines, owner, turned=TURNED)
     return Parting(pairs, owner, lines, np.zeros(len(owner)), faces)
 
 
 def _first(program: Program, point: Point, pairs: Pairs) -> Lines:
-    return first_lines(program.points(point), program.scene.body, program.scene.pieces, pairs)
+    return first_lines(program.points(point), *_both(program, point), pairs)
+
+
+def _both(program: Program, point: Point) -> tuple[list[Solid], list[Solid]]:
+    """Solids of the body, and of the obstacles while the motion of a point is driven."""
+    return program.scene.body, program.pieces(point).solids
 
 
 def pairs_near(program: Program, point: Point, within: float) -> Pairs:
     """Pairs nearer than `within` [m] at a point; see `near_pairs`."""
-    scene = program.scene
-    if not (scene.pieces and scene.parts):
+    scene, pieces = program.scene, program.pieces(point)
+    if not (pieces.solids and scene.parts):
         empty = np.zeros(0, dtype=np.int64)
         return Pairs(empty, empty, empty)
-    return near_pairs(program.points(point), scene.body, scene.pieces, within=within)
+    during = pieces.interval if pieces.move else None
+    return near_pairs(
+        program.points(point), scene.body, pieces.solids, within=within, during=during
+    )

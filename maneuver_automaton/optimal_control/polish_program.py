@@ -13,6 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
+from maneuver_automaton.optimal_control.movers import Pieces
 from maneuver_automaton.optimal_control.paths import Frames, paths
 from maneuver_automaton.optimal_control.polish_values import (
     Ends,
@@ -65,6 +66,10 @@ class Program(NamedTuple):
         pace = point.durations[:, None] * (self.n_intervals / duration)
         control = np.hstack([point.control, pace]) if self.paced else point.control
         return point.state, control, duration
+
+    def pieces(self, point: Point) -> Pieces:
+        """Pieces of the obstacles while the motion of a point is driven."""
+        return self.scene.during(point.durations)
 
     def points(self, point: Point) -> list[tuple[Array, Array]]:
         """Control points of every solid of the body, in numbers."""

@@ -26,6 +26,8 @@ ROW_S = 1e-5  # [s] for each row of a program, to put it together: measured, gen
 ORDERING = 2  # approximate minimum fill: factorises twice as quickly as the default
 OF_LINE = 4  # parameters of a line: margin, anchor, angle
 OF_CORNER = 3  # parameters of a corner: its place, and the radius that rounds it
+OF_SHIFT = 2  # parameters of how a corner shifts with the duration
+WITHIN = 0.2  # share of the duration by which it changes at once where something moves
 
 
 class Begin(enum.Enum):
@@ -65,18 +67,26 @@ class Solver(NamedTuple):
     watcher: Watcher  # asks the budget at every iteration, and keeps the best
     bounds: Array  # (variables, 2)
     limits: Array  # (rows, 2)
-    corners: Array  # (k,) parameters that stay
+    corners: Array  # (k,) parameters of corners
     fixed: bool
 
 
 def solver_of(
-    program: Program, parting: Parting, *, fixed: bool, price: float, budget: Budget
+    program: Program,
+    point: Point,
+    parting: Parting,
+    *,
+    fixed: bool,
+    price: float,
+    budget: Budget,
 ) -> Solver | float:
     """The program with its lines; where no time is left to build it, what it takes [s].
 
     Parameters
     ----------
     program : Program
+    point : Point
+        Near which obstacles are where the motion of it meets them.
     parting : Parting
     fixed : bool
         Whether the lines stand still.
@@ -90,7 +100,7 @@ def solver_of(
     free = np.tile([-np.inf, np.inf], (0 if fixed else 2 * len(own), 1))
     inside = np.tile([0.0, np.inf], (program.n_intervals if elastic else 0, 1))
     bounds = np.vstack([program.bounds, free, inside])
-    corners, places = _corners(program, parting)
+    corners, places = _corners(program, point, parting)
     blocks = [*program.blocks, *_line_blocks(program, parting, places, fixed, elastic)]
     if elastic:
         numbers = np.arange(len(bounds) - len(inside), len(bounds))[None]
@@ -112,29 +122,47 @@ def solver_of(
     return Solver(function, watcher, bounds, built.limits, corners, fixed)
 
 
-def _corners(program: Program, parting: Parting) -> tuple[Array, tuple[IntArray, IntArray]]:
+class Places(NamedTuple):
+    """Where the parameters of corners begin, among those of all corners."""
+
+    body: IntArray  # of each solid
+    piece: IntArray  # of the piece of each pair
+    shift: IntArray  # how its corners shift; negative where it stands still
+
+
+def _corners(program: Program, point: Point, parting: Parting) -> tuple[Array, Places]:
     """Parameters of corners of both sides, and where those of each solid begin.
 
-    Of the pieces only those that are in pairs: a map may have thousands.
+    Of the pieces only those that are in pairs: a map may have thousands. A corner that shifts is
+    where it would be if the motion took no time, and shifts with the duration from there.
     """
-    body, pieces = program.scene.both
+    body, pieces = program.scene.body, program.pieces(point)
     used, owner = np.unique(parting.pairs.piece, return_inverse=True)
-    solids = [*body, *(pieces[k] for k in used.tolist())]
+    moving = used >= pieces.first
+    shifts = pieces.shifts[used[moving] - pieces.first]
+    solids = [*body, *(pieces.solids[k] for k in used.tolist())]
     rows = [np.column_stack([corners, np.full(len(corners), by)]) for corners, by in solids]
+    duration = float(point.durations.sum())
+    for k, shift in zip(np.flatnonzero(moving).tolist(), shifts, strict=True):
+        row = rows[len(body) + k]
+        row[:, :2] -= duration * shift[: len(row)]
     begins = np.cumsum([0, *map(len, rows)])
     every = np.vstack([np.zeros((0, OF_CORNER)), *rows]).ravel()
-    return every, (begins[: len(body)], begins[len(body) :][owner])
+    shift_at = np.full(len(used), -1)
+    shift_at[moving] = every.size + OF_SHIFT * shifts.shape[1] * np.arange(len(shifts))
+    places = Places(begins[: len(body)], begins[len(body) :][owner], shift_at[owner])
+    return np.concatenate([every, shifts.ravel()]), places
 
 
 def _line_blocks(
     program: Program,
     parting: Parting,
-    places: tuple[IntArray, IntArray],
+    places: Places,
     fixed: bool,
     elastic: bool,
 ) -> list[Blocks]:
     """How far corners of the body, and of the pieces, reach over the lines."""
-    pairs, own, (here, there) = parting.pairs, parting.own, places
+    pairs, own = parting.pairs, parting.own
     if not len(own):
         return []
     n_lines = len(own)
@@ -158,17 +186,25 @@ def _line_blocks(
             variables += [angle[line][None], angle[line][None] + n_lines]
         if elastic:
             variables.append(inside[interval][None])
-        at = first + OF_CORNER * (here[number] + corner)
+        at = first + OF_CORNER * (places.body[number] + corner)
         told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
         kind = _corner_kind(pose, program.problem.n_states, program.dof, fixed, elastic)
         blocks.append(Blocks(kind, np.vstack(variables), np.array(told)))
     if not fixed:
-        pair, corner = np.nonzero(parting.facing.piece)
-        line = slot[parting.owner[pair]]
-        at = first + OF_CORNER * (there[pair] + corner)
-        told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
-        variables = [angle[line], angle[line] + n_lines]
-        blocks.append(Blocks(_piece_kind(), np.vstack(variables), np.array(told)))
+        for moves in (False, True):
+            which = (places.shift >= 0) == moves
+            pair, corner = np.nonzero(parting.facing.piece & which[:, None])
+            if not len(pair):
+                continue
+            line = slot[parting.owner[pair]]
+            at = first + OF_CORNER * (places.piece[pair] + corner)
+            told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+            variables = [angle[line], angle[line] + n_lines]
+            if moves:
+                at = first + places.shift[pair] + OF_SHIFT * corner
+                told += [at + k for k in range(OF_SHIFT)]
+                variables.append(np.full(len(pair), program.size - 1))
+            blocks.append(Blocks(_piece_kind(moves), np.vstack(variables), np.array(told)))
     return blocks
 
 
@@ -199,12 +235,15 @@ def _corner_kind(
 
 
 @functools.cache
-def _piece_kind() -> Kind:
-    """How far a corner of a piece reaches over a line."""
+def _piece_kind(moves: bool) -> Kind:
+    """How far a corner of a piece reaches over a line; one that moves shifts with the duration."""
     casadi = load_casadi()
-    line, given = casadi.SX.sym("line", 2), casadi.SX.sym("given", OF_LINE + OF_CORNER)
-    _, anchor_x, anchor_y, _, x, y, rounding = casadi.vertsplit(given)
-    angle, offset = casadi.vertsplit(line)
+    line = casadi.SX.sym("line", 2 + int(moves))
+    given = casadi.SX.sym("given", OF_LINE + OF_CORNER + OF_SHIFT * int(moves))
+    _, anchor_x, anchor_y, _, x, y, rounding, *shift = casadi.vertsplit(given)
+    angle, offset, *duration = casadi.vertsplit(line)
+    if moves:
+        x, y = x + shift[0] * duration[0], y + shift[1] * duration[0]
     beyond = casadi.cos(angle) * (x - anchor_x) + casadi.sin(angle) * (y - anchor_y)
     return kind_of(casadi, line, given, below=offset + rounding - beyond)
 
@@ -241,7 +280,12 @@ def solve_from(
     given = np.column_stack([apart.margins[own], lines.anchor, lines.angle])
     watcher = solver.watcher
     began = watcher.budget.elapsed
-    bounds = solver.bounds.copy()
+    bounds, corners = solver.bounds.copy(), solver.corners
+    if program.scene.movers:  # they are where the motion meets them, to first order
+        corners, _ = _corners(program, point, apart)
+        last = program.size - 1
+        near = duration * np.array([1.0 - WITHIN, 1.0 + WITHIN])
+        bounds[last] = np.clip(near, *bounds[last])
     if math.isfinite(trust):
         n_x = state.shape[1]
         for axis in (0, 1):
@@ -252,7 +296,7 @@ def solve_from(
     watcher.forget()
     answer = function(
         x0=np.clip(np.concatenate(first), *bounds.T),
-        p=np.concatenate([given.ravel(), solver.corners]),
+        p=np.concatenate([given.ravel(), corners]),
         lbx=bounds[:, 0],
         ubx=bounds[:, 1],
         lbg=solver.limits[:, 0],

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.optimal_control.movers import Mover, Pieces, pieces_during
 from maneuver_automaton.optimal_control.problem import Guess
 from maneuver_automaton.optimal_control.separation import BodyPart, Solid
 from maneuver_automaton.optimal_control.solution import SolveStatus
@@ -43,6 +45,7 @@ class Scene:
 
     parts: tuple[BodyPart, ...] = ()
     pieces: tuple[Solid, ...] = ()
+    movers: tuple[Mover, ...] = ()
     walls: tuple[tuple[float, float, float], ...] = ()  # (a, b, c): a x + b y <= c
 
     @property
@@ -50,10 +53,14 @@ class Scene:
         """Solids of all parts."""
         return [solid for part in self.parts for solid in part.solids]
 
-    @property
-    def both(self) -> tuple[list[Solid], list[Solid]]:
-        """Solids of the body, and of the obstacles."""
-        return self.body, list(self.pieces)
+    def during(self, durations: Array) -> Pieces:
+        """Pieces of the obstacles while a motion is driven, of which intervals last so long [s]."""
+        return _pieces_during(self, durations.tobytes() if self.movers else b"")
+
+
+@functools.lru_cache(maxsize=8)  # a round asks for the same ones several times
+def _pieces_during(scene: Scene, durations: bytes) -> Pieces:
+    return pieces_during(scene.pieces, scene.movers, np.frombuffer(durations))
 
 
 class Ends(NamedTuple):

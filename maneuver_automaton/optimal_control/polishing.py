@@ -13,8 +13,14 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.parting import pairs_near, parted
-from maneuver_automaton.optimal_control.polish_program import program_of
-from maneuver_automaton.optimal_control.polish_solver import Begin, Solver, solve_from, solver_of
+from maneuver_automaton.optimal_control.polish_program import Program, program_of
+from maneuver_automaton.optimal_control.polish_solver import (
+    WITHIN,
+    Begin,
+    Solver,
+    solve_from,
+    solver_of,
+)
 from maneuver_automaton.optimal_control.polish_values import (
     Answer,
     Ends,
@@ -31,6 +37,7 @@ TOO_DEEP = 0.2  # radii of the body inside obstacles from where fixed planes lea
 PRICE = 2.0  # of being inside obstacles, in durations of the guess per radius of the body
 FIXED_ROUNDS = 2  # solves with fixed planes: what comes out is a guess
 TRUST = 0.6  # share of the distance within which pairs have lines
+QUICKER = 1.0 - 0.99 * WITHIN  # share of the duration that is as quick as a solve may get
 TIGHT = 2e-3  # radii of the body: pieces nearer than this are held back by their line
 
 
@@ -99,7 +106,7 @@ def polish(
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
         if solver is None:
-            built = solver_of(program, apart, fixed=fixed_planes, price=price, budget=budget)
+            built = solver_of(program, point, apart, fixed=fixed_planes, price=price, budget=budget)
             if isinstance(built, float):
                 reason = f"no time was left: to build the program would take {built:.2g} s"
                 total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason=reason)
@@ -118,8 +125,13 @@ def polish(
         total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
         missed = pairs_near(program, found, MISSED * reach)
         far = float(np.abs(found.state[:, :2] - point.state[:, :2]).max())
+        held_back = program.scene.movers and found.durations.sum() < QUICKER * point.durations.sum()
         if trust > near and far > near and apart.lacks(missed):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
+            continue
+        if _comes_and_goes(program, point, found):
+            point, apart = found, parted(program, found, pairs_near(program, found, near))
+            solver, begin = None, Begin.NEARBY
             continue
         point = found
         if trust < near:
@@ -129,7 +141,7 @@ def polish(
         if apart is moved and not fixed_planes:
             apart = moved.split(program, point, TIGHT * reach)
         if apart is moved and moved.is_kept(program, point):
-            if far < 0.99 * trust:
+            if far < 0.99 * trust and not held_back:
                 total = total._replace(status=answer.status, reason=answer.reason)
                 break
         else:
@@ -137,6 +149,14 @@ def polish(
         if apart is not moved:
             solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
     return _polished(best, total, max(budget.elapsed - began, needed))
+
+
+def _comes_and_goes(program: Program, before: Point, after: Point) -> bool:
+    """Whether something is there in other intervals of one motion than of another one."""
+    if not program.scene.movers:
+        return False
+    here, there = (program.pieces(one).interval for one in (before, after))
+    return not np.array_equal(here, there)
 
 
 def _polished(point: Point, total: Answer, seconds: float) -> Polished:

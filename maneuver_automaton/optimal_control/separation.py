@@ -100,8 +100,12 @@ def near_pairs(
     pieces: Sequence[Solid],
     *,
     within: float,
+    during: IntArray | None = None,
 ) -> Pairs:
-    """Pairs that are nearer than `within` [m], from control points in numbers."""
+    """Pairs that are nearer than `within` [m], from control points in numbers.
+
+    `during` is the interval in which alone each piece counts; -1 for all, -2 for none.
+    """
     import shapely
 
     solid = _geometries([corners for corners, _ in pieces])
@@ -112,6 +116,9 @@ def near_pairs(
         hulls = _hulls(x, y)
         most = within + by + float(rounding.max(initial=0.0))
         interval, piece = tree.query(hulls, predicate="dwithin", distance=most)
+        if during is not None:
+            there = (during[piece] == -1) | (during[piece] == interval)
+            interval, piece = interval[there], piece[there]
         apart = shapely.distance(hulls[interval], solid[piece]) - by - rounding[piece]
         close = apart < within
         intervals.append(interval[close])
@@ -303,7 +310,7 @@ def facing(
 
 
 def _geometries(rings: Sequence[Array]) -> Any:
-    """Points, edges and polygons (n,) from their corners, those of as many corners at once."""
+    """Hulls (n,) of corners in any order: points, edges and polygons, of as many at once."""
     import shapely
 
     counts = np.array([len(ring) for ring in rings])
@@ -312,7 +319,9 @@ def _geometries(rings: Sequence[Array]) -> Any:
         which = np.flatnonzero(counts == count)
         corners = np.stack([rings[k] for k in which.tolist()])
         make = shapely.linestrings if count == 2 else shapely.polygons
-        found[which] = shapely.points(corners[:, 0]) if count == 1 else make(corners)
+        found[which] = (
+            shapely.points(corners[:, 0]) if count == 1 else shapely.convex_hull(make(corners))
+        )
     return found
 
 

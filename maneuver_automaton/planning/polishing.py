@@ -32,7 +32,7 @@ from maneuver_automaton.planning.polished_price import (
     polished_price,
 )
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
 from maneuver_automaton.refinement.guesses import course_guess, timed
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, simpler_problem
@@ -65,8 +65,8 @@ def why_not_polished(problem: Problem) -> str:
     """Why plans of a problem cannot be polished; empty if they can."""
     if problem.automaton.lattice is not None:
         return "the vehicle moves by the maneuvers of its library alone"
-    if problem.moves:
-        return "something moves"
+    if not problem.search.polish:
+        return "it is not asked for"
     unlimited = problem.horizon.time is None and problem.horizon.max_time is None
     if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
@@ -141,6 +141,8 @@ def _in_groups(
     """
     if known:
         yield from _by_goal(problem, _guesses(problem, known, paths, budget))
+    if problem.moves:
+        return  # a path knows nothing of time
     if is_led_by_paths(problem):
         yield from _by_goal(problem, guesses_along_paths(problem, budget))
 
@@ -149,7 +151,7 @@ def _guesses(
     problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
 ) -> Iterator[Aimed]:
     """Guesses along kinematic plans; where there are none, the plans that are known."""
-    if rests_at_both_ends(problem) and follows_paths(problem.automaton.model):
+    if rests_at_both_ends(problem) and follows_paths(problem.automaton.model) and not problem.moves:
         along = guesses_along_paths(problem, budget)
         first = next(along, None)
         if first is not None:
@@ -279,7 +281,11 @@ def polish_plans(
         goal=tuple(pose),
         goal_state=_end_state(problem.automaton, last),
         parts=_body_parts(problem),
-        obstacles=tuple(shape for one in problem.obstacles for shape in _shapes_of(one)),
+        obstacles=tuple(
+            shape for one in problem.obstacles if not moves(one) for shape in _shapes_of(one)
+        ),
+        movers=tuple(one for one in problem.obstacles if isinstance(one, Obstacle) and moves(one)),
+        start_time=problem.start_time,
         bounds=problem.bounds,
         margin=problem.margin,
         durations=admitted_durations(problem),

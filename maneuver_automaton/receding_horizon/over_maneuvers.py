@@ -244,6 +244,8 @@ class OverManeuvers:
         now, limit, problem = self.now, self.now.longest, self._onward()
         if problem is None:
             return None
+        if self.here.moves:  # a motion in one piece could not be left where something comes
+            problem = replace(problem, search=replace(problem.search, polish=False))
         result = planned(problem, time_limit=max(share * self._for_plans.left, 1e-3))
         if result.plan is None or result.goal_index is None:
             self.reason = f": {result.reason}"

@@ -8,18 +8,19 @@ the others only those that come close to the best. Whatever is found is closed: 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.collision import Shape
-from maneuver_automaton.collision.convex import pieces_seen_from
-from maneuver_automaton.groups import group_of
+from maneuver_automaton.collision import Obstacle, Shape
+from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from
+from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, SolveStatus
+from maneuver_automaton.optimal_control.movers import Mover
 from maneuver_automaton.optimal_control.polish_values import (
     LEAST_DURATION,
     MOST_DURATION,
@@ -64,6 +65,10 @@ class PolishTask:
         The body; without one, no obstacle counts.
     obstacles : tuple of Shape
         The static obstacles around it.
+    movers : tuple of Obstacle
+        Those that move.
+    start_time : float
+        When it starts, on their clock [s].
     bounds : Bounds
         Where the reference point may be.
     margin : float
@@ -79,6 +84,8 @@ class PolishTask:
     goal_state: tuple[float | None, ...]
     parts: tuple[BodyPart, ...] = ()
     obstacles: tuple[Shape, ...] = ()
+    movers: tuple[Obstacle, ...] = ()
+    start_time: float = 0.0  # [s]
     bounds: Bounds = field(default_factory=Bounds)
     margin: float = 0.0  # [m]
     durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
@@ -110,8 +117,21 @@ class PolishTask:
         return Scene(
             parts=self.parts,
             pieces=tuple((corners, by + self.margin) for corners, by in pieces),
+            movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
         )
+
+    def _movers_of(self, obstacle: Obstacle) -> Iterator[Mover]:
+        """The convex pieces of an obstacle that moves, seen from the start and its time."""
+        motion, origin, since = obstacle.motion, self.start[:3], self.start_time
+        assert motion is not None
+
+        def poses(times: Array) -> Array:
+            return np.asarray((SE2(origin).inverse() @ SE2(motion.at(since + times))).pose)
+
+        first, last = obstacle.presence
+        for corners, by in convex_pieces(obstacle.shape):
+            yield Mover(corners, by + self.margin, poses, (first - since, last - since))
 
     def _walls(self) -> list[tuple[float, float, float]]:
         cosine, sine = math.cos(self.start[2]), math.sin(self.start[2])
@@ -270,6 +290,8 @@ class _Polishing:
             if self.best is None or objective < NEAR * self.best.objective:
                 self._lines(number, rough)
         self._finer()
+        if self.task.movers:  # each interval is kept free of all that moves through it meanwhile
+            self._finer()
         return PolishResult(motion=self.best, reason="" if self.best else self.reason,
                             attempts=tuple(self.attempts))  # fmt: skip
 
@@ -296,7 +318,9 @@ class _Polishing:
         return self._left() >= 3.0 * max((one.seconds for one in last), default=0.0)
 
     def _rough(self, number: int, guess: Guess) -> Polished | None:
-        """Where a guess leads with fixed planes, or with fixed gears."""
+        """Where a guess leads with fixed planes, or with fixed gears; not where something moves."""
+        if self.task.movers:
+            return self._among_movers(number, guess)
         gears = gears_of(self.task.model, guess)
         shuffles = np.count_nonzero(np.diff(gears)) >= SHUFFLE
         unfinished: list[Polished] = []
@@ -327,6 +351,17 @@ class _Polishing:
                 self._consider(one)
         return None
 
+    def _among_movers(self, number: int, guess: Guess) -> Polished | None:
+        """Where a guess leads with free lines: the lines of what moves do not stand still."""
+        found = self._solve("lines", number, guess)
+        if not (found.is_feasible or self._is_over()):
+            out = self._solve("elastic", number, guess, elastic=True)
+            if out.status is SolveStatus.SOLVED and not self._is_over():
+                found = self._solve("lines", number, out.as_guess)
+        if found.is_feasible:
+            self._consider(found)
+        return None
+
     def _lines(self, number: int, rough: Polished) -> None:
         """Solve with free lines from the result of fixed planes, which is kept if that fails."""
         if not self._is_over():
@@ -348,6 +383,8 @@ class _Polishing:
         if not self._room_for([one for one in self.attempts if one.kind != "fixed planes"]):
             return
         count = math.ceil(len(raw.durations) / FINER)
+        if self.task.movers:
+            count = max(min(count, self.settings.nodes[1]), len(raw.durations) + 1)
         if count > self.settings.nodes[1]:
             return
         guess = Guess(
@@ -412,7 +449,9 @@ class _Polishing:
         Where it shuffles a little, one that does not is tried first. Where closing leads beyond a
         limit, it is solved once more with more room.
         """
-        gears = without_shuffles(self.task.model, found, SHUFFLED * self._reach)
+        gears = None
+        if not self.task.movers:  # whose places follow from an even pace
+            gears = without_shuffles(self.task.model, found, SHUFFLED * self._reach)
         if again and gears is not None and not self._is_over():
             steady = self._solve("gears", number, found.as_guess, gears=gears)
             worth = steady.objective < (1.0 + STEADY) * found.objective

@@ -269,6 +269,7 @@ def _search(part: SearchPart) -> SearchSettings:
         weight=part.weight,
         show_nodes=part.show_nodes,
         improve=part.improve,
+        polish=part.polish,
     )
 
 

@@ -320,6 +320,9 @@ class SearchPart(Part):
     improve: bool = Field(
         True, description="look for better plans once there is one; false: return the first"
     )
+    polish: bool = Field(
+        True, description="with inertia: motions that the library does not have; false: none"
+    )
 
 
 class PushPart(Part):

@@ -273,6 +273,7 @@ def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
             weight=search.weight,
             show_nodes=search.show_nodes or None,
             improve=None if search.improve else False,
+            polish=None if search.polish else False,
         ),
     }
 

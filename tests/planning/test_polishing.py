@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from maneuver_automaton.automaton.stock import load_stock_library
-from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.budget import UNLIMITED
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.planning.polishing import guess_of_plan, polish_plans
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.receding_horizon import simulate
 from tests.inertia import resting
 from tests.search.cases import compiled_only
 
@@ -93,3 +97,77 @@ def test_a_body_of_several_parts_is_polished_between_posts():
     assert result.plan.word == ("polished",)
     assert result.audit.passed
     assert result.cost < unpolished(problem).cost
+
+
+ROBOT = load_stock_library("second_order_unicycle")
+ENDS = ([0.0, 0.0, 0.0], [4.0, 0.0, 0.0])
+
+
+def posed(*obstacles, **more):
+    more = {"footprint": Disc(0.3), "search": WORK} | more
+    return Problem(ROBOT, *ENDS, obstacles=obstacles, **more)
+
+
+def crossing(since=0.0):
+    motion = Motion([since, since + 8.0], [[2.0, -2.0, 0.0], [2.0, 2.0, 1.0]])
+    return Obstacle(Box([0.8, 0.6]), motion=motion)
+
+
+def test_plans_past_what_moves_are_polished():
+    result, plain = plan(posed(crossing()), time_limit=60.0), unpolished(posed(crossing()))
+    assert result.plan.word == ("polished",)
+    assert result.audit.passed
+    assert result.cost < plain.cost
+    words = plan(posed(crossing(), search=replace(WORK, polish=False)), time_limit=60.0)
+    assert words.plan.word == plain.plan.word
+
+
+def test_a_moved_scene_and_a_later_start_have_the_moved_polished_plan():
+    here, by = plan(posed(crossing()), time_limit=60.0), SE2([-30.0, 12.0, 2.2])
+    moved = plan(posed(crossing()).moved(by), time_limit=60.0)
+    later = plan(posed(crossing(100.0), start_time=100.0), time_limit=60.0)
+    for other in (moved, later):
+        assert other.cost == pytest.approx(here.cost, abs=1e-6)
+    np.testing.assert_allclose((by @ SE2(here.plan.end)).pose, moved.plan.end, atol=1e-6)
+
+
+def test_what_moves_but_stays_is_polished_as_what_stands():
+    stays = Obstacle(Box([0.8, 0.6]), motion=Motion([0.0, 9.0], [[2.0, 0.2, 0.5]] * 2))
+    stands = Obstacle(Box([0.8, 0.6], [2.0, 0.2], 0.5))
+    one, other = (plan(posed(each), time_limit=60.0) for each in (stays, stands))
+    assert one.plan.word == ("polished",)
+    assert one.cost == pytest.approx(other.cost, rel=2e-3)
+
+
+def test_behind_a_wall_that_drives_ahead_it_arrives_as_soon_as_on_paper():
+    """Where it is as slow as the wall it touches that, and brakes to the goal from there."""
+    wall = Motion([0.0, 40.0], [[1.0, 0.0, 0.0], [11.0, 0.0, 0.0]])
+    problem = posed(Obstacle(Box([0.2, 12.0]), motion=wall))
+    speed, brake = 0.25, ROBOT.model.control_limits[0, 1]
+    touches = 4.0 - 0.5 * speed * speed / brake + 0.3
+    least = (touches - 0.9) / speed + speed / brake
+    result, found = plan(problem, time_limit=60.0), []
+    assert result.audit.passed
+    assert least - 1e-6 <= result.cost < least + 0.05
+    # From another plan, polishing comes to the same: an interval lasts 0.05 s in the end.
+    slower = replace(problem, horizon=Horizon(time=least + 2.0))
+    guess = guess_of_plan(plan(slower, time_limit=60.0).plan)
+    polish_plans(problem, [guess], 0, None, budget=UNLIMITED, accepts=lambda p: not found.append(p))
+    assert least - 1e-6 <= found[-1].duration < least + 0.06
+
+
+def test_what_comes_and_goes_leaves_the_plan_as_it_is_or_better():
+    gate = Obstacle(Box([0.2, 12.0], [2.0, 0.0]), present_s=(0.0, 11.0))
+    problem = posed(gate, search=SearchSettings(max_expansions=2000))
+    result = plan(problem, time_limit=60.0)
+    assert result.audit.passed
+    least = 11.0 + 2.4 / 0.5 + 1.0  # at full speed through the gate as it opens, then it brakes
+    assert least <= result.cost <= unpolished(problem).cost
+
+
+def test_in_closed_loop_past_what_moves_no_motion_of_one_piece_is_driven():
+    loop = simulate(posed(crossing()), step=0.5, steps=40, time_limit=60.0)
+    assert loop.reached
+    known = {maneuver.name for maneuver in ROBOT.maneuvers}
+    for step in loop.steps:
+        assert all(one is None or one.name in known for one in step.plan.maneuvers)
