@@ -92,6 +92,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads import RoadScene as RoadScene
     from maneuver_automaton.roads import RoadVehicle as RoadVehicle
     from maneuver_automaton.roads import drive_road as drive_road
+    from maneuver_automaton.roads import drive_roads as drive_roads
     from maneuver_automaton.roads import plan_road as plan_road
     from maneuver_automaton.roads import plan_roads as plan_roads
     from maneuver_automaton.scenario import FleetScenario as FleetScenario
@@ -155,6 +156,7 @@ _HOMES = {
     "design_library": "design",
     "disperse_library": "design",
     "drive_road": "roads",
+    "drive_roads": "roads",
     "load_library": "automaton.library",
     "load_map": "formats.maps",
     "load_plan": "formats.plan_json",

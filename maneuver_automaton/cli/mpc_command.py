@@ -52,7 +52,11 @@ class Settings:
 def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Close the loop of one problem into the folder `out`, print it, return the exit code."""
     if road_command.is_road(path):
-        return road_command.drive_file(path, out, settings=settings, parts=parts)
+        from maneuver_automaton.cli import road_fleets
+
+        of_one = not road_fleets.states_several(path, parts)
+        drive = road_command.drive_file if of_one else road_fleets.drive_file
+        return drive(path, out, settings=settings, parts=parts)
     from maneuver_automaton.scenario import FleetScenario
 
     scenario = problem_of(path, parts)

@@ -28,7 +28,9 @@ def fleet_planned(path: Path, document: Mapping[str, Any], parts: Parts) -> Flee
 
     file, its = source_of(path, document, parts)
     if is_road(file):
-        raise InvalidScenario(f"{path}: holds plans on the road of {file}, which only export reads")
+        raise InvalidScenario(
+            f"{path}: is of several vehicles on the road of {file}, whose plans only export reads"
+        )
     scenario = problem_of(file, its)
     if not isinstance(scenario, FleetScenario):
         raise InvalidScenario(f"{path}: holds plans of several vehicles, but {file} states one")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,9 @@ from maneuver_automaton.formats.plan_json import (
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.roads import (
     RoadDrive,
+    RoadFleetDrive,
     RoadFleetResult,
+    RoadPair,
     RoadPlanner,
     RoadPlanResult,
     RoadStep,
@@ -80,15 +83,42 @@ def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> 
             "between": _number(result.distance_m),
             "to_obstacles": _number(min((one.clearance_m for one in verdicts), default=math.inf)),
         },
-        "closest": [
-            {"pair": list(one.pair), "time_s": one.time_s, "distance_m": one.distance_m}
-            for one in result.pairs
-        ],
+        "closest": _closest(result.pairs),
         "order": list(result.order),
         "timing_s": {"search": result.search_s},
         "vehicles": {
             name: road_plan_to_dict(one) | {"name": name} for name, one in result.results.items()
         },
+    }
+
+
+def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> dict[str, Any]:
+    """The content of closed_loop.json for several vehicles on one road."""
+    vehicles = {
+        name: road_drive_to_dict(one, before=drive.before.results[name]) | {"name": name}
+        for name, one in drive.results.items()
+    }
+    driven = drive.plans.values()
+    rows = drive.results.values()
+    return {
+        "schema": SCHEMA,
+        "version": package_version(),
+        "kind": FLEET,
+        "name": drive.name,
+        "status": drive.status,
+        "reason": drive.reason,
+        "reached": drive.reached,
+        "cost": math.fsum(one["cost"] for one in vehicles.values()),
+        "duration_s": max((plan.duration for plan in driven), default=0.0),
+        "last_s": max((plan.start_time + plan.duration for plan in driven), default=0.0),
+        "planned_before_s": drive.before.search_s,
+        "clearance_m": {
+            "between": _number(drive.distance_m),
+            "to_obstacles": _number(min(one.verdict.clearance_m for one in rows)),
+        },
+        "closest": _closest(drive.pairs),
+        "collisions": sum(one.verdict.collisions for one in rows),
+        "vehicles": vehicles,
     }
 
 
@@ -134,6 +164,13 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
             },
         ],
     }
+
+
+def _closest(pairs: Sequence[RoadPair]) -> list[dict[str, Any]]:
+    return [
+        {"pair": list(one.pair), "time_s": one.time_s, "distance_m": one.distance_m}
+        for one in pairs
+    ]
 
 
 def _primitives(plan: Plan | None) -> list[dict[str, Any]]:

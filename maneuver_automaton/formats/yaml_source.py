@@ -19,6 +19,8 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.text_source import MAX_BYTES, too_long
 
 MAX_DEPTH = 40
+NESTED = f"lists and mappings are nested more than {MAX_DEPTH} deep"
+TOO_DEEP = "exceeded maximum nesting depth"  # what libyaml says of it
 MAX_COPIED = 10_000  # values that aliases may add to those that are written
 MAX_SHOWN = 60  # characters of a value that a message shows
 
@@ -137,6 +139,8 @@ def parse(text: str, *, name: str, what: str = "a scenario") -> Document:
         mark = error.problem_mark or error.context_mark
         line = f":{mark.line + 1}" if mark else ""
         said = _problem(error, text.splitlines()[mark.line :] if mark else [])
+        if TOO_DEEP in said:  # more than libyaml itself reads
+            raise InvalidScenario(f"{name}{line}: {NESTED}") from error
         raise InvalidScenario(f"{name}{line}: not valid YAML: {said}") from error
     except (yaml.YAMLError, UnicodeEncodeError) as error:
         said = " ".join(str(error).split())
@@ -200,7 +204,7 @@ class _Builder:
         if self._awaits_key():
             raise self._error(line, "a list or mapping is used as a key, need a word")
         if len(self.stack) >= MAX_DEPTH:
-            raise self._error(line, f"lists and mappings are nested more than {MAX_DEPTH} deep")
+            raise self._error(line, NESTED)
         value: Any = [] if isinstance(event, yaml.SequenceStartEvent) else {}
         self.stack.append(_Unfinished(value, self._next_place(), line, event.anchor, self.nodes))
         self.nodes += 1

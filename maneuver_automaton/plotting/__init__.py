@@ -73,6 +73,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.progress import draw_progress as draw_progress
     from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
     from maneuver_automaton.plotting.road_fleets import (
+        save_road_fleet_animation as save_road_fleet_animation,
+    )
+    from maneuver_automaton.plotting.road_fleets import (
         save_road_fleet_figure as save_road_fleet_figure,
     )
     from maneuver_automaton.plotting.roads import draw_road as draw_road
@@ -138,6 +141,7 @@ _HOMES = {
     "player_of_file": "player",
     "draw_progress": "progress",
     "save_progress_figure": "progress",
+    "save_road_fleet_animation": "road_fleets",
     "save_road_fleet_figure": "road_fleets",
     "draw_road": "roads",
     "save_road_animation": "roads",

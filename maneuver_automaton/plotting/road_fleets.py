@@ -1,17 +1,22 @@
-"""The picture of several vehicles on one road: all of them in the plane, and their speeds."""
+"""Pictures of several vehicles on one road: all of them in the plane, and their speeds; films."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.text import Text
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import INK, Color, fleet_colors
+from maneuver_automaton.plotting.film import Film, picture_times, write_film
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.plotting.pages import (
@@ -33,25 +38,28 @@ from maneuver_automaton.plotting.roads import (
     MOMENTS,
     PANEL,
     RIGHT,
+    bodies_at,
     draw_drive,
     draw_surroundings,
     road_box,
     set_road_view,
 )
 from maneuver_automaton.plotting.style import line_handle, tidy
-from maneuver_automaton.roads import RoadFleetResult, RoadScene, RoadVehicle
+from maneuver_automaton.roads import RoadFleetDrive, RoadFleetResult, RoadScene, RoadVehicle
 
 BETWEEN = 0.62  # [in] between the plane and the speeds
 
+AnyRoadFleet = RoadFleetResult | RoadFleetDrive
+
 
 def save_road_fleet_figure(
-    result: RoadFleetResult, vehicle: RoadVehicle, path: str | Path, *, look: Look | None = None
+    result: AnyRoadFleet, vehicle: RoadVehicle, path: str | Path, *, look: Look | None = None
 ) -> None:
     """Write the picture of several drives: a colour for each, bodies at times that all share.
 
     Parameters
     ----------
-    result : RoadFleetResult
+    result : RoadFleetResult or RoadFleetDrive
         At least one has a plan.
     vehicle : RoadVehicle
     path : str or Path
@@ -66,10 +74,93 @@ def save_road_fleet_figure(
     OSError
         If the file cannot be written.
     """
+    page = _page(result, vehicle, look or Look(title=result.name), under=BETWEEN + PANEL)
+    plans, colors, plane = result.plans, page.colors, page.plane
+    speed = axes_at(page.figure, left=LEFT, bottom=page.bottom, width=page.inner, height=PANEL)
+    moments = np.linspace(*page.span, MOMENTS)
+    draw_surroundings(plane, page.others, moments.tolist())
+    for name, plan in plans.items():
+        begin, end = plan.start_time, plan.start_time + plan.duration
+        there = moments[(moments >= begin) & (moments <= end)]
+        times = [*there.tolist(), *([end] if there.size == 0 or there[-1] < end else [])]
+        draw_drive(plane, vehicle, plan, times, color=colors[name])
+        plane.add_collection(_goals(page.scenes[name], colors[name]), autolim=False)
+        _draw_speed(speed, result, name, colors[name])
+    set_road_view(plane, *page.corners)
+    tidy(speed, x="time [s]", y="speed [m/s]")
+    write_figure(page.figure, path)
+
+
+def save_road_fleet_animation(
+    result: AnyRoadFleet, vehicle: RoadVehicle, path: str | Path, *, look: Look | None = None
+) -> None:
+    """Write a moving picture of several drives, by its ending .gif or .mp4.
+
+    Parameters
+    ----------
+    result : RoadFleetResult or RoadFleetDrive
+        At least one has a plan.
+    vehicle : RoadVehicle
+    path : str or Path
+        Where to write.
+    look : Look, optional
+        Title, size and style.
+
+    Raises
+    ------
+    ValueError
+        If nobody has a plan, or the ending is another one.
+    OSError
+        If the file cannot be written.
+    """
+    page = _page(result, vehicle, look or Look(title=result.name), under=0.0)
+    plane, others = page.plane, page.others
+    _, _, traffic = draw_surroundings(plane, others, [])
+    bodies = {}
+    for name, plan in result.plans.items():
+        bodies[name], _ = draw_drive(plane, vehicle, plan, [], color=page.colors[name])
+        plane.add_collection(_goals(page.scenes[name], page.colors[name]), autolim=False)
+    set_road_view(plane, *page.corners)
+    clock: Text = plane.text(
+        0.01, 0.98, "", transform=plane.transAxes, va="top", fontsize=9.0, color=INK, zorder=9.0
+    )
+
+    def show(time: float) -> None:
+        here = others.present(time)
+        traffic.set_paths([shape_path(one.at(time)) for one in here])
+        traffic.set_facecolor([SOLID if one.motion is None else MOVING for one in here])
+        for name, body in bodies.items():
+            plan = result.plans[name]
+            there = plan.start_time <= time <= plan.start_time + plan.duration
+            body.set_verts(bodies_at(vehicle, plan.pose_at([time])) if there else [])
+            body.set_facecolor([page.colors[name]])
+        clock.set_text(f"{time:.1f} s")
+
+    times = picture_times(*page.span)
+    moving = (traffic, *bodies.values(), clock)
+    film = Film(figure=page.figure, moving=moving, show=show, times=times, samples=[page.span[0]])
+    write_film(film, path)
+
+
+class _Page(NamedTuple):
+    """A figure with axes for the plane, and what is drawn there."""
+
+    figure: Figure
+    plane: Axes
+    colors: dict[str, Color]
+    scenes: dict[str, RoadScene]
+    others: RoadScene  # the road and all that is there besides
+    corners: tuple[Array, Array]
+    span: tuple[float, float]  # [s]
+    bottom: float  # [in]
+    inner: float  # [in]
+
+
+def _page(result: AnyRoadFleet, vehicle: RoadVehicle, look: Look, *, under: float) -> _Page:
+    """The page, with so much room `under` the plane [in]."""
     plans = result.plans
     if not plans:
         raise ValueError("road fleet: nobody has a plan, there is nothing to draw")
-    look = look or Look(title=result.name)
     colors = dict(zip(result.results, fleet_colors(len(result.results)), strict=True))
     scenes = {name: result.results[name].planner.scene for name in plans}
     boxes = [road_box(scenes[name], vehicle, plan) for name, plan in plans.items()]
@@ -81,27 +172,16 @@ def save_road_fleet_figure(
     lines = title_lines(look, inner, _headline(result))
     top, bottom = heading_height(lines) + 0.1, 0.6 + 0.2 * legend_rows(names, inner)
     height = float(np.clip(inner * (high - low)[1] / (high - low)[0], FLATTEST, HIGHEST))
-    figure = new_figure(look.width, top + height + BETWEEN + PANEL + bottom)
+    figure = new_figure(look.width, top + height + under + bottom)
     heading_text(figure, lines, left=LEFT)
     bottom_legend(figure, handles, names, left=LEFT, width=inner)
-    speed = axes_at(figure, left=LEFT, bottom=bottom, width=inner, height=PANEL)
-    plane = axes_at(figure, left=LEFT, bottom=bottom + PANEL + BETWEEN, width=inner, height=height)
-    begins = [plan.start_time for plan in plans.values()]
-    ends = [plan.start_time + plan.duration for plan in plans.values()]
-    moments = np.linspace(min(begins), max(ends), MOMENTS)
-    draw_surroundings(plane, others, moments.tolist())
-    for (name, plan), begin, end in zip(plans.items(), begins, ends, strict=True):
-        there = moments[(moments >= begin) & (moments <= end)]
-        times = [*there.tolist(), *([end] if there.size == 0 or there[-1] < end else [])]
-        draw_drive(plane, vehicle, plan, times, color=colors[name])
-        plane.add_collection(_goals(scenes[name], colors[name]), autolim=False)
-        _draw_speed(speed, result, name, colors[name])
-    set_road_view(plane, low, high)
-    tidy(speed, x="time [s]", y="speed [m/s]")
-    write_figure(figure, path)
+    plane = axes_at(figure, left=LEFT, bottom=bottom + under, width=inner, height=height)
+    begin = min(plan.start_time for plan in plans.values())
+    end = max(plan.start_time + plan.duration for plan in plans.values())
+    return _Page(figure, plane, colors, scenes, others, (low, high), (begin, end), bottom, inner)
 
 
-def _draw_speed(ax: Axes, result: RoadFleetResult, name: str, color: Color) -> None:
+def _draw_speed(ax: Axes, result: AnyRoadFleet, name: str, color: Color) -> None:
     driven = result.plans[name].sample()
     ax.plot(driven.time, driven.reduced_state[:, 0], color=color, linewidth=1.4)
 
@@ -123,7 +203,7 @@ def _goals(scene: RoadScene, color: Color) -> PathCollection:
     )  # fmt: skip
 
 
-def _headline(result: RoadFleetResult) -> str:
+def _headline(result: AnyRoadFleet) -> str:
     found, count = len(result.plans), len(result.results)
     parts = [f"{found} of {count} with a plan" if found < count else f"{count} vehicles"]
     if result.pairs:
@@ -133,7 +213,7 @@ def _headline(result: RoadFleetResult) -> str:
 
 
 def _entries(
-    result: RoadFleetResult, others: RoadScene, colors: dict[str, Color]
+    result: AnyRoadFleet, others: RoadScene, colors: dict[str, Color]
 ) -> tuple[list[Artist], list[str]]:
     """Handles and names of the vehicles, of lanes and of what else is there."""
     handles: list[Artist] = [line_handle(colors[name], width=3.4) for name in result.plans]

@@ -113,7 +113,7 @@ def draw_drive(
 ) -> tuple[PolyCollection, LineCollection]:
     """A vehicle at some times [s], the later the darker, and the path of its middle."""
     bodies = PolyCollection(
-        _bodies(vehicle, plan.pose_at(moments)),
+        bodies_at(vehicle, plan.pose_at(moments)),
         facecolors=[shaded(color, _haze(k, len(moments))) for k in range(len(moments))],
         edgecolors=["white"],
         linewidths=0.6,
@@ -214,7 +214,7 @@ def save_road_animation(
         here = scene.present(time)
         drawn.traffic.set_paths([shape_path(one.at(time)) for one in here])
         drawn.traffic.set_facecolor([SOLID if one.motion is None else MOVING for one in here])
-        drawn.bodies.set_verts(_bodies(vehicle, plan.pose_at([time])))
+        drawn.bodies.set_verts(bodies_at(vehicle, plan.pose_at([time])))
         drawn.bodies.set_facecolor([EGO])
         clock.set_text(f"{time:.1f} s")
 
@@ -308,7 +308,8 @@ def _goal_paths(goals: Sequence[GoalRegion]) -> PathCollection:
     )
 
 
-def _bodies(vehicle: RoadVehicle, poses: Array) -> list[Array]:
+def bodies_at(vehicle: RoadVehicle, poses: Array) -> list[Array]:
+    """Corners of a vehicle at poses (n, 3) of its rear axle."""
     corners = vehicle.footprint.corners
     return [np.asarray(SE2(pose).act(corners)) for pose in poses]
 

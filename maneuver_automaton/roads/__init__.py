@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads.several import RoadFleetResult as RoadFleetResult
     from maneuver_automaton.roads.several import RoadPair as RoadPair
     from maneuver_automaton.roads.several import plan_roads as plan_roads
+    from maneuver_automaton.roads.several_driving import RoadFleetDrive as RoadFleetDrive
+    from maneuver_automaton.roads.several_driving import drive_roads as drive_roads
     from maneuver_automaton.roads.single_plan import RoadPlanResult as RoadPlanResult
     from maneuver_automaton.roads.single_plan import drive_road as drive_road
     from maneuver_automaton.roads.single_plan import plan_before as plan_before
@@ -48,6 +50,8 @@ _HOMES = {
     "RoadFleetResult": "several",
     "RoadPair": "several",
     "plan_roads": "several",
+    "RoadFleetDrive": "several_driving",
+    "drive_roads": "several_driving",
     "RoadPlanResult": "single_plan",
     "drive_road": "single_plan",
     "plan_before": "single_plan",

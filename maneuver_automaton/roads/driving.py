@@ -20,6 +20,7 @@ from maneuver_automaton.roads.decision import RoadDecision
 from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.missed import nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner
+from maneuver_automaton.roads.scene import RoadScene
 
 LONGEST = 60.0  # [s] of a drive whose goal has no last time
 
@@ -100,36 +101,70 @@ def drive_scene(
     progress : callable, optional
         Called with the number of each step that is done.
     """
-    last = planner.last_tick
-    longest = math.ceil(LONGEST / planner.tick) if math.isinf(planner.scene.last_time) else last
-    limit = min(longest if steps is None else steps, last)
-    state, tail = planner.start_state, first
-    done: list[RoadStep] = []
-    tick = 0
+    driver = Driver(planner, first, steps)
     with patient():
         planner.warm()
-        while not (planner.at_goal(state, tick=tick) or tick >= limit or stopped()):
-            done.append(_step(planner, state, tick=tick, tail=tail))
-            decision = done[-1].decision
-            state = _state_after(planner, state, decision.controls[0])
-            tick, tail = tick + 1, decision.tail()
+        while not (driver.is_done or stopped()):
+            driver.step(planner)
             if progress is not None:
-                progress(tick)
-    reached = planner.at_goal(state, tick=tick)
-    states = np.array([*(step.state for step in done), state])
-    status, reason = _ending(planner, states, stood=_stood(done), reached=reached)
-    reason += ", when the drive was interrupted" if stopped() and not reached else ""
-    applied = np.array([step.control for step in done]).reshape(-1, 2)
-    driven = planner.plan_of(planner.start_state, applied)
-    return RoadDrive(
-        planner=planner,
-        steps=tuple(done),
-        driven=driven,
-        reached=reached,
-        status=status,
-        reason=reason,
-        verdict=judged(planner.scene, planner.vehicle, driven),
-    )
+                progress(driver.tick)
+    return driver.drive(planner.scene)
+
+
+class Driver:
+    """A vehicle along its drive: where it is, and what it does next if nothing better is found."""
+
+    def __init__(
+        self, planner: RoadPlanner, first: RoadDecision | None, steps: int | None = None
+    ) -> None:
+        last = planner.last_tick
+        longest = math.ceil(LONGEST / planner.tick) if math.isinf(planner.scene.last_time) else last
+        self.planner = planner
+        self.limit = min(longest if steps is None else steps, last)
+        self.state = planner.start_state
+        self.tail = first
+        self.tick = 0
+        self.done: list[RoadStep] = []
+
+    @property
+    def reached(self) -> bool:
+        """Whether it is at a goal."""
+        return self.planner.at_goal(self.state, tick=self.tick)
+
+    @property
+    def is_done(self) -> bool:
+        """Whether it is at a goal, or there are no steps left."""
+        return self.reached or self.tick >= self.limit
+
+    def step(self, planner: RoadPlanner) -> None:
+        """Decide as a planner says, which knows the traffic of now, and drive a tick."""
+        self.done.append(_step(planner, self.state, tick=self.tick, tail=self.tail))
+        decision = self.done[-1].decision
+        self.state = _state_after(planner, self.state, decision.controls[0])
+        self.tick, self.tail = self.tick + 1, decision.tail()
+
+    @property
+    def driven(self) -> Plan:
+        """All that it drove, in the coordinates and on the clock of the scene."""
+        applied = np.array([step.control for step in self.done]).reshape(-1, 2)
+        return self.planner.plan_of(self.planner.start_state, applied)
+
+    def drive(self, scene: RoadScene) -> RoadDrive:
+        """The drive, judged among the traffic of a scene."""
+        planner, reached = self.planner, self.reached
+        states = np.array([*(step.state for step in self.done), self.state])
+        status, reason = _ending(planner, states, stood=_stood(self.done), reached=reached)
+        reason += ", when the drive was interrupted" if stopped() and not reached else ""
+        driven = self.driven
+        return RoadDrive(
+            planner=planner,
+            steps=tuple(self.done),
+            driven=driven,
+            reached=reached,
+            status=status,
+            reason=reason,
+            verdict=judged(scene, planner.vehicle, driven),
+        )
 
 
 def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision | None) -> RoadStep:

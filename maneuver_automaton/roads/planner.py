@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import (
     _kernels_beam,
@@ -21,13 +23,14 @@ from maneuver_automaton.roads import (
     _kernels_motion,
 )
 from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
+from maneuver_automaton.roads._kernels_free import Clearing
 from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.polishing import ROUND, polished_controls
 from maneuver_automaton.roads.route import Route, route_of
-from maneuver_automaton.roads.scene import RoadScene
+from maneuver_automaton.roads.scene import RoadScene, moved_obstacle
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
     goal_arrays,
@@ -108,6 +111,16 @@ class RoadPlanner:
         """A planner like this one with another width of its search."""
         settings = replace(self.settings, width=width)
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
+
+    def past(self, others: Sequence[Obstacle]) -> RoadPlanner:
+        """A planner like this one, among other road users besides, that move."""
+        scene = replace(self.scene, traffic=(*self.scene.traffic, *others))
+        back = SE2(self.frame).inverse()
+        more = tuple(moved_obstacle(one, back, digits=DIGITS) for one in others)
+        local = replace(self.local, traffic=(*self.local.traffic, *more))
+        clearing = _clearing(local, self.vehicle, self.settings, tick=self.tick)
+        horizon = self.horizon._replace(clearing=clearing)
+        return replace(self, scene=scene, local=local, horizon=horizon)
 
     def warm(self) -> None:
         """Compile the kernels and touch the room, before time counts."""
@@ -280,18 +293,8 @@ def road_planner(
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)
-    last = scene.last_time if math.isfinite(scene.last_time) else scene.start.time + 60.0
-    lasting = last - scene.start.time + settings.horizon_s + LONGEST_STOP
-    clearing = clearing_of(
-        local,
-        vehicle,
-        tick=tick,
-        last_tick=math.ceil(lasting / tick),
-        off_edge=settings.off_edge_m,
-        off_traffic=settings.off_traffic_m,
-    )
     horizon = Horizon(
-        clearing=clearing,
+        clearing=_clearing(local, vehicle, settings, tick=tick),
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
@@ -310,4 +313,20 @@ def road_planner(
         library=library,
         horizon=horizon,
         room=beam_arrays(settings, library),
+    )
+
+
+def _clearing(
+    local: RoadScene, vehicle: RoadVehicle, settings: RoadSettings, *, tick: float
+) -> Clearing:
+    """What has to be kept clear of, until the last stop."""
+    begin = local.start.time
+    last = local.last_time if math.isfinite(local.last_time) else begin + 60.0
+    return clearing_of(
+        local,
+        vehicle,
+        tick=tick,
+        last_tick=math.ceil((last - begin + settings.horizon_s + LONGEST_STOP) / tick),
+        off_edge=settings.off_edge_m,
+        off_traffic=settings.off_traffic_m,
     )

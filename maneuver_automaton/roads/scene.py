@@ -124,7 +124,7 @@ class RoadScene:
                 )
                 for goal in self.goals
             ),
-            traffic=tuple(_near_obstacle(one.moved(by), digits) for one in self.traffic),
+            traffic=tuple(moved_obstacle(one, by, digits=digits) for one in self.traffic),
         )
 
 
@@ -143,7 +143,9 @@ def _near_shape(shape: Shape, digits: int | None) -> Shape:
     return Polygon(rings[0], rings[1:])
 
 
-def _near_obstacle(one: Obstacle, digits: int | None) -> Obstacle:
+def moved_obstacle(one: Obstacle, by: SE2, *, digits: int | None = None) -> Obstacle:
+    """A road user moved by a planar pose; its numbers rounded to `digits` if given."""
+    one = one.moved(by)
     if one.motion is None:
         return replace(one, shape=_near_shape(one.shape, digits))
     return replace(one, motion=replace(one.motion, pose=_near(one.motion.pose, digits)))

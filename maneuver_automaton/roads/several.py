@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.audit import closest_to
@@ -129,7 +130,7 @@ def plan_roads(
     return RoadFleetResult(
         name=name,
         results=checked,
-        pairs=_pairs(vehicle, checked),
+        pairs=nearest_pairs(vehicle, {k: one.plan for k, one in checked.items() if one.plan}),
         order=last,
         search_s=time.perf_counter() - begin,
     )
@@ -154,12 +155,20 @@ def _in_order(
 
 
 def _seen_by_others(vehicle: RoadVehicle, plan: Plan, name: str) -> Obstacle:
-    """A plan as a road user for those that are planned after it, a little larger than it is."""
+    """A plan as a road user for those that are planned after it."""
     steps = max(math.ceil(plan.duration / SAMPLE_S), 1)
     times = np.linspace(plan.start_time, plan.start_time + plan.duration, steps + 1)
+    return seen_by_others(vehicle, times, plan.pose_at(times), name)
+
+
+def seen_by_others(vehicle: RoadVehicle, times: Array, poses: Array, name: str) -> Obstacle:
+    """What a vehicle is going to do as a road user for others, a little larger than it is.
+
+    It is there between the first and the last of the times (n,) [s] of its poses (n, 3).
+    """
     size = [vehicle.length + 2.0 * ROOM, vehicle.width + 2.0 * ROOM]
     body = Box(size, [vehicle.ahead, 0.0])
-    return Obstacle(body, motion=Motion(times, plan.pose_at(times)), name=name)
+    return Obstacle(body, motion=Motion(times, poses), name=name)
 
 
 def driving(vehicle: RoadVehicle, plan: Plan, name: str) -> Obstacle:
@@ -193,11 +202,11 @@ def _checked(
         kept[worst] = replace(kept[worst], plan=None, verdict=None, reason=reason)
 
 
-def _pairs(vehicle: RoadVehicle, results: Mapping[str, RoadPlanResult]) -> tuple[RoadPair, ...]:
+def nearest_pairs(vehicle: RoadVehicle, plans: Mapping[str, Plan]) -> tuple[RoadPair, ...]:
     """Least distances of those that are there at once, by the audit's bounds."""
-    rows, plans = [], [(n, one.plan) for n, one in results.items() if one.plan is not None]
-    for k, (name, plan) in enumerate(plans):
-        for other, its in plans[k + 1 :]:
+    rows, named = [], [*plans.items()]
+    for k, (name, plan) in enumerate(named):
+        for other, its in named[k + 1 :]:
             body = driving(vehicle, its, other)
             least = closest_to(
                 plan,

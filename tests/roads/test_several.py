@@ -6,6 +6,7 @@ import itertools
 import json
 import math
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from maneuver_automaton.cli import run
 from maneuver_automaton.formats import load_plans
 from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads import RoadVehicle, judged, plan_roads
+from maneuver_automaton.roads import RoadVehicle, drive_roads, judged, plan_roads
 from maneuver_automaton.roads.several import driving
 from tests.roads.files import GOAL, LANES, car, commonroad, problem
 
@@ -108,6 +109,58 @@ def test_who_has_no_plan_is_told(folder, capsys):
     assert capsys.readouterr().err.startswith("road.xml: partial: 10")
 
 
+class TestLoop:
+    def test_nobody_comes_near_another(self, folder):
+        scenes, vehicle = scenes_of("road.xml"), RoadVehicle()
+        drive = drive_roads(scenes)
+        assert drive.reached
+        assert not drive.reason
+        slow = least_by_shapely(drive.plans.values())
+        assert 0.15 < drive.distance_m <= slow <= drive.distance_m + 0.05
+        for name, one in drive.results.items():
+            assert one.verdict.clean
+            others = [driving(vehicle, p, n) for n, p in drive.plans.items() if n != name]
+            past = replace(scenes[name], traffic=(*scenes[name].traffic, *others))
+            assert judged(past, vehicle, one.driven).clean
+
+    def test_a_moved_road_has_the_moved_loop(self, folder):
+        by = SE2(np.array([30.0, -20.0, 1.1]))
+        scenes = scenes_of("road.xml")
+        one = drive_roads(scenes)
+        other = drive_roads({name: scene.moved(by) for name, scene in scenes.items()})
+        for name, plan in one.plans.items():
+            np.testing.assert_allclose(
+                (by @ SE2(plan.end)).pose[:2], other.plans[name].end[:2], atol=1e-6
+            )
+
+    def test_alone_is_as_one_vehicle(self, folder):
+        scene = scenes_of("road.xml")["100"]
+        several, alone = drive_roads({"100": scene}), ma.drive_road(scene)
+        assert several.distance_m == math.inf
+        assert several.reached
+        assert several.results["100"].driven.duration == alone.driven.duration
+
+    def test_who_has_no_plan_does_not_make_others_collide(self, folder):
+        """Two at one place touch at the start; the third one keeps away from both."""
+        both = (problem(100, x=10.0), problem(101, x=11.0), problem(102, x=40.0, speed=14.0))
+        Path("road.xml").write_text(commonroad(*LANES, *both))
+        drive = drive_roads(scenes_of("road.xml"), time_limit=2.0)
+        assert drive.results["102"].reached
+        assert drive.results["102"].verdict.clean
+        assert {row.pair for row in drive.pairs if row.distance_m <= 0.0} == {("100", "101")}
+
+    def test_one_that_begins_later_is_not_there_before(self, folder):
+        later = problem(101, x=10.0, speed=12.0).replace(
+            "<time><exact>0</exact></time>", "<time><exact>12</exact></time>"
+        )
+        later = later.replace("<intervalStart>20<", "<intervalStart>32<").replace(">40<", ">60<")
+        Path("road.xml").write_text(commonroad(*LANES, problem(100), later))
+        drive = drive_roads(scenes_of("road.xml"))
+        assert drive.reached
+        assert drive.plans["101"].start_time == pytest.approx(1.2)
+        assert all(one.verdict.clean for one in drive.results.values())
+
+
 def test_nothing_to_plan():
     with pytest.raises(ValueError, match="there is no vehicle"):
         plan_roads({})
@@ -141,9 +194,45 @@ class TestCommands:
         assert "found" in capsys.readouterr().out
         assert Path("out/road/plan.json").exists()
 
-    @pytest.mark.parametrize("option", ["--animate", "--html"])
-    def test_what_is_for_one(self, folder, capsys, option):
-        assert run(["plan", "road.xml", option]) == 2
+    def test_mpc(self, folder, capsys):
+        assert run(["mpc", "road.xml", "--animate"]) == 0
+        printed = capsys.readouterr()
+        assert printed.err == ""
+        assert "reached:        3 of 3" in printed.out
+        document = json.loads(Path("out/closed_loop.json").read_text())
+        assert (document["kind"], document["status"]) == ("fleet", "reached")
+        assert list(document["vehicles"]) == ["100", "101", "102"]
+        assert document["collisions"] == 0
+        assert document["clearance_m"]["between"] > 0.0
+        for one in document["vehicles"].values():
+            assert one["reached"]
+            assert len(one["steps"]) > 10
+        for ending in ("png", "gif"):
+            assert Path(f"out/closed_loop.{ending}").stat().st_size > 10_000
+        assert run(["check", "out/closed_loop.json"]) == 2
+        assert "is of several vehicles on the road of road.xml" in capsys.readouterr().err
+
+    def test_mpc_of_few_steps(self, folder, capsys):
+        assert run(["mpc", "road.xml", "--steps", "3", "--quiet", "--no-plot"]) == 1
+        assert capsys.readouterr().err.startswith("road.xml: steps_spent: 100: no goal was reached")
+        assert not Path("out/closed_loop.png").exists()
+
+    def test_mpc_of_a_folder(self, folder, capsys):
+        Path("files").mkdir()
+        Path("road.xml").rename("files/road.xml")
+        assert run(["mpc", "files", "--no-plot"]) == 0
+        assert "reached" in capsys.readouterr().out
+
+    def test_a_film(self, folder):
+        assert run(["plan", "road.xml", "--animate", "--quiet", "--no-plot"]) == 0
+        assert Path("out/plan.gif").stat().st_size > 10_000
+
+    @pytest.mark.parametrize(
+        "options", ["plan --html", "mpc --html", "mpc --seeds 2", "mpc --resume road.xml"]
+    )
+    def test_what_is_for_one(self, folder, capsys, options):
+        command, option, *value = options.split()
+        assert run([command, "road.xml", option, *value]) == 2
         assert capsys.readouterr().err == (
             f"{option}: is not for several vehicles on roads; leave it out, or pick one with "
             "--case\n"
@@ -160,7 +249,8 @@ class TestCommands:
         for command in ("check", "plot"):
             assert run([command, "out/plan.json"]) == 2
             assert capsys.readouterr().err == (
-                "out/plan.json: holds plans on the road of road.xml, which only export reads\n"
+                "out/plan.json: is of several vehicles on the road of road.xml, whose plans only "
+                "export reads\n"
             )
 
     @quiet

@@ -762,6 +762,10 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         SCENARIO + f"deep: {'[' * 5000}{']' * 5000}\n",
         ":14: lists and mappings are nested more than 40 deep",
     ),
+    "nesting": (
+        SCENARIO + f"deep: {'[' * 50}{']' * 50}\n",
+        ":14: lists and mappings are nested more than 40 deep",
+    ),
     "binary": (bytes(range(256)), ":2: is not a text file in UTF-8"),
     "another encoding": (
         but("A case", "caf\xe9").encode("latin-1"),
