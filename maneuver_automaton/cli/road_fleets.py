@@ -44,7 +44,7 @@ def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> Roa
     """Plan them all into the folder `out`, and print the plans; the result."""
     from maneuver_automaton.roads import plan_roads
 
-    _refuse({"--model": parts.model is not None, "--html": settings.html})
+    _refuse({"--model": parts.model is not None})
     scenes, vehicle, name = _roads(path, parts)
     make_folder(out)
     limit = settings.time_limit or TIME_LIMIT * len(scenes)
@@ -71,7 +71,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 
     given = {"--seeds": settings.seeds, "--resume": settings.resume}
     loops = {option: value is not None for option, value in given.items()}
-    _refuse({"--model": parts.model is not None, "--html": settings.html} | loops)
+    _refuse({"--model": parts.model is not None} | loops)
     scenes, vehicle, name = _roads(path, parts)
     make_folder(out)
     limit = settings.time_limit or TIME_LIMIT * len(scenes)
@@ -227,7 +227,11 @@ def _draw(
     """Write the pictures that were asked for, `file` with their endings."""
     for ending in (".png", ".gif", ".html"):
         file.with_suffix(ending).unlink(missing_ok=True)  # of an earlier one
-    if not what.plans or stopped() or not (settings.plot or settings.animate):
+    if not what.plans or stopped():
+        return
+    if settings.html:
+        what.player(title=settings.look.title or what.name).save(file.with_suffix(".html"))
+    if not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
     from maneuver_automaton.cli.pictures import skip_documentation

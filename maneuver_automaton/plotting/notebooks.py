@@ -18,9 +18,10 @@ from maneuver_automaton.plotting.pages import axes_at, new_figure, write_figure
 from maneuver_automaton.plotting.paths import draw_plan
 from maneuver_automaton.plotting.plan_figures import save_plan_figure
 from maneuver_automaton.plotting.player import player_of as player_of
+from maneuver_automaton.plotting.road_fleets import save_road_fleet_figure
 from maneuver_automaton.plotting.roads import save_road_figure
 from maneuver_automaton.receding_horizon import ClosedLoop
-from maneuver_automaton.roads import RoadDrive, RoadPlanResult
+from maneuver_automaton.roads import RoadDrive, RoadFleetDrive, RoadFleetResult, RoadPlanResult
 
 
 def picture_of(value: Any) -> bytes | None:
@@ -58,6 +59,13 @@ def _(drive: RoadDrive, path: Path) -> None:
 def _(result: RoadPlanResult, path: Path) -> None:
     if result.plan is not None:
         save_road_figure(result.planner.scene, result.planner.vehicle, result.plan, path)
+
+
+@_save.register
+def _(what: RoadFleetResult | RoadFleetDrive, path: Path) -> None:
+    if what.plans:
+        planners = [one.planner for one in what.results.values()]
+        save_road_fleet_figure(what, planners[0].vehicle, path)
 
 
 _save.register(PlanResult, save_plan_figure)

@@ -142,6 +142,11 @@ def save_road_fleet_animation(
     write_film(film, path)
 
 
+def road_fleet_colors(result: AnyRoadFleet) -> dict[str, Color]:
+    """The colour of each vehicle, by name."""
+    return dict(zip(result.results, fleet_colors(len(result.results)), strict=True))
+
+
 class _Page(NamedTuple):
     """A figure with axes for the plane, and what is drawn there."""
 
@@ -161,7 +166,7 @@ def _page(result: AnyRoadFleet, vehicle: RoadVehicle, look: Look, *, under: floa
     plans = result.plans
     if not plans:
         raise ValueError("road fleet: nobody has a plan, there is nothing to draw")
-    colors = dict(zip(result.results, fleet_colors(len(result.results)), strict=True))
+    colors = road_fleet_colors(result)
     scenes = {name: result.results[name].planner.scene for name in plans}
     boxes = [road_box(scenes[name], vehicle, plan) for name, plan in plans.items()]
     low = np.min([box[0] for box in boxes], axis=0)

@@ -20,6 +20,7 @@ from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import RoadVehicle, drive_roads, judged, plan_roads
 from maneuver_automaton.roads.several import driving
+from tests.plotting.player.browser import browser, opened
 from tests.roads.files import GOAL, LANES, car, commonroad, problem
 
 LEFT, RIGHT = GOAL, GOAL.replace('lanelet ref="2"', 'lanelet ref="1"')
@@ -223,12 +224,22 @@ class TestCommands:
         assert run(["mpc", "files", "--no-plot"]) == 0
         assert "reached" in capsys.readouterr().out
 
+    @pytest.mark.parametrize("command", ["plan", "mpc"])
+    def test_a_page(self, folder, command):
+        assert run([command, "road.xml", "--html", "--quiet", "--no-plot"]) == 0
+        file = Path("out/plan.html" if command == "plan" else "out/closed_loop.html")
+        with browser() as running, opened(running, file) as page:
+            page.click("text=problem 101")  # picks it
+            assert "nearest other [m]" in page.inner_text("body")
+            document = json.loads(file.with_suffix(".json").read_text())
+            assert f"{document['clearance_m']['between']:.3g} m" in page.inner_text("#facts")
+
     def test_a_film(self, folder):
         assert run(["plan", "road.xml", "--animate", "--quiet", "--no-plot"]) == 0
         assert Path("out/plan.gif").stat().st_size > 10_000
 
     @pytest.mark.parametrize(
-        "options", ["plan --html", "mpc --html", "mpc --seeds 2", "mpc --resume road.xml"]
+        "options", ["plan --model car", "mpc --seeds 2", "mpc --resume road.xml"]
     )
     def test_what_is_for_one(self, folder, capsys, options):
         command, option, *value = options.split()

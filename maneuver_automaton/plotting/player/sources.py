@@ -33,11 +33,12 @@ from maneuver_automaton.plotting.player.fleets import fleet_content, loop_conten
 from maneuver_automaton.plotting.player.local import Local, rounded
 from maneuver_automaton.plotting.player.motions import motion_entry
 from maneuver_automaton.plotting.player.page import Player
+from maneuver_automaton.plotting.player.road_fleets import road_loop_content, road_plans_content
 from maneuver_automaton.plotting.player.surroundings import body_entries
 from maneuver_automaton.plotting.scene import plan_scene
 from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.receding_horizon import ClosedLoop, Step
-from maneuver_automaton.roads import RoadDrive, RoadPlanResult
+from maneuver_automaton.roads import RoadDrive, RoadFleetDrive, RoadFleetResult, RoadPlanResult
 
 MOST_NODES = 20_000  # shown of a search
 
@@ -47,7 +48,8 @@ def player_of(value: Any, *, title: str = "") -> Player:
 
     Parameters
     ----------
-    value : Plan, PlanResult, FleetResult, ClosedLoop, FleetLog, RoadPlanResult or RoadDrive
+    value : Plan, PlanResult, FleetResult, ClosedLoop, FleetLog, RoadPlanResult, RoadDrive, \
+RoadFleetResult or RoadFleetDrive
         What to play.
     title : str
         Heads the page; the kind of `value` if left out.
@@ -99,12 +101,14 @@ def content_of(value: Any) -> dict[str, Any]:
     """Title, facts, motions, and what is around them, as plain values."""
     raise TypeError(
         f"player: got {type(value).__name__}, need a Plan, PlanResult, FleetResult, ClosedLoop, "
-        "FleetLog, RoadPlanResult or RoadDrive"
+        "FleetLog, RoadPlanResult, RoadDrive, RoadFleetResult or RoadFleetDrive"
     )
 
 
 content_of.register(FleetResult, fleet_content)
 content_of.register(FleetLog, loop_content)
+content_of.register(RoadFleetResult, road_plans_content)
+content_of.register(RoadFleetDrive, road_loop_content)
 
 
 @content_of.register
