@@ -229,8 +229,9 @@ class TestCommands:
         assert run([command, "road.xml", "--html", "--quiet", "--no-plot"]) == 0
         file = Path("out/plan.html" if command == "plan" else "out/closed_loop.html")
         with browser() as running, opened(running, file) as page:
-            page.click("text=problem 101")  # picks it
-            assert "nearest other [m]" in page.inner_text("body")
+            assert "of 3 arrived" in page.inner_text("#clock")
+            page.click("text=problem 101")  # picks it: its primitives are told
+            assert "steering rate" in page.inner_text("body")
             document = json.loads(file.with_suffix(".json").read_text())
             assert f"{document['clearance_m']['between']:.3g} m" in page.inner_text("#facts")
 

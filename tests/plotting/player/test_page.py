@@ -251,7 +251,7 @@ def test_other_values_are_refused():
         player_of(3)
     assert str(error.value) == (
         "player: got int, need a Plan, PlanResult, FleetResult, ClosedLoop, "
-        "FleetLog, RoadPlanResult or RoadDrive"
+        "FleetLog, RoadPlanResult, RoadDrive, RoadFleetResult or RoadFleetDrive"
     )
 
 
