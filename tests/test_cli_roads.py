@@ -70,9 +70,11 @@ def test_one_plan(folder):
 
 def test_one_of_several_problems(folder, capsys):
     Path("two.xml").write_text(commonroad(*LANES, problem(1, goal=LATE), problem(2)))
-    assert run(["mpc", "two.xml", *QUICK]) == 2
+    assert run(["check", "two.xml"]) == 2
     assert "two.xml: holds 2 problems, need --case and a number, 0 to 1" in capsys.readouterr().err
-    assert run(["plan", "two.xml", "--case", "1", *QUICK]) == 0
+    for command, written in (("plan", "plan.json"), ("mpc", "closed_loop.json")):
+        assert run([command, "two.xml", "--case", "1", *QUICK]) == 0
+        assert "kind" not in json.loads(Path("out", written).read_text())
 
 
 def test_folders_hold_scenarios_and_other_xml(folder):
