@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
+from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
@@ -30,7 +31,7 @@ from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.polishing import ROUND, polished_controls
 from maneuver_automaton.roads.route import Route, route_of
-from maneuver_automaton.roads.scene import RoadScene, moved_obstacle
+from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
     goal_arrays,
@@ -47,6 +48,7 @@ LONGEST_STOP = 12.0  # [s]
 SLACK = 1.2  # of the last plan's cost: a new plan is polished, too, before it is compared
 PASSES = 2  # of polishing a plan that is kept, in each step
 DIGITS = 9  # of the numbers of a scene [m, rad]
+SEEN_OTHERWISE = 0.05  # [m] by which distances differ of two that both see the other one larger
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -66,6 +68,7 @@ class RoadPlanner:
     library: RoadLibrary
     horizon: Horizon
     room: BeamArrays = field(repr=False)
+    kind: tuple[Obstacle, ...] = ()  # of the scene's traffic what drives by plans like its own
 
     __repr__ = brief
 
@@ -113,14 +116,17 @@ class RoadPlanner:
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
     def past(self, others: Sequence[Obstacle]) -> RoadPlanner:
-        """A planner like this one, among other road users besides, that move."""
+        """A planner like this one, among others of its kind besides: what these hold is known.
+
+        What it holds itself was proven past them as they saw it, so it may come a little nearer.
+        """
         scene = replace(self.scene, traffic=(*self.scene.traffic, *others))
         back = SE2(self.frame).inverse()
         more = tuple(moved_obstacle(one, back, digits=DIGITS) for one in others)
         local = replace(self.local, traffic=(*self.local.traffic, *more))
         clearing = _clearing(local, self.vehicle, self.settings, tick=self.tick)
         horizon = self.horizon._replace(clearing=clearing)
-        return replace(self, scene=scene, local=local, horizon=horizon)
+        return replace(self, scene=scene, local=local, horizon=horizon, kind=tuple(others))
 
     def warm(self) -> None:
         """Compile the kernels and touch the room, before time counts."""
@@ -153,13 +159,42 @@ class RoadPlanner:
         below = SLACK * self.price(old) if old is not None and settled and old.stops else math.inf
         new = self.search(state, tick=tick, narrow=settled, below=below)
         if new is not None:
-            new = self.polished(new)
+            new = self.polished(new) if self._may_stand(new) else None
         if old is None:
             return (self._emergency(state, tick) if new is None else new), True
         if new is None or not self._better(new, old):
             kept = self.polished(old, passes=PASSES)
             return kept, kept is not old
         return new, True
+
+    def _may_stand(self, plan: RoadDecision) -> bool:
+        """Whether a plan reaches a goal, or nobody of its kind comes where it stops."""
+        if plan.reaches or not self.kind:
+            return True
+        n = len(plan.controls)
+        still = np.array([*self.world(plan.states[n, :3]), 0.0, float(plan.states[n, 4])])
+        last = max(float(one.motion.time[-1]) for one in self.kind if one.motion is not None)
+        lasting = max(math.ceil((last - self.time_of(plan.tick + n)) / self.tick), 1)
+        stands = plan_of_controls(
+            self.vehicle.model,
+            still,
+            np.zeros((lasting, 2)),
+            tick=self.tick,
+            start_time=self.time_of(plan.tick + n),
+        )
+        off = self.settings.off_traffic_m
+        return all(
+            closest_to(
+                stands,
+                self.vehicle.model,
+                (one,),
+                footprint=(self.vehicle.footprint,),
+                within=presence_of(one),
+                enough=off,
+            ).distance
+            > off
+            for one in self.kind
+        )
 
     def polished(self, plan: RoadDecision, *, passes: int = ROUND, rounds: int = 1) -> RoadDecision:
         """A plan to a goal made cheaper by `polished_controls`; any other as it is."""
@@ -241,9 +276,16 @@ class RoadPlanner:
         plan = self._of_controls(
             state, tail.tick, tail.controls, tail.lasting, reaches=tail.reaches
         )
-        free = _kernels_free.free_ticks(self.horizon.clearing, np.array(plan.states), plan.tick)
+        clearing = self.horizon.clearing
+        if self.kind:
+            clearing = clearing._replace(off_traffic=clearing.off_traffic - SEEN_OTHERWISE)
+        free = _kernels_free.free_ticks(clearing, np.array(plan.states), plan.tick)
         if free < len(plan.controls):
-            return None
+            if not (self.kind and plan.reaches and free >= plan.lasting):
+                return None
+            # Others of its kind drive where it would stop, as it is gone from its goal by then.
+            controls = plan.controls[: plan.lasting]
+            plan = self._of_controls(state, tail.tick, controls, plan.lasting, reaches=True)
         if plan.reaches:
             until = np.array(plan.states[: plan.lasting + 1])
             if _kernels_goals.first_goal(self.horizon, until, plan.tick) < 0:

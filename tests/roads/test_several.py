@@ -141,6 +141,23 @@ class TestLoop:
         assert several.reached
         assert several.results["100"].driven.duration == alone.driven.duration
 
+    @pytest.mark.parametrize("seed", range(4))
+    def test_who_has_a_plan_at_first_reaches_its_goal(self, folder, seed):
+        rng, starts = np.random.default_rng(seed), []
+        for k in range(4):
+            lane = int(rng.integers(2))
+            x = 8.0 + 14.0 * k + rng.uniform(0.0, 6.0)
+            goal = GOAL if lane == 0 else RIGHT
+            speed = float(np.round(rng.uniform(6.0, 14.0), 2))
+            starts.append(problem(100 + k, x=x, y=2.0 + 4.0 * lane, speed=speed, goal=goal))
+        Path("road.xml").write_text(commonroad(*LANES, *starts))
+        drive = drive_roads(scenes_of("road.xml"), time_limit=5.0)
+        planned = set(drive.before.plans)
+        assert len(planned) >= 3
+        assert {name for name, one in drive.results.items() if one.reached} >= planned
+        assert all(drive.results[name].verdict.clean for name in planned)
+        assert least_by_shapely([drive.plans[name] for name in planned]) > 0.1
+
     def test_who_has_no_plan_does_not_make_others_collide(self, folder):
         """Two at one place touch at the start; the third one keeps away from both."""
         both = (problem(100, x=10.0), problem(101, x=11.0), problem(102, x=40.0, speed=14.0))
