@@ -99,7 +99,7 @@ def tried(piece: tuple[int, str], least: int, most: int, time_limit: float) -> R
         return {"seed": piece[0], "case": piece[1], "raised": repr(error)}
 
 
-def driven(seed: int, case: str, least: int, most: int, time_limit: float) -> Row:
+def driven(seed: int, case: str, least: int, most: int, time_limit: float = LONG_S) -> Row:
     """One loop, and what became of it."""
     fleet = mixed_fleet(seed, least=least, most=most)
     roomy = fleet_with_room(fleet, tube_of(fleet, None))
