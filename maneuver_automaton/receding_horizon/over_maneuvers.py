@@ -12,14 +12,11 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import committed, head_of
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
@@ -48,7 +45,6 @@ WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
 PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
 LATE = 0.8  # share of a step's time after which no plan is searched where something moves
 SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
-MOMENT = 1e-6  # [s]
 OTHERS = 3  # costlier words that are tried where the cheapest ones are not free
 HALVINGS = 10  # of a plan's duration, to find out when it is hit
 
@@ -410,9 +406,13 @@ def within_its_margin(here: Problem) -> tuple[Problem, str]:
     nowhere = Plan(here.start, (), durations=[], start_time=here.start_time)
     if not what_is_hit(body, nowhere, here.goals[0]):
         return here, ""
-    still = Trim(name="here", body_velocity=np.zeros(here.start.size), control=np.zeros(2))
-    stands = Plan(here.start, (still,), durations=[MOMENT], start_time=here.start_time)
-    found = closest_to(stands, Unicycle(), here.obstacles, footprint=here.footprint)
+    found = closest_to(
+        nowhere,
+        here.automaton.model,
+        here.obstacles,
+        footprint=here.footprint,
+        body_height=here.body_height,
+    )
     clearance = max(found.distance, 0.0)
     broken = f"the clearance is {clearance:.3g} m, need {here.margin:g} m"
     return replace(here, margin=0.5 * min(clearance, here.margin)), broken

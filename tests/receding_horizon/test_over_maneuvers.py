@@ -33,6 +33,7 @@ from maneuver_automaton.receding_horizon import (
 )
 from maneuver_automaton.receding_horizon.shifting import rested
 from tests.inertia import ROBOT, car_automaton, resting, unicycle_automaton
+from tests.matrix.vehicles import VEHICLES
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -518,6 +519,21 @@ class TestAmongWhatMoves:
         assert loop.min_clearance_m > 0.0
         assert Deed.MITIGATED not in {step.deed for step in loop.steps}
         assert_nothing_interrupted(loop)
+
+    @pytest.mark.parametrize(
+        ("top", "ahead", "clearance"), [(-1.0, 6.0, 3.0), (-1.0, 0.0, 0.0), (-9.0, 0.0, None)]
+    )
+    def test_in_flight_it_keeps_what_it_has_at_its_own_heights(self, top, ahead, clearance):
+        vehicle = VEHICLES["helicopter"]
+        problem = vehicle.problem(body_height=(-2.0, 2.0), margin=4.0)
+        x, y, _, z = problem.start
+        tower = Obstacle(Box([2.0, 2.0], [x + ahead, y]), height=(z - 30.0, z + top))
+        here, broken = over_maneuvers.within_its_margin(replace(problem, obstacles=(tower,)))
+        if clearance is None:
+            assert (here.margin, broken) == (4.0, "")
+        else:
+            assert here.margin == pytest.approx(0.5 * clearance, abs=1e-9)
+            assert broken == f"the clearance is {clearance:g} m, need 4 m"
 
     @pytest.mark.parametrize("static", [True, False])
     def test_pushed_within_its_margin_it_drives_on_and_says_so(self, static):
