@@ -26,13 +26,16 @@ from maneuver_automaton.automaton.cutting import begin_state, end_state
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape
+from maneuver_automaton.fleet.levels import Levels
 from maneuver_automaton.fleet.log import FleetLog
 from maneuver_automaton.fleet.result import Closest
-from maneuver_automaton.fleet.verdict import CONTACT, NEAR, plan_of_motion
+from maneuver_automaton.fleet.verdict import CONTACT, IN_SPACE, NEAR, plan_of_motion
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Omnidirectional
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.problem import Goal, Problem
+
+Heights = tuple[float, float]  # [m]
 
 STEP_S = 0.005  # between the times at which bodies are placed
 FINE = 5e-5  # [m] to which the least distance of two bodies is known
@@ -140,25 +143,35 @@ def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
 
 def _greatest_jump(way: Sequence[Plan]) -> float:
     """How far it was from the end of one piece when the next began, at most [m]."""
-    places = [(one.end[:2], other.start[:2]) for one, other in pairwise(way)]
-    return max((float(np.hypot(*(after - before))) for before, after in places), default=0.0)
+    gaps = [np.delete(after.start - before.end, 2) for before, after in pairwise(way)]
+    return max((float(np.linalg.norm(gap)) for gap in gaps), default=0.0)
 
 
-def _stretches(way: Mapping[int, Plan], edges: Array, gone: float) -> Iterator[Plan]:
-    """What was driven without a jump, as plans of something that moves at will."""
+def _stretches(
+    way: Mapping[int, Plan], edges: Array, gone: float, body_height: Heights
+) -> Iterator[tuple[Plan, Heights]]:
+    """What was driven without a jump, as plans of something that moves at will.
+
+    And how far the body reaches about the altitude of it.
+    """
     run: list[Plan] = []
+    low, high = body_height
     for step, piece in way.items():
         motion, until = Motion.of_plan(piece), min(float(edges[step + 1]), gone)
-        whole = plan_of_motion(motion, until, since=float(edges[step]))
+        levels = Levels.of_plan(piece, body_height) if piece.start.size > 3 else None
+        if levels is not None:
+            low, high = min(low, levels.reach[0]), max(high, levels.reach[1])
+        whole = plan_of_motion(motion, until, since=float(edges[step]), levels=levels)
         run.append(whole)
         after = way.get(step + 1)
-        if after is None or float(np.abs(after.start[:3] - whole.end).max()) > CONTACT:
-            yield replace(
+        if after is None or float(np.abs(after.start - whole.end).max()) > CONTACT:
+            driven = replace(
                 run[0],
                 trims=tuple(trim for one in run for trim in one.trims),
                 durations=np.concatenate([one.durations for one in run]),
             )
-            run = []
+            yield driven, (low, high)
+            run, (low, high) = [], body_height
 
 
 def _parts(
@@ -179,9 +192,15 @@ def _clearance(
     if not problem.obstacles:
         return best
     for shapes, pieces in _parts(problem, way):
-        for stretch in _stretches(pieces, edges, gone):
+        for stretch, reach in _stretches(pieces, edges, gone, problem.body_height):
+            in_space = stretch.start.size > 3
             least = closest_to(
-                stretch, Omnidirectional(), problem.obstacles, footprint=shapes, enough=CONTACT
+                stretch,
+                IN_SPACE if in_space else Omnidirectional(),
+                problem.obstacles,
+                footprint=shapes,
+                body_height=reach if in_space else (0.0, 0.0),
+                enough=CONTACT,
             )
             best = min(best, (least.distance, least.time))
     return best

@@ -12,7 +12,6 @@ import networkx as nx
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import (
@@ -28,13 +27,13 @@ from maneuver_automaton.automaton.cutting import (
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.shapes import Obstacle
+from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.shapes import Obstacle, Shape
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.fleet.arriving import aimed_at, with_room
 from maneuver_automaton.fleet.conflicts import Course
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
-from maneuver_automaton.fleet.verdict import plan_of_motion
-from maneuver_automaton.models import Omnidirectional
+from maneuver_automaton.fleet.verdict import nearest_obstacle
 from maneuver_automaton.planning.tracking import PROVEN, PROVEN_SHARE
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
@@ -380,42 +379,56 @@ def why_not_free(vehicle: Vehicle, course: Course, keep: float = math.inf) -> st
     if not problem.obstacles:
         return ""
     keep = min(problem.margin, keep)
+    levels = course.levels if problem.start.size > 3 else None
     frame = own_frame(problem.obstacles, problem.goals[0].pose)
     for shapes, motion in zip(course.shapes, course.motions, strict=True):
-        world = world_of(problem.obstacles, shapes, frame, keep=keep)
         until = min(course.until, max(problem.quiet_after, float(motion.time[-1])) + 1.0)
-        lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
-        still = np.zeros((1, 3))
-        margin = PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep)
-        free = free_times(
-            world,
-            world.into(motion.pose),
-            twists=np.concatenate([motion.rates, still]),
-            durations=lasting,
-            margin=margin,
-            keep=keep,
-            times=motion.time,
-        )
-        if (free >= lasting).all():
-            continue
-        plan = plan_of_motion(motion, until)
         enough = max(keep - CONTACT, CONTACT)
-        least = closest_to(
-            plan, Omnidirectional(), problem.obstacles, footprint=shapes, enough=enough
+        if levels is None and _is_free(problem, shapes, motion, until, keep, frame):
+            continue
+        least = nearest_obstacle(
+            shapes, motion, problem.obstacles, until=until, levels=levels, enough=enough
         )
         if least.distance <= enough:
             return f"at {least.time:.6g} s it comes within {least.distance:.3g} m of an obstacle"
     return ""
 
 
+def _is_free(
+    problem: Problem,
+    shapes: tuple[Shape, ...],
+    motion: Motion,
+    until: float,
+    keep: float,
+    frame: tuple[float, ...],
+) -> bool:
+    """Whether the kernels prove that a body keeps a distance [m] until a time [s]."""
+    world = world_of(problem.obstacles, shapes, frame, keep=keep)
+    lasting = np.diff(motion.time, append=max(until, float(motion.time[-1])))
+    margin = PROVEN if keep <= 0.0 else min(PROVEN, PROVEN_SHARE * keep)
+    free = free_times(
+        world,
+        world.into(motion.pose),
+        twists=np.concatenate([motion.rates, np.zeros((1, 3))]),
+        durations=lasting,
+        margin=margin,
+        keep=keep,
+        times=motion.time,
+    )
+    return bool((free >= lasting).all())
+
+
 def distance_to_obstacles(vehicle: Vehicle, course: Course) -> float:
     """A lower bound of the distance [m] of a course to what is not of the fleet."""
+    problem = vehicle.problem
+    levels = course.levels if problem.start.size > 3 else None
     found = [
-        closest_to(
-            plan_of_motion(motion, max(float(motion.time[-1]), vehicle.problem.quiet_after)),
-            Omnidirectional(),
-            vehicle.problem.obstacles,
-            footprint=shapes,
+        nearest_obstacle(
+            shapes,
+            motion,
+            problem.obstacles,
+            until=max(float(motion.time[-1]), problem.quiet_after),
+            levels=levels,
         ).distance
         for shapes, motion in zip(course.shapes, course.motions, strict=True)
     ]

@@ -10,6 +10,7 @@ import numpy as np
 
 from maneuver_automaton.audit import Least, closest_to, terminal_error
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet.conflicts import Course, meetings
 from maneuver_automaton.fleet.levels import Levels
@@ -171,6 +172,29 @@ def _nearest(one: Course, other: Course, *, enough: float) -> Least:
         for shapes, motion in zip(one.shapes, one.motions, strict=True)
     ]
     return min(found, key=lambda least: least.distance)
+
+
+def nearest_obstacle(
+    shapes: tuple[Shape, ...],
+    motion: Motion,
+    obstacles: tuple[AnyObstacle, ...],
+    *,
+    until: float,
+    levels: Levels | None = None,
+    enough: float = 0.0,
+) -> Least:
+    """The least distance of a body to obstacles until a time [s]: in space, if `levels` are given.
+
+    A lower bound, made sharp enough to tell on which side of `enough` [m] it is.
+    """
+    return closest_to(
+        plan_of_motion(motion, until, levels=levels),
+        Omnidirectional() if levels is None else IN_SPACE,
+        obstacles,
+        footprint=shapes,
+        body_height=(0.0, 0.0) if levels is None else levels.reach,
+        enough=enough,
+    )
 
 
 def _heights_matter(one: Course, other: Course) -> bool:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.collision import Box, Disc, Motion
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import (
@@ -21,10 +21,14 @@ from maneuver_automaton.fleet import (
     FleetResult,
     FleetStatus,
     plan_fleet,
+    simulate_fleet,
+    verify_driven,
     verify_fleet,
 )
 from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.held import distance_to_obstacles, why_not_free
 from maneuver_automaton.fleet.levels import STAGES, Levels
+from maneuver_automaton.fleet.vehicles import vehicles_of
 from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
@@ -34,6 +38,7 @@ from maneuver_automaton.plotting.fleet_distances import nearest_others
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import car
+from tests.matrix.vehicles import VEHICLES
 from tests.scenario.test_vehicles import SCENARIOS
 
 DRONE = UserModel(
@@ -247,3 +252,38 @@ def test_a_truck_drives_under_one_that_hovers():
     result = plan_fleet(below, time_limit=30.0, max_rounds=0)
     assert result.status is FleetStatus.FOUND
     assert result.sum_s == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("top", [-6.0, 40.0])
+def test_in_closed_loop_one_flies_over_what_is_low_and_round_what_is_high(top):
+    """Nobody else has anything to say of it: before, it counted at all heights and stayed."""
+    problem = VEHICLES["helicopter"].problem(body_height=(-1.0, 1.0))
+    middle = 0.5 * (problem.start + problem.goals[0].pose)[:2]
+    house = Obstacle(Box([6.0, 6.0], middle), height=(-40.0, top))
+    fleet = FleetProblem([replace(problem, obstacles=(house,))])
+    first = plan_fleet(fleet, time_limit=20.0, max_rounds=0)
+    log = simulate_fleet(fleet, step=0.5, steps=60, first=first, time_limit=20.0)
+    assert log.reached
+    assert [*log.violations] == []
+    verdict = verify_driven(log)
+    assert verdict.passed
+    ring = shapely.Polygon(Box([6.0, 6.0], middle).corners)
+    least = math.inf
+    for piece in log.pieces_of("1").values():
+        poses = piece.pose_at(piece.start_time + np.arange(0.0, piece.duration, 0.005))
+        aside = shapely.distance(shapely.points(poses[:, :2]), ring) - 2.0  # a disc of 2 m
+        above = np.maximum(poses[:, 3] - 1.0 - top, 0.0)
+        least = min(least, np.hypot(np.maximum(aside, 0.0), above).min(initial=math.inf))
+    assert verdict.clearance_m == pytest.approx(least, abs=0.02)
+    assert (verdict.clearance_m < 5.1) == (top < 0.0)
+
+
+def test_what_is_held_is_free_at_its_own_heights():
+    problem = VEHICLES["helicopter"].problem(body_height=(-1.0, 1.0))
+    x, y, _, z = problem.start
+    for top, free in ((z - 1.5, True), (z - 0.5, False)):
+        house = Obstacle(Box([6.0, 6.0], [x, y]), height=(z - 40.0, top))
+        (vehicle,) = vehicles_of(FleetProblem([replace(problem, obstacles=(house,))]))
+        assert bool(why_not_free(vehicle, vehicle.standing)) != free
+        gap = distance_to_obstacles(vehicle, vehicle.standing)
+        assert gap == pytest.approx(max(z - 1.0 - top, 0.0), abs=1e-3)
