@@ -33,6 +33,7 @@ from maneuver_automaton.fleet.verdict import CONTACT, IN_SPACE, NEAR, plan_of_mo
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Omnidirectional
 from maneuver_automaton.planning.needs import has_inertia
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 
 Heights = tuple[float, float]  # [m]
@@ -127,7 +128,7 @@ def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
     What it carries then stands as it did at the end of the piece before.
     """
     problem = log.problem.problems[log.problem.names.index(name)]
-    stands, pieces = problem.first_trim, dict[int, Plan]()
+    stands, pieces = _at_first(problem), dict[int, Plan]()
     for step, piece in log.pieces_of(name).items():
         if piece.trims:
             stands = piece.trims[-1]
@@ -136,6 +137,15 @@ def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
             still = Plan(piece.start, (stands,), durations=[0.0], start_time=piece.start_time)
             pieces[step] = still
     return pieces
+
+
+def _at_first(problem: Problem) -> Trim:
+    """The trim of a vehicle that has done nothing yet; one that switches at will may just stand."""
+    automaton = problem.automaton
+    if problem.start_trim is not None or automaton.rest is not None:
+        return problem.first_trim
+    still = np.zeros(len(automaton.model.control_names))
+    return Trim(name="stands", body_velocity=np.zeros(problem.start.size), control=still)
 
 
 # -- one vehicle
