@@ -14,6 +14,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.fleet_distances import thinned
 from maneuver_automaton.plotting.player.local import POSE_DIGITS, rounded
 from maneuver_automaton.plotting.regions import map_paths
 
@@ -124,3 +125,12 @@ def _there(one: Obstacle, times: Array, leave: bool) -> Any:
         return there
     first, last = one.motion.time[[0, -1]]
     return there & (times >= first) & (times <= last)
+
+
+def distance_curve(times: Array, distances: Array) -> dict[str, Any] | None:
+    """Least distances over time; None if there never is another."""
+    known = np.isfinite(distances)
+    if not known.any():
+        return None
+    at, least = thinned(times[known], distances[known], most=MOST_SAMPLES)
+    return {"t": rounded(at, POSE_DIGITS), "v": rounded(least, 4)}

@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet import FleetLog, FleetResult
 from maneuver_automaton.plotting.fleet_cast import Cast, Member, cast_of
-from maneuver_automaton.plotting.fleet_distances import distance_times, nearest_others, thinned
+from maneuver_automaton.plotting.fleet_distances import distance_times, nearest_others
 from maneuver_automaton.plotting.fleet_loop_cast import (
     fleet_values,
     held_tracks,
@@ -20,9 +20,9 @@ from maneuver_automaton.plotting.fleet_loop_cast import (
     vehicle_values,
 )
 from maneuver_automaton.plotting.motions import track_colors
-from maneuver_automaton.plotting.player.clearances import MOST_SAMPLES
+from maneuver_automaton.plotting.player.clearances import distance_curve
 from maneuver_automaton.plotting.player.composing import Fact, around, played, trim_entries
-from maneuver_automaton.plotting.player.local import POSE_DIGITS, Local, hex_color, rounded
+from maneuver_automaton.plotting.player.local import Local, hex_color, rounded
 from maneuver_automaton.plotting.player.motions import motion_entry
 from maneuver_automaton.plotting.player.surroundings import body_entries, goal_entries
 from maneuver_automaton.plotting.scene import BODIES, LEAST_MARK, scene_of
@@ -108,7 +108,8 @@ def cast_content(cast: Cast, trims: Trims, *, title: str, facts: list[Fact]) -> 
         "facts": facts,
         "trims": trims.entries,
         "motions": [
-            _vehicle(one, local, trims.numbers[one.name]) | {"others": _curve(times, nearest[:, k])}
+            _vehicle(one, local, trims.numbers[one.name])
+            | {"others": distance_curve(times, nearest[:, k])}
             for k, one in enumerate(cast.members)
         ],
         "bodies": [],
@@ -117,7 +118,7 @@ def cast_content(cast: Cast, trims: Trims, *, title: str, facts: list[Fact]) -> 
             "begin": cast.begin,
             "end": cast.end,
             "margin": cast.margin,
-            "distance": _curve(times, nearest.min(axis=1)),
+            "distance": distance_curve(times, nearest.min(axis=1)),
         },
     }
 
@@ -137,15 +138,6 @@ def _vehicle(one: Member, local: Local, names: dict[str, int]) -> dict[str, Any]
         "leaves": one.leaves and one.course is not None,
         "reason": one.reason,
     }
-
-
-def _curve(times: Array, distances: Array) -> dict[str, Any] | None:
-    """Least distances over time; None if there never is another."""
-    known = np.isfinite(distances)
-    if not known.any():
-        return None
-    at, least = thinned(times[known], distances[known], most=MOST_SAMPLES)
-    return {"t": rounded(at, POSE_DIGITS), "v": rounded(least, 4)}
 
 
 def _mark(cast: Cast) -> float:

@@ -12,16 +12,15 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.fleet_distances import thinned
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.player.clearances import (
-    MOST_SAMPLES,
     clearance_entry,
+    distance_curve,
     sample_times,
 )
 from maneuver_automaton.plotting.player.composing import Fact, around, names_of, trim_entries
-from maneuver_automaton.plotting.player.local import POSE_DIGITS, Local, hex_color, rounded
+from maneuver_automaton.plotting.player.local import Local, hex_color
 from maneuver_automaton.plotting.player.motions import curve_entries, motion_entry
 from maneuver_automaton.plotting.player.surroundings import body_entries, obstacle_entries
 from maneuver_automaton.plotting.road_fleets import AnyRoadFleet, road_fleet_colors
@@ -75,7 +74,6 @@ def _content(
         at = sample_times(track.switching_times)
         bodies = [(ring, track.at(at)) for ring in footprint_polygons(vehicle.footprint)]
         others = tuple(one for one in scene.traffic if one.name not in planners)
-        places = [Obstacle(place) for goal in scene.goals for place in goal.places or ()]
         motions.append(
             {
                 **motion_entry(track, local, names_of(trims)),
@@ -87,11 +85,10 @@ def _content(
                 "color": hex_color(colors[name]),
                 "bodies": body_entries(vehicle.footprint, {}),
                 "goals": [],
-                "regions": obstacle_entries(places, local, leave=False),
                 "leaves": name in what.plans,
                 "joins": plan.start_time > begin,
                 "reason": reasons[name],
-                "others": _curve(times, nearest[name]) if name in nearest else None,
+                "others": distance_curve(times, nearest[name]) if name in nearest else None,
             }
         )
     if what.pairs:
@@ -115,7 +112,12 @@ def _content(
         ),
         "lanes": [local.places(lanelet.ring) for lanelet in first.scene.lanelets],
         "regions": _regions(planners, local),
-        "fleet": {"begin": begin, "end": end, "margin": 0.0, "distance": _curve(times, least)},
+        "fleet": {
+            "begin": begin,
+            "end": end,
+            "margin": 0.0,
+            "distance": distance_curve(times, least),
+        },
         "ending": ending,
     }
 
@@ -159,12 +161,3 @@ def _nearest_others(
         for name in (one, other):
             nearest[name] = np.minimum(nearest[name], apart)
     return nearest
-
-
-def _curve(times: Array, distances: Array) -> dict[str, Any] | None:
-    """Least distances over time; None if there never is another."""
-    known = np.isfinite(distances)
-    if not known.any():
-        return None
-    at, least = thinned(times[known], distances[known], most=MOST_SAMPLES)
-    return {"t": rounded(at, POSE_DIGITS), "v": rounded(least, 4)}
