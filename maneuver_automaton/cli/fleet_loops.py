@@ -65,7 +65,7 @@ def _judged(path: Path, log: FleetLog, driven: DrivenVerdict) -> int:
 
 
 def driven_loop(path: Path, scenario: FleetScenario, settings: Settings) -> FleetLog:
-    """The closed loop of a file of several vehicles, from plans as `plan` makes them."""
+    """The closed loop of a file of several vehicles, from plans with room for noise."""
     from maneuver_automaton.fleet import simulate_fleet
 
     part = scenario.receding_horizon
@@ -104,16 +104,19 @@ def _seed(scenario: FleetScenario, settings: Settings) -> int:
 
 
 def _first_plans(scenario: FleetScenario, *, quiet: bool) -> FleetResult | None:
-    """Plans of those that are there from the begin on, if there are any."""
+    """Plans of those that are there from the begin on, if there are any, as a loop needs them."""
     from maneuver_automaton.fleet import plan_fleet
+    from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
 
+    part = scenario.receding_horizon
+    assert part is not None
     there = [name for name in scenario.fleet.names if name not in scenario.joins_s]
     if not there:
         return None
     limit = scenario.time_limit_s
     with waiting(f"planning, at most {limit:g} s", quiet=quiet):
         return plan_fleet(
-            scenario.fleet.only(there),
+            fleet_with_room(scenario.fleet.only(there), tube_of(scenario.fleet, part.tube_m)),
             time_limit=limit,
             objective=scenario.settings.objective,
             orders=scenario.settings.orders,

@@ -50,8 +50,14 @@ def with_room(problem: Problem, tube_m: float) -> Problem:
 
 
 def fleet_with_room(fleet: FleetProblem, tube_m: float) -> FleetProblem:
-    """The fleet, each vehicle with goals that keep room; see `with_room`."""
-    return replace(fleet, problems=tuple(with_room(one, tube_m) for one in fleet.problems))
+    """The fleet as a loop plans it at first: each with goals that keep room; see `with_room`.
+
+    With inertia by maneuvers of the library alone: a motion in one piece could not be left where
+    another one breaks down.
+    """
+    roomy = (with_room(one, tube_m) for one in fleet.problems)
+    words = (replace(one, search=replace(one.search, polish=False)) for one in roomy)
+    return replace(fleet, problems=tuple(words))
 
 
 def tube_of(fleet: FleetProblem, tube_m: float | None) -> float:

@@ -325,3 +325,12 @@ def test_who_leaves_is_gone_for_all_at_the_same_time(noise):
     assert [*log.violations] == []
     assert log.distance_m > (0.9 if noise else 1.0) * fleet.margin
     assert set(log.arrived_s) == set(fleet.names)
+
+
+def test_who_has_inertia_drives_maneuvers_that_can_be_left():
+    fleet = FleetProblem([Problem(unicycle_automaton(), [0, 0, 0], [3, 1, 0.5])], names=["a"])
+    log = simulate_fleet(fleet, step=0.5, first_time_limit=2.0)
+    assert log.reached
+    known = {one.name for one in fleet.problems[0].automaton.maneuvers}
+    for step in log.steps:
+        assert all(one is None or one.name in known for one in step.plans["a"].maneuvers)
