@@ -528,9 +528,41 @@ class Problem:
         if goals is not None:
             changed["goals"] = _as_goals(goals)
         known = {name: self.__dict__[name] for name in _FIELDS}
+        if horizon is None:
+            known["_setting"] = self.setting
         moved.__dict__.update(known, moves=self.moves, **changed)
         moved._check_ends()
         return moved
+
+    @property
+    def setting(self) -> Problem:
+        """The problem that this one was made from: only ends and clock may differ.
+
+        What depends on nothing else is kept with it, for all the queries of a planner.
+
+        Examples
+        --------
+        >>> from maneuver_automaton.models import Unicycle
+        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+        >>> one = Problem(robot, [0, 0, 0], [1, 1, 0])
+        >>> one.starting_at([2, 0, 0], time=0.0).setting is one, one.setting is one
+        (True, True)
+        """
+        made_from: Problem = self.__dict__.get("_setting", self)
+        return made_from
+
+    @property
+    def ends(self) -> tuple[str | None, tuple[tuple[str | None, bool], ...]]:
+        """Trim at the start, trim and freedom of the heading at every goal: poses aside, its ends.
+
+        Examples
+        --------
+        >>> from maneuver_automaton.models import Unicycle
+        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+        >>> Problem(robot, [0, 0, 0], Goal(pose=[1, 1, 0], free_heading=True)).ends
+        (None, ((None, True),))
+        """
+        return self.start_trim, tuple((goal.trim, goal.free_heading) for goal in self.goals)
 
     def moved(self, by: LieGroup) -> Problem:
         """The problem moved by the group element `by`, all around it too; bounds must be open.

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import FEW, Array, as_array
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.collision import _kernels_advancement
 from maneuver_automaton.collision.body import fastest_points
 from maneuver_automaton.collision.world import World
@@ -86,24 +84,13 @@ def free_times(
 def clearances(world: World, poses: ArrayLike, *, times: ArrayLike = 0.0) -> Array:
     """Clearance (k,) at poses (k, 3) seen from the world's frame: a lower bound [m].
 
-    Exact near contact, and capped where nothing is near; not positive only on contact. What was
-    asked for last is known at once, since more than one step asks for it.
+    Exact near contact, and capped where nothing is near; not positive only on contact.
     """
     places = np.atleast_2d(as_array("poses", poses, last=3))
-    if not world.arrays.moving.speed.size:
-        times = 0.0
-    clocks = np.array(np.broadcast_to(as_array("times", times), len(places)))
-    if len(places) > FEW:
-        return np.asarray(
-            _kernels_advancement.clearances(world.arrays, world.body, np.array(places), clocks)
-        )
-    return _known_clearances(world, places.tobytes(), clocks.tobytes()).copy()
-
-
-@functools.lru_cache(maxsize=8)
-def _known_clearances(world: World, places: bytes, clocks: bytes) -> Array:
-    poses = np.frombuffer(places).reshape(-1, 3).copy()
+    clocks = np.zeros(len(places))
+    if world.arrays.moving.speed.size:
+        clocks += as_array("times", times)
     found: Array = _kernels_advancement.clearances(
-        world.arrays, world.body, poses, np.frombuffer(clocks).copy()
+        world.arrays, world.body, np.array(places), clocks
     )
     return found

@@ -107,29 +107,26 @@ class World:
         """A pose (..., 3) seen from the world's frame: places first, so that no digit is lost."""
         poses = np.asarray(pose, dtype=np.float64)
         if poses.size <= FEW:
+            to_x, to_y, turn = self.frame.tolist()
+            c, s = float(np.cos(-turn)), float(np.sin(-turn))
             rows = poses.reshape(-1, 3).tolist()
-            return np.array([self._one_into(*row) for row in rows]).reshape(poses.shape)
+            seen = [_one_into(x - to_x, y - to_y, heading - turn, c, s) for x, y, heading in rows]
+            return np.array(seen).reshape(poses.shape)
         x, y = poses[..., 0] - self.frame[0], poses[..., 1] - self.frame[1]
         c, s = np.cos(-self.frame[2]), np.sin(-self.frame[2])
         turned = np.stack(
             [c * x - s * y, s * x + c * y, wrapped(poses[..., 2] - self.frame[2])], -1
         )
-        seen: Array = np.round(turned, DIGITS)
-        half = seen[..., 2] <= -HALF_TURN  # half a turn to either side is one pose
-        seen[..., 2] = np.where(half, -seen[..., 2], seen[..., 2])
-        return seen
+        found: Array = np.round(turned, DIGITS)
+        half = found[..., 2] <= -HALF_TURN  # half a turn to either side is one pose
+        found[..., 2] = np.where(half, -found[..., 2], found[..., 2])
+        return found
 
-    def _one_into(self, x: float, y: float, heading: float) -> tuple[float, float, float]:
-        """The same for one pose, in numbers: some arrays take longer than a first plan may."""
-        to_x, to_y, turn = self.frame.tolist()
-        c, s = float(np.cos(-turn)), float(np.sin(-turn))
-        x, y = x - to_x, y - to_y
-        seen = rounded((heading - turn + np.pi) % (2.0 * np.pi) - np.pi)
-        return (
-            rounded(c * x - s * y),
-            rounded(s * x + c * y),
-            -seen if seen <= -HALF_TURN else seen,
-        )
+
+def _one_into(x: float, y: float, turn: float, c: float, s: float) -> tuple[float, float, float]:
+    """The same for one pose, in numbers: some arrays take longer than a first plan may."""
+    seen = rounded((turn + math.pi) % (2.0 * math.pi) - math.pi)
+    return rounded(c * x - s * y), rounded(s * x + c * y), -seen if seen <= -HALF_TURN else seen
 
 
 def rounded(value: float) -> float:
@@ -207,11 +204,11 @@ def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[flo
 
     The pose `otherwise` (3,) where there is none.
     """
-    return _frame_at_first(obstacles) or tuple(otherwise[:3].tolist())
+    return frame_at_first(obstacles) or tuple(otherwise[:3].tolist())
 
 
 @functools.lru_cache(maxsize=64)
-def _frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
+def frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
     """The pose of `own_frame`; empty where there is none."""
     for obstacle in obstacles:
         if isinstance(obstacle, OccupancyMap):

@@ -20,7 +20,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.inside import outside
-from maneuver_automaton.search.lattice_worlds import world_around
+from maneuver_automaton.search.lattice_worlds import ends_of, world_around
 
 CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 
@@ -58,7 +58,7 @@ def _surely_free(problem: Problem) -> list[bool]:
     """
     if not problem.obstacles or problem.parts or problem.start.size > 3 or problem.moves:
         return [False] * (1 + len(problem.goals))
-    return proven_free(problem, [problem.start, *(goal.pose for goal in problem.goals)])
+    return [one > problem.margin + CLEARLY for one in ends_of(problem).clearances.tolist()]
 
 
 def proven_free(problem: Problem, poses: Sequence[Array]) -> list[bool]:

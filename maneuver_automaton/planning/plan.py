@@ -6,8 +6,10 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 from maneuver_automaton._interrupts import patient
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.free_space import plan_by_words
@@ -202,7 +204,21 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
 
 
 def _load(problem: Problem, workspace: Workspace) -> None:
-    """Compile or load what planning needs, before the clock runs."""
+    """Compile or load what planning needs, before the clock runs: once for all like queries."""
+    ready = _ready(problem.setting, workspace)
+    if problem.ends not in ready:
+        _load_all(problem, workspace)
+        ready.add(problem.ends)
+
+
+@kept_by_first
+def _ready(setting: Problem, workspace: Workspace) -> set[Any]:
+    """Which kinds of ends everything is loaded for."""
+    del setting, workspace  # they say which set is meant
+    return set()
+
+
+def _load_all(problem: Problem, workspace: Workspace) -> None:
     guarded = bool(problem.obstacles or problem.zones)
     if guarded:
         from maneuver_automaton.planning.checking import load_checking

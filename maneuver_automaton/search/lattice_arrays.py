@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.collision.body import Body
+from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.swept_areas import SweptAreas, swept_areas
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search.part_motion import (
@@ -97,10 +97,20 @@ class LatticeLibrary:
     mirrored: bool  # whether the mirror image of every trim is a trim of the same cost
 
     @functools.cached_property
+    def half_width(self) -> float:
+        """Half the width of the narrowest part [m]."""
+        return min(body_of(part.shapes).half_width for part in self.parts)
+
+    @functools.cached_property
     def drives(self) -> bool:
         """Whether a trim moves."""
         numbered = self.arrays.library
         return bool(numbered.twists[: numbered.n_trims].any())
+
+    @functools.cached_property
+    def lags(self) -> bool:
+        """Whether maneuvers between classes cost more than their paths."""
+        return bool(self.lag.any())
 
     @functools.cached_property
     def climbs(self) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.between import part_between
 from maneuver_automaton.collision import Shape
@@ -60,20 +61,25 @@ def lattice_library(
         If a maneuver has no course, and so no known cost.
     """
     automaton = problem.automaton
-    if not automaton.is_kinematic:
-        first = automaton.index_of(problem.first_trim.name)
-        ends = [automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals]
-        automaton = part_between(automaton, first, ends)
+    if automaton.is_kinematic:
+        return _library_on(problem.setting, automaton, prepared)
+    first = automaton.index_of(problem.first_trim.name)
+    ends = [automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals]
+    return _library_on(problem.setting, part_between(automaton, first, ends), prepared)
+
+
+@kept_by_first
+def _library_on(setting: Problem, automaton: Automaton, prepared: Prepared) -> LatticeLibrary:
     return prepared.once(
         _library,
         automaton,
-        problem.cost,
-        problem.footprint,
-        tuple(problem.parts.items()),
-        fixed_time=problem.horizon.time is not None,
-        waits=problem.moves,
-        min_coast=problem.horizon.min_coast,
-        limited=_limited(problem),
+        setting.cost,
+        setting.footprint,
+        tuple(setting.parts.items()),
+        fixed_time=setting.horizon.time is not None,
+        waits=setting.moves,
+        min_coast=setting.horizon.min_coast,
+        limited=_limited(setting),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_window import window_of
-from maneuver_automaton.search.lattice_worlds import Worlds, worlds_around
+from maneuver_automaton.search.lattice_worlds import Worlds, ends_of, worlds_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import Scene, scene_of
 from maneuver_automaton.words.library import NO_TRIM
@@ -69,7 +70,7 @@ class LatticeQuery:
     @property
     def half_width(self) -> float:
         """Half the width of the narrowest part [m]."""
-        return _half_width(self.library)
+        return self.library.half_width
 
     @property
     def window(self) -> Array:
@@ -164,6 +165,66 @@ def lattice_query(
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
+    if library.at_will and problem.start.size == 3 and not (problem.parts or problem.moves):
+        ends = _ends_in_plane(problem, goals)
+    else:
+        ends = _ends(problem, goals, library, worlds)
+    margin = _margin(library, worlds.whole, ends.clear)
+    box, window, bounded = window_of(problem.bounds, worlds.outer, ends.seen, radius=library.radius)
+    most = horizon.max_time if horizon.time is None else horizon.time
+    return LatticeQuery(
+        problem=problem,
+        library=library,
+        world=worlds.whole,
+        plane=worlds.plane,
+        around=scene_of(problem, library, worlds, window, margin=margin, level=ends.level),
+        start=ends.seen[0],
+        start_trim=int(ends.trims[0]),
+        goals=ends.seen[1:],
+        goal_trims=ends.trims[1:],
+        free_heading=ends.free,
+        goal_poses=ends.poses[1:],
+        goal_index=ends.index,
+        box=box,
+        bounded=bounded,
+        most_time=math.inf if most is None else most * (1.0 + 1e-12),
+        prepared=prepared,
+    )
+
+
+class _Ends(NamedTuple):
+    """The start, then poses that are aimed at."""
+
+    poses: Array  # (1 + n, dof) as the problem sees them
+    seen: Array  # (1 + n, 4) as the query does
+    clear: Array  # (1 + n,) [m] clearance beyond the margin
+    trims: IntArray  # (1 + n,) NO_TRIM: any will do
+    index: tuple[int, ...]  # (n,) which of the problem's goals they belong to
+    free: NDArray[np.bool_]  # (n,) whether any heading will do
+    level: float = 0.0  # [m] altitude from which others are counted
+
+
+def _ends_in_plane(problem: Problem, goals: Sequence[int]) -> _Ends:
+    """The ends of a vehicle that switches at will in a plane, which were looked at before."""
+    known = ends_of(problem)
+    seen = np.zeros((1 + len(problem.goals), 4))
+    seen[:, :3] = known.poses
+    clear = known.clearances - problem.margin
+    if len(goals) < len(problem.goals):
+        kept = [0, *(1 + k for k in goals)]
+        seen, clear = seen[kept], clear[kept]
+    return _Ends(
+        poses=np.array([problem.start, *(problem.goals[k].pose for k in goals)]),
+        seen=seen,
+        clear=clear,
+        trims=np.full(1 + len(goals), NO_TRIM),
+        index=tuple(goals),
+        free=np.array([problem.goals[k].free_heading for k in goals], dtype=np.bool_),
+    )
+
+
+def _ends(problem: Problem, goals: Sequence[int], library: LatticeLibrary, worlds: Worlds) -> _Ends:
+    """The ends of any vehicle, several headings at goals where any will do included."""
     turns = library.at_will  # at the end, to any heading
     rows = [
         problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
@@ -173,35 +234,15 @@ def lattice_query(
     free = np.array([problem.goals[k].free_heading for k in index])
     poses = np.concatenate([problem.start[None], *rows])
     level = float(poses[1, 3]) if poses.shape[1] > 3 else 0.0
-    ends = _seen(worlds.whole, poses, level)
+    seen = _seen(worlds.whole, poses, level)
     trims = _end_trims(problem, library, index)
-    clear = _end_clearances(problem, library, worlds, ends, trims, level)
+    clear = _end_clearances(problem, library, worlds, seen, trims, level)
     # The clearance at one heading says nothing of a goal at which the vehicle may turn.
     if not turns and (clear[1:] > 0.0).any():
         kept = np.append(0, 1 + np.flatnonzero(clear[1:] > 0.0))
-        clear, ends, trims, poses = clear[kept], ends[kept], trims[kept], poses[kept]
+        clear, seen, trims, poses = clear[kept], seen[kept], trims[kept], poses[kept]
         index, free = index[kept[1:] - 1], free[kept[1:] - 1]
-    margin = _margin(library, worlds.whole, clear)
-    box, window, bounded = window_of(problem.bounds, worlds.outer, ends, radius=library.radius)
-    most = horizon.max_time if horizon.time is None else horizon.time
-    return LatticeQuery(
-        problem=problem,
-        library=library,
-        world=worlds.whole,
-        plane=worlds.plane,
-        around=scene_of(problem, library, worlds, window, margin=margin, level=level),
-        start=ends[0],
-        start_trim=int(trims[0]),
-        goals=ends[1:],
-        goal_trims=trims[1:],
-        free_heading=free & turns,
-        goal_poses=poses[1:],
-        goal_index=tuple(index.tolist()),
-        box=box,
-        bounded=bounded,
-        most_time=math.inf if most is None else most * (1.0 + 1e-12),
-        prepared=prepared,
-    )
+    return _Ends(poses, seen, clear, trims, tuple(index.tolist()), free & turns, level)
 
 
 def _seen(world: World, poses: Array, level: float) -> Array:
@@ -256,13 +297,9 @@ def _end_clearances(
 
 def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
     """Proven clearance: a share of the body, at most half of that at start and goals."""
-    usual = MARGIN * (_half_width(library) or _typical(world))
+    usual = MARGIN * (library.half_width or _typical(world))
     halves = [0.5 * one for one in clear.tolist() if one > 0.0]
     return float(max(LEAST_MARGIN, min([usual, *halves])))
-
-
-def _half_width(library: LatticeLibrary) -> float:
-    return min(body_of(part.shapes).half_width for part in library.parts)
 
 
 def _typical(world: World) -> float:

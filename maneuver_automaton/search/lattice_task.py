@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.problem import SearchSettings
 from maneuver_automaton.search.distance_grid import OCTILE
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -102,77 +104,118 @@ class Task(NamedTuple):
 
 def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -> Task:
     """Limits and sizes of a search, as the kernels see them."""
-    library, settings = query.library, query.settings
-    frame = query.goals[0]
-    cell = resolution.scale * (settings.cell or library.cell)
-    headings = settings.headings or HEADINGS
-    size = query.half_width or library.radius * 0.1
-    interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
-    sharp = interval * library.radius * library.per_metre
-    tick = _tick(query, resolution)
-    by_gear, by_trim, by_count, layers = _layers(query, resolution)
+    x, y, heading, _ = query.goals[0].tolist()
     start, goals = _ends(query)
     aims, aim_trims, aim_free = goals if sign > 0.0 else start
     roots, root_trims = start[:2] if sign > 0.0 else goal_roots(query)
-    return Task(
+    timed = query.moves or math.isfinite(query.most_time)
+    known, layers = _sizes(
+        query.library, query.settings, resolution, timed, query.most_trims, query.least_coast
+    )
+    size = query.half_width or query.library.radius * 0.1
+    finest = max(known.headings, known.fine_headings)
+    least, most = query.interval
+    return known._replace(
         sign=sign,
         roots=roots,
         root_trims=root_trims,
         aims=aims,
         aim_trims=aim_trims,
         aim_free=aim_free,
-        lag=_lag(library, aim_trims),
-        frame_x=float(frame[0]),
-        frame_y=float(frame[1]),
-        frame_heading=float(frame[2]),
-        frame_cos=math.cos(float(frame[2])),
-        frame_sin=math.sin(float(frame[2])),
+        lag=_lag(query.library, aim_trims),
+        frame_x=x,
+        frame_y=y,
+        frame_heading=heading,
+        frame_cos=math.cos(heading),
+        frame_sin=math.sin(heading),
+        radix=_radix(query, known.fine_cell, finest, known.tick, layers),
+        least_interval=least,
+        most_interval=most,
+        back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
+        clock=float(query.start_time),
+        most_time=float(query.most_time),
+        stay_until=float(query.stay_until),
+    )
+
+
+@kept_by_first
+def _sizes(
+    library: LatticeLibrary,
+    settings: SearchSettings,
+    resolution: Resolution,
+    timed: bool,
+    most_trims: int,
+    least_coast: float,
+) -> tuple[Task, int]:
+    """The task of any query, without its ends; and how many layers its cells have.
+
+    `timed`: of two nodes of a cell the costlier may be the one that is in time.
+    """
+    cell = resolution.scale * (settings.cell or library.cell)
+    size = library.half_width or library.radius * 0.1
+    interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
+    sharp = interval * library.radius * library.per_metre
+    by_gear, by_trim, by_count, layers = _layers(library, resolution, most_trims, least_coast)
+    none, numbers = np.zeros((0, 4)), np.zeros(0, dtype=np.int64)
+    task = Task(
+        sign=1.0,
+        roots=none,
+        root_trims=numbers,
+        aims=none,
+        aim_trims=numbers,
+        aim_free=np.zeros(0, dtype=np.bool_),
+        lag=np.zeros(0),
+        frame_x=0.0,
+        frame_y=0.0,
+        frame_heading=0.0,
+        frame_cos=1.0,
+        frame_sin=0.0,
         cell=float(cell),
-        headings=int(headings),
+        headings=int(settings.headings or HEADINGS),
         fine_cell=float(resolution.fine * cell),
         fine_headings=FINE_HEADINGS,
         rise=float(resolution.scale * RISE * library.radius),
-        tick=tick,
-        radix=_radix(query, resolution.fine * cell, max(headings, FINE_HEADINGS), tick, layers),
+        tick=_tick(library, resolution) if timed else 0.0,
+        radix=(1, 1, 1, 1),
         weight=float(resolution.weight),
         per_metre=float(library.per_metre) / (OCTILE if resolution.straight else 1.0),
         per_climb=float(library.per_climb),
         # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
         # for, and the node that ends at the goal must not be missed.
         per_interval=(float(sharp) or 1.0) if library.drives else math.inf,
-        least_interval=query.interval[0],
-        most_interval=query.interval[1],
+        least_interval=0.0,
+        most_interval=0.0,
         connection_factor=CONNECTION_FACTOR,
         connection_slack=_slack(library),
         tries=TRIES,
         stop_at_first=bool(resolution.stop),
         ends_early=bool(resolution.ends_early),
         truncated=resolution.truncated,
-        back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
+        back_off=0.0,
         shortest_truncated=float(SHORTEST_TRUNCATED * size),
-        clock=float(query.start_time),
-        most_time=float(query.most_time),
-        stay_until=float(query.stay_until),
-        most_trims=int(query.most_trims),
-        least_coast=float(query.least_coast * (1.0 - ROUNDING)),
-        checks_words=bool(query.most_trims > 0 or query.least_coast > 0.0 or library.limits_coasts),
+        clock=0.0,
+        most_time=math.inf,
+        stay_until=-math.inf,
+        most_trims=int(most_trims),
+        least_coast=float(least_coast * (1.0 - ROUNDING)),
+        checks_words=bool(most_trims > 0 or least_coast > 0.0 or library.limits_coasts),
         by_gear=by_gear,
         by_trim=by_trim,
         by_count=by_count,
     )
+    return task, layers
 
 
-def _layers(query: LatticeQuery, resolution: Resolution) -> tuple[bool, bool, bool, int]:
+def _layers(
+    library: LatticeLibrary, resolution: Resolution, most_trims: int, least_coast: float
+) -> tuple[bool, bool, bool, int]:
     """Whether cells know the gear, the trim and the count of trims, and how many layers that is."""
-    arrays = query.library.arrays
-    numbered = arrays.library
+    numbered = library.arrays.library
     by_gear = bool(resolution.layered and numbered.direction_change > 0.0)
-    by_trim = len(arrays.trims_of) > len(numbered.cost) and bool(
-        query.least_coast > 0.0
-        or query.library.limits_coasts
-        or (resolution.layered and numbered.switch > 0.0)
+    by_trim = len(library.arrays.trims_of) > len(numbered.cost) and bool(
+        least_coast > 0.0 or library.limits_coasts or (resolution.layered and numbered.switch > 0.0)
     )
-    by_count = query.most_trims > 0
+    by_count = most_trims > 0
     layers = len(numbered.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
     return by_gear, by_trim, by_count, layers * (numbered.n_trims + 1 if by_trim else 1)
 
@@ -209,7 +252,7 @@ def _lag(library: LatticeLibrary, aim_trims: IntArray) -> Array:
     """Least surplus (m + 1,) of maneuvers from each trim, and from none, to an aim's trim."""
     numbered = library.arrays.library
     classes = numbered.class_of
-    if not library.lag.any():
+    if not library.lags:
         return np.zeros(1 + numbered.n_trims)
     to_aims = library.lag[:, classes[aim_trims]].min(axis=1)
     return np.append(to_aims[classes[: numbered.n_trims]], to_aims[0])
@@ -227,11 +270,9 @@ def _slack(library: LatticeLibrary) -> float:
     return float(path + prices) if path > 0.0 else math.inf
 
 
-def _tick(query: LatticeQuery, resolution: Resolution) -> float:
-    """Length in time of a cell [s]; 0 where a costlier node is never the one that is in time."""
-    if not (query.moves or math.isfinite(query.most_time)):
-        return 0.0
-    durations = query.library.arrays.edge_durations
+def _tick(library: LatticeLibrary, resolution: Resolution) -> float:
+    """Length in time of a cell [s], where a costlier node may be the one that is in time."""
+    durations = library.arrays.edge_durations
     lasting = durations[durations > 0.0]
     return resolution.durations * float(lasting.min()) if lasting.size else 1.0
 

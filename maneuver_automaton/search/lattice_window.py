@@ -21,11 +21,15 @@ def window_of(
     the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
     """
     pad = 4.0 * radius + 4.0 * world.body.reach
-    low = np.minimum(world.box[:2], poses[:, :2].min(axis=0)) - pad
-    high = np.maximum(world.box[2:], poses[:, :2].max(axis=0)) + pad
+    # Plain numbers: arrays of two take longer than a first plan may.
+    low_x, low_y, high_x, high_y = world.box.tolist()
+    xs, ys = poses[:, 0].tolist(), poses[:, 1].tolist()
+    low_x, low_y = min(low_x, *xs) - pad, min(low_y, *ys) - pad
+    high_x, high_y = max(high_x, *xs) + pad, max(high_y, *ys) + pad
     if bounds.x is None and bounds.y is None:
-        window = np.array([*low.tolist(), *high.tolist(), 0.0, 0.0, 1.0, 0.0, 0.0])
+        window = np.array([low_x, low_y, high_x, high_y, 0.0, 0.0, 1.0, 0.0, 0.0])
         return window[:4], window, False
+    low, high = np.array([low_x, low_y]), np.array([high_x, high_y])
     turn = float(world.frame[2])
     c, s = math.cos(turn), math.sin(turn)
     corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
+from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.heights import Layer
 from maneuver_automaton.collision.layers import LayerArrays, always, bands_of, layer_arrays
-from maneuver_automaton.collision.world import World, own_frame, world_of
+from maneuver_automaton.collision.world import World, frame_at_first, world_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.part_motion import Part
 from maneuver_automaton.search.prepared import RECENT, Prepared
@@ -32,26 +36,63 @@ class Worlds:
     flat: LayerArrays | None  # they as arrays, where heights do not matter
 
 
+class Ends(NamedTuple):
+    """Start and goals of a problem in the plane, as the world around its body sees them."""
+
+    world: World
+    poses: Array  # (1 + n, 3) seen from the world's frame [m, m, rad]
+    clearances: Array  # (1 + n,) to what stands there, a lower bound as in `clearances` [m]
+
+
+@kept_by_first
+def ends_of(problem: Problem) -> Ends:
+    """Start and goals of a problem in the plane; nothing of it moves, and no part is carried."""
+    world = world_around(problem)
+    poses = world.into(np.array([problem.start, *(goal.pose for goal in problem.goals)]))
+    return Ends(world, poses, clearances(world, poses))
+
+
 def world_around(problem: Problem) -> World:
     """The obstacles of a problem around its footprint, prepared once for a map."""
-    frame = own_frame(problem.obstacles, problem.goals[0].pose)
-    return world_of(problem.obstacles, problem.footprint, frame, keep=problem.margin)
+    return _world(problem.setting, _frame(problem))
+
+
+@kept_by_first
+def _world(setting: Problem, frame: tuple[float, ...]) -> World:
+    return world_of(setting.obstacles, setting.footprint, frame, keep=setting.margin)
+
+
+def _frame(problem: Problem) -> tuple[float, ...]:
+    """The frame of the worlds of a problem."""
+    return _frame_on(problem.setting) or tuple(problem.goals[0].pose[:3].tolist())
+
+
+@kept_by_first
+def _frame_on(setting: Problem) -> tuple[float, ...]:
+    return frame_at_first(setting.obstacles)
 
 
 def worlds_around(
     problem: Problem, parts: tuple[Part, ...], *, prepared: Prepared = RECENT
 ) -> Worlds:
     """The obstacles and zones of a problem around the parts of its vehicle."""
-    low, high = problem.bounds.z or (-math.inf, math.inf)
-    below, above = problem.body_height
+    return _worlds_on(problem.setting, parts, _frame(problem), prepared)
+
+
+@kept_by_first
+def _worlds_on(
+    setting: Problem, parts: tuple[Part, ...], frame: tuple[float, ...], prepared: Prepared
+) -> Worlds:
+    low, high = setting.bounds.z or (-math.inf, math.inf)
+    below, above = setting.body_height
     return prepared.once(
         _worlds,
-        problem.obstacles,
-        problem.zones,
+        setting.obstacles,
+        setting.zones,
         tuple(part.shapes for part in parts),
-        own_frame(problem.obstacles, problem.goals[0].pose),
-        (low + below, high + above) if problem.start.size > 3 else None,
-        keep=problem.margin,
+        frame,
+        (low + below, high + above) if setting.start.size > 3 else None,
+        keep=setting.margin,
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.collision.convex import DIGITS
 from maneuver_automaton.collision.layers import ROUNDED, LayerArrays, layer_arrays
 from maneuver_automaton.problem import Problem
@@ -45,6 +46,7 @@ def scene_of(
 
     `margin` is the clearance that a proof needs beyond the problem's own [m].
     """
+    admitted = _admitted(library, problem.setting)
     edge_window = window.copy()
     edge_window[8] -= library.worst_error
     lowest, highest = -math.inf, math.inf
@@ -59,16 +61,26 @@ def scene_of(
         edge_window=edge_window,
         lowest=lowest - level - ROUNDED,
         highest=highest - level + ROUNDED,
-        zone_trims=_admitted_trims(problem, library),
-        zone_pieces=_admitted_pieces(problem, library),
+        zone_trims=admitted[0],
+        zone_pieces=admitted[1],
     )
+
+
+@kept_by_first
+def _admitted(
+    library: LatticeLibrary, setting: Problem
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which trims, and which pieces of maneuvers, each zone of a problem admits."""
+    return _admitted_trims(setting, library), _admitted_pieces(setting, library)
 
 
 def for_library(scene: Scene, problem: Problem, library: LatticeLibrary) -> Scene:
     """A scene for another library of the same trims."""
     edge_window = scene.window.copy()
     edge_window[8] -= library.worst_error
-    return scene._replace(edge_window=edge_window, zone_pieces=_admitted_pieces(problem, library))
+    return scene._replace(
+        edge_window=edge_window, zone_pieces=_admitted(library, problem.setting)[1]
+    )
 
 
 def _layers(problem: Problem, worlds: Worlds, pad: float, level: float) -> LayerArrays:

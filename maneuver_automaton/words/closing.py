@@ -9,6 +9,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups.chain import coasted
+from maneuver_automaton.words import _kernels_closing
 from maneuver_automaton.words.conjugation import conjugated, goal_before
 
 STEPS = 8
@@ -85,22 +86,35 @@ def closest_times(
     Gauss-Newton with the smallest change; no time becomes less than `at_least` [s], and what lasts
     no time stays so: it stands between two maneuvers.
     """
-    best, least = durations, math.inf
-    now = np.array(durations)
-    lasting = (now != 0.0) | (at_least < 0.0)
-    for _ in range(STEPS):
-        gap, columns = conditions.missing(now)
-        worst = float(np.abs(gap).max())
-        if worst < least:
-            best, least = now, worst
-        elif least < MET:
-            break
-        if worst < EXACT or not lasting.any():
-            break
-        change = np.zeros(now.size)
-        change[lasting] = np.linalg.lstsq(columns[:, lasting], gap, rcond=rank)[0]
-        now = np.maximum(now + change, at_least)
-    return np.asarray(best), least
+    start, goal = (np.zeros(4), np.zeros(4))
+    dof = conditions.start.size
+    start[:dof], goal[:dof] = conditions.start, conditions.goal
+    start[:2] -= goal[:2]  # seen from the goal's place no digit is lost
+    start[3] -= goal[3]
+    twists, product = np.zeros((len(durations), 4)), np.zeros(4)
+    twists[:, :dof] = conditions.twists
+    if conditions.product is not None:
+        product[:dof] = conditions.product
+    m = len(conditions.targets)
+    rows = np.zeros((m, len(durations)))
+    if conditions.rows is not None:
+        rows[:] = conditions.rows
+    best, missed = _kernels_closing.close_times(
+        start,
+        twists,
+        float(goal[2]),
+        product,
+        bool(conditions.free_heading),
+        rows,
+        np.array(conditions.targets, dtype=np.float64),
+        np.array(durations, dtype=np.float64),
+        float(rank),
+        float(at_least),
+        STEPS,
+        MET,
+        EXACT,
+    )
+    return best, missed
 
 
 def closed_at(

@@ -136,3 +136,64 @@ def test_what_is_then_missing_is_said():
     )
     times, missing = closest_times(straight, np.array([1.9]))
     assert (times.tolist(), missing) == ([2.0], 0.05)
+
+
+def closed_by_svd(conditions: EndConditions, durations: np.ndarray) -> tuple[np.ndarray, float]:
+    """The same by LAPACK, on the values and derivatives that `EndConditions` states."""
+    best, least, now = durations, math.inf, np.array(durations)
+    lasting = now != 0.0
+    for _ in range(8):
+        gap, columns = conditions.missing(now)
+        worst = float(np.abs(gap).max())
+        if worst < least:
+            best, least = now, worst
+        elif least < 1e-9:
+            break
+        if worst < 1e-15 or not lasting.any():
+            break
+        change = np.zeros(now.size)
+        change[lasting] = np.linalg.lstsq(columns[:, lasting], gap, rcond=1e-9)[0]
+        now = np.maximum(now + change, 0.0)
+    return best, least
+
+
+@given(
+    seed=st.integers(0, 10**6),
+    n=st.integers(1, 9),
+    dof=st.sampled_from([3, 4]),
+    kind=st.sampled_from(["any", "straight", "turns on the spot"]),
+    displaced=st.booleans(),
+    free_heading=st.booleans(),
+    timed=st.booleans(),
+)
+@settings(max_examples=draws(200))
+def test_the_kernel_does_what_singular_values_of_lapack_do(
+    seed, n, dof, kind, displaced, free_heading, timed
+):
+    rng = np.random.default_rng(seed)
+    twists = rng.normal(size=(n, dof))
+    twists[:, 2] *= kind != "straight"
+    twists[:, :2] *= kind != "turns on the spot"
+    times = rng.uniform(0.0, 3.0, n) * (rng.random(n) < 0.8)
+    group = SE2 if dof == 3 else SE2xR
+    start = 10.0 * rng.normal(size=dof)
+    end = group(start)
+    for twist, time in zip(twists, times, strict=True):
+        end = end @ group.exp(time * twist)
+    product = rng.normal(size=dof) if displaced else None
+    goal = np.array((end if product is None else end @ group(product)).pose)
+    goal[2] += float(free_heading)
+    conditions = EndConditions(
+        start=start,
+        twists=twists,
+        goal=goal,
+        free_heading=free_heading,
+        product=product,
+        rows=np.ones((1, n)) if timed else None,
+        targets=np.array([times.sum()] if timed else []),
+    )
+    near = times + (times > 0.0) * 1e-5 * rng.random(n)
+    expected, missed = closed_by_svd(conditions, near)
+    found, missing = closest_times(conditions, near)
+    assert found == pytest.approx(expected, abs=1e-11)
+    assert missing <= max(3.0 * missed, 1e-12)
