@@ -99,6 +99,48 @@ def inlined_kernel(function: Kernel) -> Kernel:
     return _later(function, _inner, {"forceinline": True, **NO_COUNTS})
 
 
+def plain(function: Kernel) -> Kernel:
+    """A kernel as Python has it, for callers of a formula that kernels need as well.
+
+    Examples
+    --------
+    >>> @inlined_kernel
+    ... def double(x):
+    ...     return 2.0 * x
+    >>> plain(double)(1.5)
+    3.0
+    """
+    return cast("Kernel", getattr(function, "__wrapped__", function))
+
+
+def bound(function: Callable[..., Any], *args: Any) -> Callable[[], Any]:
+    """A call of a kernel with these very arguments: their types are looked at now, and not again.
+
+    To find out the types of a hundred arrays takes longer than a small search. They stay what they
+    are, since the arguments do; what the arrays hold may change between two calls.
+
+    Examples
+    --------
+    >>> @kernel
+    ... def total(numbers):
+    ...     return numbers[0] + numbers[1]
+    >>> import numpy as np
+    >>> numbers = np.array([1.0, 2.0])
+    >>> call = bound(total, numbers)
+    >>> numbers[0] = 5.0
+    >>> call()
+    7.0
+    """
+    if not isinstance(function, CompiledLater):
+        return functools.partial(function, *args)
+    import numba
+
+    types = tuple(map(numba.typeof, args))
+    function.compiled.compile(types)  # type: ignore[attr-defined]
+    compiled = function.compiled.overloads[types]  # type: ignore[attr-defined]
+    return functools.partial(compiled.entry_point, *args)
+
+
 NO_COUNTS: dict[str, Any] = {"_nrt": False}
 LINKED = (0, 63), (0, 68)  # the first and the last numba whose insides `_linking` is known to fit
 

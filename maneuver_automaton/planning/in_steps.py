@@ -19,6 +19,7 @@ from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.steps import Steps, steps_of
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.result import plan_of
@@ -31,12 +32,18 @@ IN_SPACE = 23  # the same where some may pass above or below
 
 
 def plan_in_steps(
-    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+    problem: Problem,
+    budget: Budget,
+    workspace: Workspace,
+    /,
+    *,
+    alternatives: int,
+    begun: Begun | None = None,
 ) -> PlanResult:
     """The cheapest plan found: words and paths, the lattice, better words, checks, polishing.
 
     Where the problem limits its expansions, all steps count their work: the plan is then the same
-    at every call, unless the time is over before.
+    at every call, unless the time is over before. The lattice goes on from what is `begun`.
     """
     steps = steps_of(problem)
     found = Incumbents(
@@ -51,7 +58,7 @@ def plan_in_steps(
     if steps.words and not (budget.is_over or found.is_enough):
         _offer(found, _free_words(found, steps), proven=not problem.obstacles)
     if steps.lattice and not (budget.is_over or found.is_enough):
-        lattice = search_lattice(found, steps)
+        lattice = search_lattice(found, steps, begun)
         searched = budget.elapsed if lattice.knows_all else None
         if not problem.search.improve:
             found.offer_in_turn(lattice.candidates)

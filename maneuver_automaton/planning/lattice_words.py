@@ -28,6 +28,7 @@ from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.refinement.restarts import restarts_of
+from maneuver_automaton.search.beginning import Begun, ends_seen
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -118,12 +119,17 @@ class LatticeWords:
             self.found.offer(better, index, proven=False)  # it ends its coasts elsewhere
 
     def first_plan(
-        self, query: LatticeQuery, budget: Budget, *, most: int | None = None
+        self,
+        query: LatticeQuery,
+        budget: Budget,
+        *,
+        most: int | None = None,
+        begun: Begun | None = None,
     ) -> FirstPlan:
         """A first plan for a query, its expansions counted."""
         limits = [one for one in (most, budget.expansions) if one is not None]
         counted = replace(budget, expansions=min(limits, default=None))
-        found = first_plan(query, budget=counted, table=self.table)
+        found = first_plan(query, budget=counted, table=self.table, begun=begun)
         self._count(found.expansions, found.queries, searches=1)
         return found
 
@@ -150,27 +156,29 @@ class LatticeWords:
             self.found.counts.update(more)
 
 
-def search_lattice(found: Incumbents, steps: Steps) -> LatticeWords:
+def search_lattice(found: Incumbents, steps: Steps, begun: Begun | None = None) -> LatticeWords:
     """The words found for a problem: a first one, and better ones for as long as there is time.
 
     Most of the time that is left may go by until there is a plan, the rest is for a proof that
     there is none; a share of it is for better ones where polishing or alternatives come after.
     """
     problem, prepared = found.problem, found.workspace.prepared
-    query = lattice_query(problem, goals_left(problem), prepared=prepared)
+    goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
+    ends = None if begun is None else ends_seen(begun)
+    query = lattice_query(problem, goals, prepared=prepared, ends=ends)
     known = query.library.at_will
     table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
     query = query if known else late_at_first(query)
     alone = not found.plans
     share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
     lattice = LatticeWords(query, table, found, steps, alone, found.for_first.stage(share))
-    lattice.first = _first(lattice)
+    lattice.first = _first(lattice, begun)
     # The path in the plane, where a way leads far round, takes longer than a first plan.
     lattice.bound = lattice_bound(query) if steps.at_will and problem.search.improve else None
     return lattice
 
 
-def _first(lattice: LatticeWords) -> FirstPlan | None:
+def _first(lattice: LatticeWords, begun: Begun | None = None) -> FirstPlan | None:
     """The first plan; where obstacles move, one with rests if a quick search finds none."""
     query, limit = lattice.query, lattice.limit
     if query.problem.obstacles and not lattice.found.plans:
@@ -187,7 +195,7 @@ def _first(lattice: LatticeWords) -> FirstPlan | None:
         if timed is not None:
             lattice.gained(timed)
             return first
-    first = lattice.first_plan(query, limit)
+    first = lattice.first_plan(query, limit, begun=begun)
     if first.word is not None:
         lattice.gained(first.word)
     return first

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import Problem
 
 
@@ -20,6 +21,11 @@ def uses_lattice(problem: Problem) -> bool:
     does and the heading never changes; and a rest where the time is fixed. Otherwise words are
     searched, and those that meet obstacles are refused.
     """
+    return _uses_lattice(problem.setting)
+
+
+@kept_by_first
+def _uses_lattice(problem: Problem) -> bool:
     if climbs_among_obstacles(problem):
         return True
     velocities = problem.automaton.body_velocities

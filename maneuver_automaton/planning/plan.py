@@ -19,6 +19,7 @@ from maneuver_automaton.planning.off_lattice import goals_off_lattice
 from maneuver_automaton.planning.result import LowerBound, PlanResult
 from maneuver_automaton.planning.workspace import Workspace, workspace_of
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.beginning import Begun, begin, end, prepare_bench
 from maneuver_automaton.search.choose import load_search
 
 
@@ -169,6 +170,12 @@ def _answered(
     problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The answer to a problem whose goals are met exactly."""
+    begun = begin(problem, workspace.prepared)
+    if begun is not None:  # its ends are free
+        try:
+            return _searched(problem, budget, workspace, alternatives=alternatives, begun=begun)
+        finally:
+            end(problem, begun, workspace.prepared)
     blocked = blocked_ends(problem) or goals_off_lattice(problem)
     if blocked is not None:
         return blocked
@@ -180,13 +187,19 @@ def _answered(
 
 
 def _searched(
-    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
+    problem: Problem,
+    budget: Budget,
+    workspace: Workspace,
+    /,
+    *,
+    alternatives: int,
+    begun: Begun | None = None,
 ) -> PlanResult:
     """The answer of the search that suits a problem without zones."""
     if has_inertia(problem) or uses_lattice(problem):
         from maneuver_automaton.planning.in_steps import plan_in_steps
 
-        return plan_in_steps(problem, budget, workspace, alternatives=alternatives)
+        return plan_in_steps(problem, budget, workspace, alternatives=alternatives, begun=begun)
     return plan_by_words(problem, budget, workspace, alternatives=alternatives)
 
 
@@ -200,6 +213,7 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
 
         goals = tuple(range(len(problem.goals)))
         lattice_query(problem, goals, prepared=workspace.prepared)
+        prepare_bench(problem, workspace.prepared)
         load_checks(problem, workspace)
 
 
@@ -209,6 +223,8 @@ def _load(problem: Problem, workspace: Workspace) -> None:
     if problem.ends not in ready:
         _load_all(problem, workspace)
         ready.add(problem.ends)
+    if problem.setting is not problem and uses_lattice(problem):  # others may follow it
+        prepare_bench(problem, workspace.prepared)
 
 
 @kept_by_first

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel, kernel
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
@@ -16,9 +16,30 @@ if TYPE_CHECKING:
 
 BLOCKED, SETTLED, REACHED = 1, 2, 3  # marks of a cell; 0 is one that nothing is known of
 STRAIGHT, DIAGONAL = 29, 41  # a step to a neighbour, in units: 41 / 29 is 0.03 % below sqrt(2)
+DETOUR = 4  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
 NARROW = 4  # how much dearer a cell is whose middle is no place for the vehicle
 BUCKETS = 256  # a power of two, more than ``NARROW * DIAGONAL + DIAGONAL``, see `_queue`
 LISTED, N_SETTLED, AT_RIM, FAR, WRITTEN, NOW = range(6)  # places in `grid.state`
+
+
+@inlined_kernel
+def grid_layout(
+    origin: float, low: float, high: float, cell: float, field_cell: float, stride: int
+) -> tuple[int, int, float]:
+    """Along one axis: the first cell, how many there are, and where the first begins [m].
+
+    Of cells of `stride` cells of the field, whose origin it is, from `low` to `high`.
+    """
+    origin -= (stride // 2) * field_cell
+    first = math.floor((low - origin) / cell)
+    last = math.floor((high - origin) / cell)  # the far rim belongs to it too
+    return first, max(last - first, 0) + 1, origin + first * cell
+
+
+@inlined_kernel
+def detour_of(columns: int, rows: int) -> int:
+    """How much longer a path is preferred to one through a wall thinner than a cell [units]."""
+    return DETOUR * (columns + rows) * STRAIGHT
 
 
 @bare_inner_kernel
@@ -197,6 +218,12 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
 @bare_kernel
 def seed(grid: DistanceGrid, points: Array) -> None:
     """Set the distance of the cells of `points` (n, 2) to 0."""
+    sow(grid, points)
+
+
+@bare_inner_kernel
+def sow(grid: DistanceGrid, points: Array) -> None:
+    """The same within a kernel; `points` (n, 2 or more)."""
     for k in range(points.shape[0]):
         i = math.floor((points[k, 0] - grid.origin_x) / grid.cell)
         j = math.floor((points[k, 1] - grid.origin_y) / grid.cell)

@@ -61,6 +61,21 @@ def expand(
     n: int,
     upper_bound: float,
 ) -> int:
+    """Expand up to `n` nodes, as `expanded`, for callers from Python."""
+    return expanded(search, task, lib, scene, grid, table, n, upper_bound)
+
+
+@bare_inner_kernel
+def expanded(
+    search: SearchArrays,
+    task: Task,
+    lib: LatticeArrays,
+    scene: Scene,
+    grid: DistanceGrid,
+    table: CostTable,
+    n: int,
+    upper_bound: float,
+) -> int:
     """Expand up to `n` nodes, the roots first; stops at the first connection if the task says so.
 
     Children that cannot lead to less than `upper_bound` are left out. Returns whether it may go on:

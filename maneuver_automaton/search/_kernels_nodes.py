@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.lattice_task import Task
 
 FULL_TURN = 2.0 * math.pi
+MOST_SIDES = 1 << 15  # cells along a side that have numbers of their own
+MOST_KEYS = 1 << 62  # numbers of cells: they are signed and have 64 bits
 COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
 NODE_BITS = 0x7FFFFFFF  # of an entry of the hash table: the node; above them the search
 X, Y, HEADING, Z, COST, TIME, COAST, RUN, CLEARANCE = range(9)
@@ -61,6 +63,21 @@ PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
     QUERIES,  # motions and connections that were tested
     BEGUN,  # 1 once the roots are pushed
 ) = range(13)
+
+
+@inlined_kernel
+def cells_along(cell: float, far: float, others: int) -> int:
+    """Number of cells along a side of a window [m] that have numbers of their own, a power of two.
+
+    `others` is the product of what headings, levels, ticks and layers need.
+    """
+    sides = 2
+    # A quotient, which is exact, in place of a product, which might need more than 64 bits.
+    while (
+        sides < MOST_SIDES and sides * cell < 4.0 * far and others < MOST_KEYS // (2 * sides) ** 2
+    ):
+        sides *= 2
+    return sides
 
 
 @inlined_kernel

@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import plain
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
-from maneuver_automaton.search._kernels_distance import BUCKETS, STRAIGHT
+from maneuver_automaton.search._kernels_distance import BUCKETS
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
 OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one
 COARSER = 3  # field cells along a side of a coarse cell
 COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed radius, at most
-DETOUR = 4  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
 
 
 class DistanceGrid(NamedTuple):
@@ -67,29 +67,14 @@ def distance_grid(
     neighbours is at most half a diagonal from one of them, which is blocked if the radius is a
     whole diagonal.
     """
-    field = world.arrays.field
-    if not field.distance.size:
+    if not world.arrays.field.distance.size:
         return _none()
-    low_x, low_y, high_x, high_y = box.tolist()
-    area = max(high_x - low_x, field.cell) * max(high_y - low_y, field.cell)
-    stride = stride_of(area, field.cell)
-    if coarse and COARSER * field.cell * math.sqrt(0.5) <= COARSEST * world.body.inscribed:
-        stride = max(stride, COARSER)
-    cell = stride * field.cell
-    origin_x = field.origin_x - (stride // 2) * field.cell
-    origin_y = field.origin_y - (stride // 2) * field.cell
-    first_i, first_j = math.floor((low_x - origin_x) / cell), math.floor((low_y - origin_y) / cell)
-    # The far rim belongs to it too.
-    last_i, last_j = math.floor((high_x - origin_x) / cell), math.floor((high_y - origin_y) / cell)
-    columns, rows = max(last_i - first_i, 0) + 1, max(last_j - first_j, 0) + 1
-    start_x, start_y = origin_x + first_i * cell, origin_y + first_j * cell
-    n = columns * rows
-    half_diagonal = cell * math.sqrt(0.5)
-    aim_x, aim_y = aim[:2].tolist()
+    grid = laid_grid(world, box, aim, coarse=coarse)
+    n = grid.columns * grid.rows
     most = 8 * n + 8  # each cell is reached once from each of its neighbours at most
     memory = prepared.room(2 * n + 3 * most, np.int64)
     keys, items, links = (memory[2 * n + k * most : 2 * n + (k + 1) * most] for k in range(3))
-    grid = DistanceGrid(
+    grid = grid._replace(
         value=memory[:n],
         rank=memory[n : 2 * n],
         mark=np.zeros(n, dtype=np.uint8),
@@ -98,6 +83,29 @@ def distance_grid(
         links=links,
         heads=np.zeros(BUCKETS, dtype=np.int64),
         state=np.zeros(6, dtype=np.int64),
+    )
+    _kernels_distance.seed(grid, np.ascontiguousarray(seeds[:, :2]))
+    return grid
+
+
+def laid_grid(
+    world: World, box: Array, aim: Array, *, coarse: bool = False, like: DistanceGrid | None = None
+) -> DistanceGrid:
+    """The grid of `distance_grid` without its arrays, or with those of another one."""
+    field = world.arrays.field
+    low_x, low_y, high_x, high_y = box.tolist()
+    area = max(high_x - low_x, field.cell) * max(high_y - low_y, field.cell)
+    few = area <= MOST_CELLS * field.cell * field.cell
+    stride = 1 if few else stride_of(area, field.cell)
+    if coarse and COARSER * field.cell * math.sqrt(0.5) <= COARSEST * world.body.inscribed:
+        stride = max(stride, COARSER)
+    cell = stride * field.cell
+    layout = plain(_kernels_distance.grid_layout)
+    first_i, columns, start_x = layout(field.origin_x, low_x, high_x, cell, field.cell, stride)
+    first_j, rows, start_y = layout(field.origin_y, low_y, high_y, cell, field.cell, stride)
+    half_diagonal = cell * math.sqrt(0.5)
+    aim_x, aim_y = aim[:2].tolist()
+    return (like or _none())._replace(
         origin_x=start_x,
         origin_y=start_y,
         cell=cell,
@@ -109,12 +117,25 @@ def distance_grid(
         inflation=world.body.inscribed - half_diagonal,
         wanted=world.body.inscribed,
         cut=half_diagonal if world.body.inscribed < 2.0 * half_diagonal else -math.inf,
-        detour=DETOUR * (columns + rows) * STRAIGHT,
+        detour=plain(_kernels_distance.detour_of)(columns, rows),
         aim_i=math.floor((aim_x - start_x) / cell),
         aim_j=math.floor((aim_y - start_y) / cell),
     )
-    _kernels_distance.seed(grid, np.ascontiguousarray(seeds[:, :2]))
-    return grid
+
+
+def with_cells(grid: DistanceGrid, n: int) -> DistanceGrid:
+    """The grid with memory of its own for `n` cells, of which nothing is known."""
+    most = 8 * n + 8
+    return grid._replace(
+        value=np.zeros(n, dtype=np.int64),
+        rank=np.zeros(n, dtype=np.int64),
+        mark=np.zeros(n, dtype=np.uint8),
+        keys=np.zeros(most),
+        items=np.zeros(most, dtype=np.int64),
+        links=np.zeros(most, dtype=np.int64),
+        heads=np.zeros(BUCKETS, dtype=np.int64),
+        state=np.zeros(6, dtype=np.int64),
+    )
 
 
 def stride_of(area: float, cell: float) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,11 +11,16 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
 from maneuver_automaton.search.lattice_pass import Pass, give_back, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_schedules import Schedule, schedule_of
+from maneuver_automaton.search.lattice_schedules import (
+    Schedule,
+    first_resolutions,
+    schedule_of,
+)
 from maneuver_automaton.search.lattice_task import Resolution
 from maneuver_automaton.search.reversal import forward_word, reversed_query, to_reverse
 from maneuver_automaton.words.word import Word
@@ -42,6 +47,7 @@ def first_plan(
     budget: Budget = UNLIMITED,
     table: CostTable = NO_TABLE,
     grids: Grids | None = None,
+    begun: Begun | None = None,
 ) -> FirstPlan:
     """The first connection from start to a goal, at the first resolution that has one.
 
@@ -54,14 +60,18 @@ def first_plan(
     table : CostTable
     grids : tuple of DistanceGrid, optional
         Distances to the goals and to the start along fine cells, if they are known.
+    begun : Begun, optional
+        The first search of the schedule, if it is begun.
     """
     schedule = schedule_of(query.library)
     guides = _Guides(query, table, grids)
     room = 2**62 if budget.expansions is None else budget.expansions
-    (_, coarse), *stages = schedule.stages
-    if query.settings.weight is not None:
-        coarse = tuple(replace(one, weight=query.settings.weight) for one in coarse)
-    turns = _turns(guides, schedule, coarse)
+    stages = list(schedule.stages[1:])
+    turns = _turns(guides, schedule, first_resolutions(query.library, query.settings))
+    if begun is not None:
+        turns[0].begun = begun.search_of(query)
+        if not begun.is_found:
+            guides.coarse_grids[turns[0].sign] = turns[0].begun.grid
     word, proof, total, left_out = None, "", 0, False
     while word is None:
         for one in turns:
@@ -69,7 +79,7 @@ def first_plan(
                 continue
             search = one.begun or one.begin()
             search.is_late = budget.left < search.first_takes  # nothing is begun that would be late
-            before = search.expansions
+            before = search.expansions - search.untold
             word = search.run(min(one.chunk, room - total), math.inf, budget=budget)
             total += search.expansions - before
             one.chunk = min(2 * one.chunk, schedule.most_chunk)
@@ -103,7 +113,8 @@ def first_plan(
         nodes=_expanded(query, passes) if query.settings.show_nodes else None,
     )
     for search in passes:
-        give_back(search)
+        if begun is None or search is not turns[0].begun:  # whose arrays are those of the bench
+            give_back(search)
     return found
 
 

@@ -56,6 +56,7 @@ class Pass:
     chunk: int = FIRST_CHUNK
     alive: bool = True
     is_late: bool = False  # no time is left to make room for more nodes
+    untold: int = 0  # expansions that were done before it was asked to run
 
     @property
     def expansions(self) -> int:
@@ -70,7 +71,11 @@ class Pass:
     @property
     def first_takes(self) -> float:
         """About how long the first expansion takes, which nobody can stop [s]."""
-        return 0.0 if self.expansions else STEERED_S * _steered(self.library, self.task)
+        return (
+            0.0
+            if self.arrays.state[layout.BEGUN]
+            else STEERED_S * _steered(self.library, self.task)
+        )
 
     @property
     def queries(self) -> int:
@@ -94,12 +99,12 @@ class Pass:
 
     def run(self, n: int, upper_bound: float, *, budget: Budget = UNLIMITED) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
-        left = self.expansions + n
+        left, self.untold = self.expansions - self.untold + n, 0
         self.pace.go_on(budget)
         while self.may_expand and self.expansions < left and not budget.is_over:
-            self._expand(min(left - self.expansions, TIMELY), upper_bound)
             if self.task.stop_at_first and self.arrays.state[layout.FOUND]:
                 break
+            self._expand(min(left - self.expansions, TIMELY), upper_bound)
             if self.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
                 break
         return _word(self) if self.arrays.state[layout.FOUND] else None
@@ -151,7 +156,7 @@ def pass_of(
             arrays = search_arrays(scaled.library)
     room = with_room(arrays, len(task.roots) + 4)
     begin_anew(room)
-    pace = Pace(UNLIMITED, steps=max(1, min(FIRST_CHUNK, AT_FIRST // _steered(scaled, task))))
+    pace = Pace(UNLIMITED, steps=first_steps(scaled, task))
     return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
 
 
@@ -160,6 +165,11 @@ def give_back(one: Pass) -> None:
     spare = one.query.prepared.once(spare_searches, one.query.library)
     if len(spare) < MOST_SPARE and len(one.arrays.nodes) <= LARGEST_SPARE:
         spare.append(one.arrays)
+
+
+def first_steps(library: LatticeArrays, task: Task) -> int:
+    """Expansions before the clock is looked at first."""
+    return max(1, min(FIRST_CHUNK, AT_FIRST // _steered(library, task)))
 
 
 def _steered(library: LatticeArrays, task: Task) -> int:

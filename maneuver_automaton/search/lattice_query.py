@@ -22,7 +22,7 @@ from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_window import window_of
-from maneuver_automaton.search.lattice_worlds import Worlds, ends_of, worlds_around
+from maneuver_automaton.search.lattice_worlds import Ends, Worlds, ends_of, worlds_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import Scene, scene_of
 from maneuver_automaton.words.library import NO_TRIM
@@ -151,12 +151,14 @@ def lattice_query(
     *,
     prepared: Prepared = RECENT,
     library: LatticeLibrary | None = None,
+    ends: Ends | None = None,
 ) -> LatticeQuery:
     """The query of a search from the start of a problem to the goals of these numbers.
 
     A vehicle that switches at will begins and ends in any trim. Unless it does so in a plane,
     several headings are asked for where any will do: best times then let the heading go. A fixed
-    time is a longest one, since rest fills it. A `library` takes the place of the usual one.
+    time is a longest one, since rest fills it. A `library` takes the place of the usual one; `ends`
+    of a vehicle in the plane are not looked at again.
 
     Raises
     ------
@@ -166,25 +168,26 @@ def lattice_query(
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
     if library.at_will and problem.start.size == 3 and not (problem.parts or problem.moves):
-        ends = _ends_in_plane(problem, goals)
+        aimed = _ends_in_plane(problem, goals, ends or ends_of(problem))
     else:
-        ends = _ends(problem, goals, library, worlds)
-    margin = _margin(library, worlds.whole, ends.clear)
-    box, window, bounded = window_of(problem.bounds, worlds.outer, ends.seen, radius=library.radius)
+        aimed = _ends(problem, goals, library, worlds)
+    margin = _margin(library, worlds.whole, aimed.clear)
+    radius = library.radius
+    box, window, bounded = window_of(problem.bounds, worlds.outer, aimed.seen, radius=radius)
     most = horizon.max_time if horizon.time is None else horizon.time
     return LatticeQuery(
         problem=problem,
         library=library,
         world=worlds.whole,
         plane=worlds.plane,
-        around=scene_of(problem, library, worlds, window, margin=margin, level=ends.level),
-        start=ends.seen[0],
-        start_trim=int(ends.trims[0]),
-        goals=ends.seen[1:],
-        goal_trims=ends.trims[1:],
-        free_heading=ends.free,
-        goal_poses=ends.poses[1:],
-        goal_index=ends.index,
+        around=scene_of(problem, library, worlds, window, margin=margin, level=aimed.level),
+        start=aimed.seen[0],
+        start_trim=int(aimed.trims[0]),
+        goals=aimed.seen[1:],
+        goal_trims=aimed.trims[1:],
+        free_heading=aimed.free,
+        goal_poses=aimed.poses[1:],
+        goal_index=aimed.goals,
         box=box,
         bounded=bounded,
         most_time=math.inf if most is None else most * (1.0 + 1e-12),
@@ -199,14 +202,13 @@ class _Ends(NamedTuple):
     seen: Array  # (1 + n, 4) as the query does
     clear: Array  # (1 + n,) [m] clearance beyond the margin
     trims: IntArray  # (1 + n,) NO_TRIM: any will do
-    index: tuple[int, ...]  # (n,) which of the problem's goals they belong to
+    goals: tuple[int, ...]  # (n,) which of the problem's goals they belong to
     free: NDArray[np.bool_]  # (n,) whether any heading will do
     level: float = 0.0  # [m] altitude from which others are counted
 
 
-def _ends_in_plane(problem: Problem, goals: Sequence[int]) -> _Ends:
+def _ends_in_plane(problem: Problem, goals: Sequence[int], known: Ends) -> _Ends:
     """The ends of a vehicle that switches at will in a plane, which were looked at before."""
-    known = ends_of(problem)
     seen = np.zeros((1 + len(problem.goals), 4))
     seen[:, :3] = known.poses
     clear = known.clearances - problem.margin
@@ -218,7 +220,7 @@ def _ends_in_plane(problem: Problem, goals: Sequence[int]) -> _Ends:
         seen=seen,
         clear=clear,
         trims=np.full(1 + len(goals), NO_TRIM),
-        index=tuple(goals),
+        goals=tuple(goals),
         free=np.array([problem.goals[k].free_heading for k in goals], dtype=np.bool_),
     )
 
@@ -295,9 +297,14 @@ def _end_clearances(
     return least - problem.margin
 
 
+def usual_margin(library: LatticeLibrary, world: World) -> float:
+    """Proven clearance if start and goals allow it, a share of the body [m]."""
+    return MARGIN * (library.half_width or _typical(world))
+
+
 def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
-    """Proven clearance: a share of the body, at most half of that at start and goals."""
-    usual = MARGIN * (library.half_width or _typical(world))
+    """Proven clearance: the usual one, at most half of that at start and goals."""
+    usual = usual_margin(library, world)
     halves = [0.5 * one for one in clear.tolist() if one > 0.0]
     return float(max(LEAST_MARGIN, min([usual, *halves])))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
+from maneuver_automaton.problem import SearchSettings
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_task import Resolution
 
@@ -84,6 +85,14 @@ def schedule_of(library: LatticeLibrary) -> Schedule:
             for after, begun in stages
         )
     )
+
+
+def first_resolutions(library: LatticeLibrary, settings: SearchSettings) -> tuple[Resolution, ...]:
+    """The resolutions with which a search begins, at the weight that is asked for."""
+    _, begun = schedule_of(library).stages[0]
+    if settings.weight is None:
+        return begun
+    return tuple(replace(one, weight=settings.weight) for one in begun)
 
 
 def as_wide_as_turns(library: LatticeLibrary) -> tuple[Resolution, ...]:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import plain
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import SearchSettings
+from maneuver_automaton.search._kernels_nodes import cells_along
 from maneuver_automaton.search.distance_grid import OCTILE
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -30,9 +32,8 @@ BACK_OFF = 0.01  # [half widths of the body] kept before contact
 SHORTEST_TRUNCATED = 0.03  # [half widths] of an edge that ends there
 SAMPLED_HEADINGS = 16  # roots at a goal whose heading is free
 ROUNDING = 1e-12  # relative, by which a coast may fall short of the least one
-MOST_SIDES, MOST_LEVELS, MOST_TICKS = 1 << 15, 1 << 8, 1 << 11  # cells that have numbers of theirs
+MOST_LEVELS, MOST_TICKS = 1 << 8, 1 << 11  # that have numbers of their own
 MOST_COUNTS = 16  # of trims that make another cell
-MOST_KEYS = 1 << 62  # numbers of cells: they are signed and have 64 bits
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,8 +113,6 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
     known, layers = _sizes(
         query.library, query.settings, resolution, timed, query.most_trims, query.least_coast
     )
-    size = query.half_width or query.library.radius * 0.1
-    finest = max(known.headings, known.fine_headings)
     least, most = query.interval
     return known._replace(
         sign=sign,
@@ -128,10 +127,10 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         frame_heading=heading,
         frame_cos=math.cos(heading),
         frame_sin=math.sin(heading),
-        radix=_radix(query, known.fine_cell, finest, known.tick, layers),
+        radix=_radix(query, known, layers),
         least_interval=least,
         most_interval=most,
-        back_off=float(max(BACK_OFF * size, 2.0 * query.margin)),
+        back_off=float(max(back_off_of(query.library), 2.0 * query.margin)),
         clock=float(query.start_time),
         most_time=float(query.most_time),
         stay_until=float(query.stay_until),
@@ -152,7 +151,6 @@ def _sizes(
     `timed`: of two nodes of a cell the costlier may be the one that is in time.
     """
     cell = resolution.scale * (settings.cell or library.cell)
-    size = library.half_width or library.radius * 0.1
     interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
     sharp = interval * library.radius * library.per_metre
     by_gear, by_trim, by_count, layers = _layers(library, resolution, most_trims, least_coast)
@@ -192,7 +190,7 @@ def _sizes(
         ends_early=bool(resolution.ends_early),
         truncated=resolution.truncated,
         back_off=0.0,
-        shortest_truncated=float(SHORTEST_TRUNCATED * size),
+        shortest_truncated=float(SHORTEST_TRUNCATED * _size(library)),
         clock=0.0,
         most_time=math.inf,
         stay_until=-math.inf,
@@ -277,19 +275,32 @@ def _tick(library: LatticeLibrary, resolution: Resolution) -> float:
     return resolution.durations * float(lasting.min()) if lasting.size else 1.0
 
 
-def _radix(
-    query: LatticeQuery, cell: float, headings: int, tick: float, layers: int
-) -> tuple[int, int, int, int]:
+def _radix(query: LatticeQuery, task: Task, layers: int) -> tuple[int, int, int, int]:
     """How many numbers each coordinate of a cell needs; more cells than that share numbers.
 
     Where numbers are short, places far apart share them: that drops a node, never a proof.
     """
     low_x, low_y, high_x, high_y = query.box.tolist()
     far = max(high_x - low_x, high_y - low_y)  # no pose of the window is farther from the frame
-    turns, levels = headings + 1, MOST_LEVELS if query.library.climbs else 1
-    ticks = MOST_TICKS if tick > 0.0 else 1
+    turns = max(task.headings, task.fine_headings) + 1
+    levels = MOST_LEVELS if query.library.climbs else 1
+    ticks = MOST_TICKS if task.tick > 0.0 else 1
     others = layers * 2 * ticks * levels * turns  # two: truncated edges have cells of their own
-    sides = 2
-    while sides < MOST_SIDES and sides * cell < 4.0 * far and others * (2 * sides) ** 2 < MOST_KEYS:
-        sides *= 2
-    return sides, int(turns), levels, ticks
+    return plain(cells_along)(task.fine_cell, far, others), turns, levels, ticks
+
+
+def numbers_of_cells(query: LatticeQuery, task: Task, resolution: Resolution) -> int:
+    """How many numbers the cells of one place need: the `others` of `cells_along`."""
+    *_, layers = _layers(query.library, resolution, query.most_trims, query.least_coast)
+    _, turns, levels, ticks = task.radix
+    return layers * 2 * ticks * levels * turns
+
+
+def back_off_of(library: LatticeLibrary) -> float:
+    """Distance kept before contact, as far as the margin does not ask for more [m]."""
+    return BACK_OFF * _size(library)
+
+
+def _size(library: LatticeLibrary) -> float:
+    """Half the width of the body [m]; of a point a share of its turns."""
+    return library.half_width or library.radius * 0.1

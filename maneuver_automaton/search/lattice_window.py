@@ -12,6 +12,11 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
 
 
+def pad_around(world: World, radius: float) -> float:
+    """How far [m] a window without bounds goes beyond all that stands, and the ends."""
+    return 4.0 * radius + 4.0 * world.body.reach
+
+
 def window_of(
     bounds: Bounds, world: World, poses: Array, *, radius: float
 ) -> tuple[Array, Array, bool]:
@@ -20,7 +25,7 @@ def window_of(
     A box (4,) in the world's frame, a window as in `_kernels_window.inside_window`, and whether
     the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
     """
-    pad = 4.0 * radius + 4.0 * world.body.reach
+    pad = pad_around(world, radius)
     # Plain numbers: arrays of two take longer than a first plan may.
     low_x, low_y, high_x, high_y = world.box.tolist()
     xs, ys = poses[:, 0].tolist(), poses[:, 1].tolist()

@@ -39,7 +39,6 @@ class Worlds:
 class Ends(NamedTuple):
     """Start and goals of a problem in the plane, as the world around its body sees them."""
 
-    world: World
     poses: Array  # (1 + n, 3) seen from the world's frame [m, m, rad]
     clearances: Array  # (1 + n,) to what stands there, a lower bound as in `clearances` [m]
 
@@ -49,7 +48,7 @@ def ends_of(problem: Problem) -> Ends:
     """Start and goals of a problem in the plane; nothing of it moves, and no part is carried."""
     world = world_around(problem)
     poses = world.into(np.array([problem.start, *(goal.pose for goal in problem.goals)]))
-    return Ends(world, poses, clearances(world, poses))
+    return Ends(poses, clearances(world, poses))
 
 
 def world_around(problem: Problem) -> World:

@@ -86,23 +86,20 @@ def closest_times(
     Gauss-Newton with the smallest change; no time becomes less than `at_least` [s], and what lasts
     no time stays so: it stands between two maneuvers.
     """
-    start, goal = (np.zeros(4), np.zeros(4))
-    dof = conditions.start.size
-    start[:dof], goal[:dof] = conditions.start, conditions.goal
-    start[:2] -= goal[:2]  # seen from the goal's place no digit is lost
-    start[3] -= goal[3]
-    twists, product = np.zeros((len(durations), 4)), np.zeros(4)
+    n, dof = len(durations), conditions.start.size
+    start, twists, product = np.zeros(4), np.zeros((n, 4)), np.zeros(4)
+    start[:dof] = conditions.start - conditions.goal  # from the goal's place no digit is lost
+    start[2] = conditions.start[2]
     twists[:, :dof] = conditions.twists
     if conditions.product is not None:
         product[:dof] = conditions.product
-    m = len(conditions.targets)
-    rows = np.zeros((m, len(durations)))
+    rows = np.zeros((len(conditions.targets), n))
     if conditions.rows is not None:
         rows[:] = conditions.rows
-    best, missed = _kernels_closing.close_times(
+    return _kernels_closing.close_times(
         start,
         twists,
-        float(goal[2]),
+        float(conditions.goal[2]),
         product,
         bool(conditions.free_heading),
         rows,
@@ -114,7 +111,6 @@ def closest_times(
         MET,
         EXACT,
     )
-    return best, missed
 
 
 def closed_at(

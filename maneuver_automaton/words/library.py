@@ -5,6 +5,7 @@ Everything here is the same for every start, goal and map: symmetry makes it reu
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -71,7 +72,7 @@ class Scratch(NamedTuple):
     branches: Array  # (2, 3)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Library:
     """Trims of an automaton prepared for a search, with their prices."""
 
@@ -81,7 +82,7 @@ class Library:
     maneuver_costs: Array  # (M,) of the automaton's maneuvers
     arrays: LibraryArrays
 
-    @property
+    @functools.cached_property
     def number_of(self) -> IntArray:
         """Number of each trim of the automaton among `trims`, NO_TRIM for those left out."""
         numbers = np.full(len(self.automaton), NO_TRIM)

@@ -80,14 +80,20 @@ def word_of_steps(
     times = np.array(durations, dtype=np.float64)
     held = np.array(transitions, dtype=np.int64)
     cost, lasting = _price(library, numbers, times, held) if library else (math.nan, 0.0)
-    return Word(
-        trims=numbers,
-        durations=times,
-        transitions=held,
-        goal=goal,
-        cost=cost,
-        maneuver_time=lasting,
-    )
+    for array in (numbers, times, held):
+        array.setflags(write=False)
+    word: Word = object.__new__(Word)  # its arrays are its own, and of the right kinds
+    for name, value in (
+        ("trims", numbers),
+        ("durations", times),
+        ("transitions", held),
+        ("goal", goal),
+        ("cost", cost),
+        ("maneuver_time", lasting),
+        ("certificate", None),
+    ):
+        object.__setattr__(word, name, value)
+    return word
 
 
 def with_price(library: Library, word: Word) -> Word:
@@ -102,12 +108,14 @@ def _price(
     """Cost of a word at the prices of a library, and the time of its maneuvers [s]."""
     arrays, numbers = library.arrays, library.number_of[trims]
     cost, lasting, switches = float(arrays.rates[numbers] @ durations), 0.0, len(transitions)
-    held = transitions[transitions != SWITCH]
-    if held.size:
+    if library.automaton.maneuvers:
+        held = transitions[transitions != SWITCH]
         lasting = float(sum(library.automaton.maneuvers[k].duration for k in held))
         cost += float(library.maneuver_costs[held].sum())
         switches -= held.size
     cost += arrays.switch * switches
+    if arrays.direction_change == 0.0:
+        return cost, lasting
     gears = arrays.gears[numbers]
     gears = gears[gears != 0]
     return cost + arrays.direction_change * int(np.count_nonzero(gears[1:] != gears[:-1])), lasting

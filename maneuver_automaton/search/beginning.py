@@ -1,0 +1,246 @@
+"""The first call of the compiled search for a query: all its arguments are made once, for many.
+
+A first plan in a room takes a few dozen expansions. To work out anew for each query what all of
+them share, and of which types a hundred arrays are, takes longer than that.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import bound
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.budget import UNLIMITED, Pace
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search import _kernels_begin as kernels
+from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search.cost_to_go import NO_TABLE
+from maneuver_automaton.search.distance_grid import DistanceGrid, laid_grid, with_cells
+from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
+from maneuver_automaton.search.lattice_pass import Pass, first_steps
+from maneuver_automaton.search.lattice_query import (
+    LEAST_MARGIN,
+    LatticeQuery,
+    lattice_query,
+    usual_margin,
+)
+from maneuver_automaton.search.lattice_schedules import first_resolutions
+from maneuver_automaton.search.lattice_task import (
+    Resolution,
+    Task,
+    back_off_of,
+    numbers_of_cells,
+    task_of,
+)
+from maneuver_automaton.search.lattice_window import pad_around
+from maneuver_automaton.search.lattice_worlds import Ends
+from maneuver_automaton.search.prepared import Prepared
+from maneuver_automaton.search.scene import Scene
+
+CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
+SPARE = 1.5  # times the cells of the first query, of which there is memory
+
+
+class Desk(NamedTuple):
+    """Where a query lays down its poses, and where its call leaves what it has found out."""
+
+    poses: Array  # (1 + n, 3) start and goals as the problem sees them
+    seen: Array  # (1 + n, 4) as the search does
+    clear: Array  # (1 + n,) [m] clearance there
+    margin: Array  # (1,) [m] proven clearance
+    window_box: Array  # (4,) of the window in the world's frame
+    asked: IntArray  # (1,) how many expansions
+    frame: tuple[float, float, float, float, float]  # the world's: x, y, heading, cosine, sine of -
+    box: tuple[float, float, float, float]  # of what stands
+    pad: float  # [m] around it and the ends
+    bounded: bool  # whether the window is that of the bounds
+    low_x: float  # bounds of the pose [m]
+    low_y: float
+    high_x: float
+    high_y: float
+    clearly: float  # [m]
+    usual: float  # [m] proven clearance, if the ends allow it
+    least: float  # [m]
+    back_off: float  # [m] as in the task, as far as the margin does not ask for more
+    others: int  # numbers that layers, headings and so on of cells need
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Bench:
+    """The arguments of the first call, for queries of one setting and of the same kinds of ends."""
+
+    desk: Desk
+    call: Callable[[], int]
+    search: SearchArrays
+    task: Task
+    scene: Scene
+    grid: DistanceGrid
+    resolution: Resolution
+    steps: int  # expansions of a first call
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Begun:
+    """A query whose first expansions are done; its ends are clearly free."""
+
+    bench: Bench
+    may_go_on: bool
+
+    @property
+    def is_found(self) -> bool:
+        """Whether a connection was found."""
+        return bool(self.bench.search.state[layout.FOUND])
+
+    def search_of(self, query: LatticeQuery) -> Pass:
+        """The search that was begun, ready to go on."""
+        bench, task, scene, grid = self.bench, self.bench.task, self.bench.scene, self.bench.grid
+        if not self.is_found:
+            task, scene = task_of(query, bench.resolution), query.scene()
+            coarse = bench.resolution.coarse
+            grid = laid_grid(query.plane, query.box, query.start, coarse=coarse, like=grid)
+        return Pass(
+            query=query,
+            resolution=bench.resolution,
+            task=task,
+            scene=scene,
+            grid=grid,
+            table=NO_TABLE,
+            arrays=bench.search,
+            library=query.library.arrays,
+            pace=Pace(UNLIMITED, steps=bench.steps),
+            alive=self.may_go_on,
+            untold=int(bench.search.state[layout.EXPANSIONS]),
+        )
+
+
+@dataclass(slots=True, eq=False)
+class _Benches:
+    """Those that nobody uses now."""
+
+    free: list[Bench]
+    is_made: bool = False  # whether one was made, or found to be impossible
+
+
+@kept_by_first
+def _benches(setting: Problem, ends: object, prepared: Prepared) -> _Benches:
+    del setting, ends, prepared  # they say which benches are meant
+    return _Benches([])
+
+
+def prepare_bench(problem: Problem, prepared: Prepared) -> None:
+    """Have a bench ready for queries like this one, where they can begin so."""
+    benches = _benches(problem.setting, problem.ends, prepared)
+    if not benches.is_made:
+        benches.is_made = True
+        bench = _bench(problem, prepared)
+        if bench is not None:
+            benches.free.append(bench)
+
+
+def begin(problem: Problem, prepared: Prepared) -> Begun | None:
+    """See the ends of a query and begin its search, in one call; None where it has no bench.
+
+    Nor where its ends are not clearly free.
+    """
+    free = _benches(problem.setting, problem.ends, prepared).free
+    try:
+        bench = free.pop()
+    except IndexError:  # asked for before, another thread might take the last one
+        return None
+    desk = bench.desk
+    desk.poses[0] = problem.start
+    for k, goal in enumerate(problem.goals):
+        desk.poses[1 + k] = goal.pose
+    most = problem.search.max_expansions
+    desk.asked[0] = bench.steps if most is None else min(bench.steps, most)
+    said = bench.call()
+    if said == kernels.NOT_BEGUN:
+        free.append(bench)
+        return None
+    return Begun(bench=bench, may_go_on=bool(said))
+
+
+def ends_seen(begun: Begun) -> Ends:
+    """The ends of a query that was begun, as `ends_of` has them."""
+    desk = begun.bench.desk
+    return Ends(desk.seen[:, :3].copy(), desk.clear.copy())
+
+
+def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
+    """Leave the bench to the next query."""
+    _benches(problem.setting, problem.ends, prepared).free.append(begun.bench)
+
+
+def _bench(problem: Problem, prepared: Prepared) -> Bench | None:
+    """A bench for queries like this one; None where more has to be looked at than its kernel does.
+
+    That is so where something moves or is carried, in space, among zones, with bounds along one
+    axis alone, and where nothing stands.
+    """
+    bounds, automaton = problem.bounds, problem.automaton
+    if not automaton.is_kinematic or automaton.lattice is not None or problem.start.size != 3:
+        return None
+    if problem.parts or problem.moves or problem.zones or (bounds.x is None) != (bounds.y is None):
+        return None
+    query = lattice_query(problem, tuple(range(len(problem.goals))), prepared=prepared)
+    library = query.library
+    first = first_resolutions(library, query.settings)[0]
+    plain = first.durations == 1.0 and query.least_coast == 0.0 and first.margin == 1.0
+    if not (library.at_will and plain and query.plane.arrays.field.distance.size):
+        return None
+    task, scene = task_of(query, first), query.scene()
+    grid = laid_grid(query.plane, query.box, query.start, coarse=first.coarse)
+    grid = with_cells(grid, int(SPARE * grid.columns * grid.rows))
+    steps = first_steps(library.arrays, task)
+    arrays = search_arrays(library.arrays.library)
+    arrays = with_room(arrays, library.arrays.most_children * (steps + 1) + 2 + len(task.roots))
+    desk = _desk(query, task, first)
+    args = (desk, arrays, task, library.arrays, scene, grid, NO_TABLE)
+    return Bench(
+        desk=desk,
+        call=bound(kernels.begin_search, *args),
+        search=arrays,
+        task=task,
+        scene=scene,
+        grid=grid,
+        resolution=first,
+        steps=steps,
+    )
+
+
+def _desk(query: LatticeQuery, task: Task, first: Resolution) -> Desk:
+    """The desk of queries like this one."""
+    problem, world = query.problem, query.world
+    n = 1 + len(query.goals)
+    to_x, to_y, turn = world.frame.tolist()
+    low_x, low_y, high_x, high_y = world.box.tolist()
+    (least_x, most_x), (least_y, most_y) = (
+        pair or (-math.inf, math.inf) for pair in (problem.bounds.x, problem.bounds.y)
+    )
+    return Desk(
+        poses=np.zeros((n, 3)),
+        seen=np.zeros((n, 4)),
+        clear=np.zeros(n),
+        margin=np.zeros(1),
+        window_box=query.box.copy(),
+        asked=np.zeros(1, dtype=np.int64),
+        frame=(to_x, to_y, turn, float(np.cos(-turn)), float(np.sin(-turn))),
+        box=(low_x, low_y, high_x, high_y),
+        pad=float(pad_around(world, query.library.radius)),
+        bounded=problem.bounds.x is not None,
+        low_x=float(least_x),
+        low_y=float(least_y),
+        high_x=float(most_x),
+        high_y=float(most_y),
+        clearly=CLEARLY,
+        usual=float(usual_margin(query.library, world)),
+        least=LEAST_MARGIN,
+        back_off=float(back_off_of(query.library)),
+        others=numbers_of_cells(query, task, first),
+    )
