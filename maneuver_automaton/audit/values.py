@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Goal
 
@@ -42,6 +43,7 @@ def terminal_error(plan: Plan, goal: Goal) -> TerminalError:
     return distance_to(seen_from(plan, goal).end, goal)
 
 
+@kept_by_first
 def seen_from(plan: Plan, goal: Goal) -> Plan:
     """The plan with the goal's place as origin and from time 0: no digit is lost."""
     start = np.array(plan.start)

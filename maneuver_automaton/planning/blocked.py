@@ -20,9 +20,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.inside import outside
-from maneuver_automaton.search.lattice_worlds import ends_of, world_around
-
-CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
+from maneuver_automaton.search.lattice_worlds import CLEARLY, ends_of, world_around
 
 
 def blocked_ends(problem: Problem) -> PlanResult | None:

@@ -170,7 +170,7 @@ def _answered(
     problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The answer to a problem whose goals are met exactly."""
-    begun = begin(problem, workspace.prepared)
+    begun = begin(problem, workspace.prepared, budget)
     if begun is not None:  # its ends are free
         try:
             return _searched(problem, budget, workspace, alternatives=alternatives, begun=begun)

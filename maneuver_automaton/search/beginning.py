@@ -16,14 +16,14 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bound
 from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton.budget import UNLIMITED, Pace
+from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.distance_grid import DistanceGrid, laid_grid, with_cells
 from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
-from maneuver_automaton.search.lattice_pass import Pass, first_steps
+from maneuver_automaton.search.lattice_pass import Pass, first_steps, first_takes
 from maneuver_automaton.search.lattice_query import (
     LEAST_MARGIN,
     LatticeQuery,
@@ -39,12 +39,12 @@ from maneuver_automaton.search.lattice_task import (
     task_of,
 )
 from maneuver_automaton.search.lattice_window import pad_around
-from maneuver_automaton.search.lattice_worlds import Ends
+from maneuver_automaton.search.lattice_worlds import CLEARLY, Ends
 from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.scene import Scene
 
-CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 SPARE = 1.5  # times the cells of the first query, of which there is memory
+MOST_CELLS = 1 << 18  # of which there is memory: on larger maps nobody waits for the begin
 
 
 class Desk(NamedTuple):
@@ -83,6 +83,7 @@ class Bench:
     grid: DistanceGrid
     resolution: Resolution
     steps: int  # expansions of a first call
+    takes: float  # [s] about, the first of them
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -143,15 +144,18 @@ def prepare_bench(problem: Problem, prepared: Prepared) -> None:
             benches.free.append(bench)
 
 
-def begin(problem: Problem, prepared: Prepared) -> Begun | None:
+def begin(problem: Problem, prepared: Prepared, budget: Budget) -> Begun | None:
     """See the ends of a query and begin its search, in one call; None where it has no bench.
 
-    Nor where its ends are not clearly free.
+    Nor is it begun where its ends are not clearly free, or where it would be late.
     """
     free = _benches(problem.setting, problem.ends, prepared).free
     try:
         bench = free.pop()
     except IndexError:  # asked for before, another thread might take the last one
+        return None
+    if budget.left < bench.takes:
+        free.append(bench)
         return None
     desk = bench.desk
     desk.poses[0] = problem.start
@@ -196,7 +200,10 @@ def _bench(problem: Problem, prepared: Prepared) -> Bench | None:
         return None
     task, scene = task_of(query, first), query.scene()
     grid = laid_grid(query.plane, query.box, query.start, coarse=first.coarse)
-    grid = with_cells(grid, int(SPARE * grid.columns * grid.rows))
+    cells = int(SPARE * grid.columns * grid.rows)
+    if cells > MOST_CELLS:
+        return None
+    grid = with_cells(grid, cells)
     steps = first_steps(library.arrays, task)
     arrays = search_arrays(library.arrays.library)
     arrays = with_room(arrays, library.arrays.most_children * (steps + 1) + 2 + len(task.roots))
@@ -211,6 +218,7 @@ def _bench(problem: Problem, prepared: Prepared) -> Bench | None:
         grid=grid,
         resolution=first,
         steps=steps,
+        takes=first_takes(library.arrays, task),
     )
 
 

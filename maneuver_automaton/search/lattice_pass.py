@@ -71,11 +71,8 @@ class Pass:
     @property
     def first_takes(self) -> float:
         """About how long the first expansion takes, which nobody can stop [s]."""
-        return (
-            0.0
-            if self.arrays.state[layout.BEGUN]
-            else STEERED_S * _steered(self.library, self.task)
-        )
+        begun = self.arrays.state[layout.BEGUN]
+        return 0.0 if begun else first_takes(self.library, self.task)
 
     @property
     def queries(self) -> int:
@@ -170,6 +167,11 @@ def give_back(one: Pass) -> None:
 def first_steps(library: LatticeArrays, task: Task) -> int:
     """Expansions before the clock is looked at first."""
     return max(1, min(FIRST_CHUNK, AT_FIRST // _steered(library, task)))
+
+
+def first_takes(library: LatticeArrays, task: Task) -> float:
+    """About how long the first expansion takes [s]."""
+    return STEERED_S * _steered(library, task)
 
 
 def _steered(library: LatticeArrays, task: Task) -> int:

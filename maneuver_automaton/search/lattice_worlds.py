@@ -20,6 +20,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.part_motion import Part
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
+CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 _Shapes = tuple[Shape, ...]
 
 

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.planning import Planner, plan
 from maneuver_automaton.problem import Bounds, Goal, Problem, SearchSettings
@@ -28,7 +29,7 @@ ONCE = SearchSettings(improve=False)
 
 def begun(problem: Problem, prepared: Prepared) -> beginning.Begun | None:
     beginning.prepare_bench(problem, prepared)
-    return beginning.begin(problem, prepared)
+    return beginning.begin(problem, prepared, UNLIMITED)
 
 
 def assert_begun_as(one: beginning.Begun, query: LatticeQuery) -> None:
@@ -121,8 +122,9 @@ def test_a_bench_serves_every_query_of_its_setting(change) -> None:
 def test_what_is_not_begun_is_planned_all_the_same(start, goal) -> None:
     planner = Planner(CAR.automaton, obstacles=CAR.obstacles, footprint=CAR_BODY, search=ONCE)
     query, prepared = planner.problem(start, goal), planner.workspace.prepared
-    assert beginning.begin(query, prepared) is None
-    assert beginning.begin(planner.problem([0, 0, 0], [12, 2, 0.4]), prepared) is not None
+    assert beginning.begin(query, prepared, UNLIMITED) is None
+    near = planner.problem([0, 0, 0], [12, 2, 0.4])
+    assert beginning.begin(near, prepared, UNLIMITED) is not None
     found, alone = planner.plan(start, goal), plan(query)
     assert (found.status, found.cost) == (alone.status, alone.cost)
 
