@@ -55,6 +55,7 @@ def search_goal(
     ties: bool = False,
     second_opinion: float = AFFORDABLE,
     not_first: int | None = None,
+    seeds: int | None = None,
 ) -> list[SearchResult]:
     """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
 
@@ -78,6 +79,8 @@ def search_goal(
         [s] that exhaustive search of short words may be expected to take beside insertion.
     not_first : int, optional
         As in `search_words`.
+    seeds : int, optional
+        As in `search_insertion`.
 
     Returns
     -------
@@ -109,6 +112,7 @@ def search_goal(
             alternatives=10 if alternatives is None else alternatives,
             budget=budget,
             known=known,
+            seeds=seeds,
         )
     ]
     if method == "auto":  # short words too, where they are few: alternatives, and a second opinion
