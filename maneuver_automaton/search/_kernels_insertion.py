@@ -20,9 +20,42 @@ from maneuver_automaton.search._kernels_changes import (
 )
 from maneuver_automaton.search._kernels_chatter import replace_runs
 from maneuver_automaton.search._kernels_price import price_positions, word_multipliers
+from maneuver_automaton.words._kernels_solve import correct
+from maneuver_automaton.words._kernels_times import assign, residual
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
+
+
+@kernel
+def close_word(
+    twists: Array, goal: Array, rows: Array, targets: Array, word: IntArray, times: Array
+) -> float:
+    """Bring a word that ends next to the goal to it, `times` in place; what it still misses.
+
+    Times change in proportion to themselves: next to nothing would otherwise become less.
+    """
+    n = word.size
+    some = np.empty((n, 4))
+    some_rows = np.empty((targets.size, n))
+    for i in range(n):
+        assign(some[i], twists[word[i]])
+        for r in range(targets.size):
+            some_rows[r, i] = rows[r, word[i]]
+    columns = np.empty((n, 3))
+    gap = np.empty(3 + targets.size)
+    closer = np.empty(n)
+    assign(closer, times)
+    least = residual(some, times, goal, some_rows, targets, columns, gap)
+    while least > 1e-15 and correct(some, goal, some_rows, targets, closer, gap, columns):
+        worst = 0.0
+        for e in range(gap.size):
+            worst = max(worst, abs(gap[e]))
+        if worst >= least:
+            break
+        least = worst
+        assign(times, closer)
+    return least
 
 
 @kernel

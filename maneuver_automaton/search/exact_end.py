@@ -15,12 +15,11 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.library_arrays import LibraryArrays
 from maneuver_automaton.search.setup import SearchSetup
-from maneuver_automaton.words.closing import MET, EndConditions, closest_times
+from maneuver_automaton.words.closing import MET
 
 DIGITS = 9  # of the goal that is searched for, after the point [m, rad]
 UNUSUAL = 1.7  # keeps steps in the number of digits away from the sizes people choose
 TINY = 1e-12  # [m, rad] below this start and goal are one
-RANK = 1e-11  # singular values below this, relative, count as none
 
 
 def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
@@ -36,17 +35,13 @@ def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
 def corrected(library: LibraryArrays, word: IntArray, times: Array, goal: Array) -> Array | None:
     """Times (n,) near `times` with which the word ends at `goal`; None if there are none.
 
-    The smallest change: the goal is less than 1e-9 away, and less for small ones.
+    The goal is less than 1e-9 away, and less for small ones.
     """
-    others = slice(int(library.climbs), None)  # an end's altitude is a condition anyway
-    conditions = EndConditions(
-        start=np.zeros(4),
-        twists=library.twists[word],
-        goal=goal,
-        rows=library.rows[others, word],
-        targets=library.targets[others],
-    )
-    best, missing = closest_times(conditions, times, rank=RANK, at_least=-math.inf)
-    if not missing < MET or (best < -MET).any():
-        return None
-    return np.asarray(best.clip(min=0.0))
+    from maneuver_automaton.search import _kernels_insertion as kernels
+
+    targets = np.array(library.targets)
+    if library.climbs:
+        targets[0] = goal[3]
+    best = np.array(times)
+    missing = kernels.close_word(library.twists, np.array(goal), library.rows, targets, word, best)
+    return best if missing < MET else None

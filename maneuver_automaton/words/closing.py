@@ -77,17 +77,15 @@ class EndConditions:
         columns[2], gap[2] = 0.0, 0.0
 
 
-def closest_times(
-    conditions: EndConditions, durations: Array, *, rank: float = RANK, at_least: float = 0.0
-) -> tuple[Array, float]:
+def closest_times(conditions: EndConditions, durations: Array) -> tuple[Array, float]:
     """Times (n,) near `durations` that miss the least, and what the worst condition then misses.
 
-    Gauss-Newton with the smallest change; no time becomes less than `at_least` [s], and what lasts
-    no time stays so: it stands between two maneuvers.
+    Gauss-Newton with the smallest change; no time becomes negative, and what lasts no time stays
+    so: it stands between two maneuvers.
     """
     best, least = durations, math.inf
     now = np.array(durations)
-    lasting = (now != 0.0) | (at_least < 0.0)
+    lasting = now != 0.0
     for _ in range(STEPS):
         gap, columns = conditions.missing(now)
         worst = float(np.abs(gap).max())
@@ -98,8 +96,8 @@ def closest_times(
         if worst < EXACT or not lasting.any():
             break
         change = np.zeros(now.size)
-        change[lasting] = np.linalg.lstsq(columns[:, lasting], gap, rcond=rank)[0]
-        now = np.maximum(now + change, at_least)
+        change[lasting] = np.linalg.lstsq(columns[:, lasting], gap, rcond=RANK)[0]
+        now = np.maximum(now + change, 0.0)
     return np.asarray(best), least
 
 
