@@ -307,7 +307,9 @@ class Problem:
         freeze(self, "start", last=dof)
         if self.start.ndim != 1:
             raise ValueError(f"start: pose has shape {self.start.shape}, need one pose")
-        check_size("start: pose", self.start[[0, 1, *range(3, dof)]])
+        check_size(
+            "start: pose", self.start[:2] if dof == 3 else self.start[[0, 1, *range(3, dof)]]
+        )
         check_heading("start: pose", self.start)
         if not math.isfinite(self.start_time):
             raise ValueError(f"start: time must be finite, got {self.start_time} s")
@@ -531,7 +533,10 @@ class Problem:
         if horizon is None:
             known["_setting"] = self.setting
         moved.__dict__.update(known, moves=self.moves, **changed)
-        moved._check_ends()
+        if goals is None and trim is None:
+            moved._check_start()
+        else:
+            moved._check_ends()
         return moved
 
     @property

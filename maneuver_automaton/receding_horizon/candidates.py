@@ -31,16 +31,20 @@ class Candidate:
     cost: float
     goal_index: int
     origin: Origin
-    at_first: float  # cost until the next step
 
-    @property
-    def preference(self) -> tuple[float, bool, int, tuple[str, ...]]:
-        """Greatest cost on [0, delta) first, then the known word, then fewer trims, then by name.
 
-        Source: the paper, Sec. 5.1.
-        """
-        known = self.origin is not Origin.SEARCHED
-        return -float(f"{self.at_first:.9g}"), not known, len(self.plan.trims), self.plan.word
+def preference(
+    one: Candidate, problem: Problem, step: float
+) -> tuple[float, bool, int, tuple[str, ...]]:
+    """Order of plans that cost the same, the first one to be applied for a `step` [s].
+
+    Greatest cost on [0, delta) first, then the known word, then fewer trims, then by name.
+
+    Source: the paper, Sec. 5.1.
+    """
+    known = one.origin is not Origin.SEARCHED
+    at_first = _cost_of_first(problem, one.plan, step)
+    return -float(f"{at_first:.9g}"), not known, len(one.plan.trims), one.plan.word
 
 
 def candidate(
@@ -60,13 +64,7 @@ def candidate(
         costlier = here.cost_of(ordered)
         if costlier <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
             plan, cost = ordered, costlier
-    return Candidate(
-        plan=plan,
-        cost=cost,
-        goal_index=goal_index,
-        origin=origin,
-        at_first=_cost_of_first(here, plan, settings.step),
-    )
+    return Candidate(plan=plan, cost=cost, goal_index=goal_index, origin=origin)
 
 
 def allowed(here: Problem, plan: Plan) -> bool:

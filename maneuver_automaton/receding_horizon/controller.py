@@ -262,7 +262,8 @@ class RecedingHorizon:
             most = min(plan.duration / delta, MOST_AHEAD)
             instants = here.start_time + delta * np.arange(1, 2 + most)
             plan = with_samples_at(plan, instants, here.automaton.model)
-        deed = _deed(chosen, now)
+        same = is_rest_of(plan, now.rest)
+        deed = _deed(chosen, now, same=same)
         bound = self._bound(chosen, search, now)
         value = chosen.value if deed.leads or search.knows_all else bound
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
@@ -276,7 +277,7 @@ class RecedingHorizon:
             applied_cost=cost_until(here, plan, applied),
             accumulated_cost=_accumulated(now),
             origin=chosen.origin,
-            replanned=last is not None and not is_rest_of(plan, now.rest),
+            replanned=last is not None and not same,
             shifted_value=chosen.shifted_value,
             off_plan=now.off_plan,
             lower_bound=min(value, bound),
@@ -338,16 +339,15 @@ def _accumulated(now: Situation) -> float:
     return 0.0 if now.last is None else now.last.accumulated_cost + now.last.applied_cost
 
 
-def _deed(chosen: Chosen, now: Situation) -> Deed:
-    """The deed of a step, where the decision does not say it."""
+def _deed(chosen: Chosen, now: Situation, *, same: bool) -> Deed:
+    """The deed of a step, where the decision does not say it; `same`: its word is the last one."""
     if chosen.deed is not None:
         return chosen.deed
     if now.last is None:
         return Deed.PLANNED
     if chosen.origin is not Origin.SEARCHED:
         return Deed.KEPT
-    same = now.last.deed.leads and is_rest_of(chosen.plan, now.rest)
-    return Deed.IMPROVED if same else Deed.REPLANNED
+    return Deed.IMPROVED if same and now.last.deed.leads else Deed.REPLANNED
 
 
 ManeuverHorizon = RecedingHorizon  # the name it has had for vehicles with inertia

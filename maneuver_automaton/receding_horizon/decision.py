@@ -91,7 +91,7 @@ def _known_free(chosen: Chosen, search: StepSearch) -> Chosen:
     until, plan = search.free_until, chosen.plan
     if until is not None and plan.trims and not plan.trims[-1].is_rest:
         until = min(until, plan.start_time + plan.duration)
-    return replace(chosen, free_until=until)
+    return chosen if until == chosen.free_until else replace(chosen, free_until=until)
 
 
 def _there(now: Situation, search: StepSearch) -> Chosen | None:
@@ -146,5 +146,5 @@ def _without_plan(now: Situation, search: StepSearch) -> Chosen:
 def _leading_nowhere(now: Situation, plan: Plan, deed: Deed, free_until: float | None) -> Chosen:
     index = 0 if now.last is None else now.last.goal_index
     origin = Origin.SHIFTED if plan is now.rest else Origin.SEARCHED
-    one = Candidate(plan=plan, cost=math.inf, goal_index=index, origin=origin, at_first=0.0)
+    one = Candidate(plan=plan, cost=math.inf, goal_index=index, origin=origin)
     return replace(now.as_chosen(one, None), deed=deed, free_until=free_until)

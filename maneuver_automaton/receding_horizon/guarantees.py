@@ -178,8 +178,8 @@ def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
     moves = promised.step - ACCURACY
     needed = (promised.least_rate + promised.rest_rate) * promised.step
     resting = now.plan.trims and now.plan.trims[0].is_rest
-    ends = _time_moving(now) <= moves
-    if resting or (not ends and now.applied_cost < needed - ACCURACY * (1.0 + needed)):
+    cheap = now.applied_cost < needed - ACCURACY * (1.0 + needed)
+    if resting or (cheap and _time_moving(now) > moves):
         yield Violation(
             guarantee=Guarantee.LEAST_COST,
             reason=f"the step costs {now.applied_cost:.9g}, need at least {needed:.9g}: it rests "

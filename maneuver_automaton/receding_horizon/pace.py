@@ -58,7 +58,7 @@ def base_name(name: str) -> str:
     >>> base_name("spin x0.5 x0.25"), base_name("ahead")
     ('spin', 'ahead')
     """
-    return PACE.sub("", name)
+    return PACE.sub("", name) if " x" in name else name
 
 
 def _named(automaton: Automaton, trim: Trim) -> Trim:

@@ -159,5 +159,7 @@ def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> boo
     bracket = max(
         abs(one[2] * other[0] - other[2] * one[0]), abs(one[2] * other[1] - other[2] * one[1])
     )
+    if not bracket:
+        return True
     scale = max(map(abs, one)) * max(map(abs, other))
     return bool(bracket <= 1e-12 * scale)

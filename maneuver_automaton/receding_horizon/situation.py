@@ -13,7 +13,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
-from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, within
+from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, preference, within
 from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.pace import between_trims
 from maneuver_automaton.receding_horizon.reanchoring import (
@@ -294,7 +294,9 @@ class Situation:
             return kept
         tied = [one for one in everything if one.cost <= least + TIE * (1.0 + abs(least))]
         self.is_sole = len(tied) == 1
-        return tied[0] if self.is_sole else min(tied, key=lambda one: one.preference)
+        if self.is_sole:
+            return tied[0]
+        return min(tied, key=lambda one: preference(one, self.here, self.settings.step))
 
     def between_trims(self, kept: Candidate | None, found: Sequence[Candidate]) -> list[Candidate]:
         """The cheapest of some candidates again, with controls between those of the library."""

@@ -22,6 +22,7 @@ from maneuver_automaton.search.word_scan import MOST_TRIMS, load_tables
 from maneuver_automaton.search.words import search_words
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
+SHORT = 4  # trims of words that are a second opinion
 LARGE = 200  # trims of a library whose tables are worth to be had ready
 SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measured, generous
 
@@ -55,6 +56,7 @@ def search_goal(
     ties: bool = False,
     second_opinion: float = AFFORDABLE,
     not_first: int | None = None,
+    seeds: int | None = None,
 ) -> list[SearchResult]:
     """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
 
@@ -78,6 +80,8 @@ def search_goal(
         [s] that exhaustive search of short words may be expected to take beside insertion.
     not_first : int, optional
         As in `search_words`.
+    seeds : int, optional
+        As in `search_insertion`.
 
     Returns
     -------
@@ -109,14 +113,17 @@ def search_goal(
             alternatives=10 if alternatives is None else alternatives,
             budget=budget,
             known=known,
+            seeds=seeds,
         )
     ]
     if method == "auto":  # short words too, where they are few: alternatives, and a second opinion
-        few = replace(problem, horizon=replace(problem.horizon, max_trims=4 - goal.free_heading))
-        best = min((one.cost for one in results[0].solutions), default=math.inf)
-        if alternatives == 0:
-            upper_bound = min(upper_bound, best)
-        if (problem.horizon.max_trims or math.inf) > 4 and _affordable(few, goal, second_opinion):
+        tail = int(goal.free_heading)
+        is_quick = _seconds(problem.automaton, SHORT - tail, tail) <= second_opinion
+        if (problem.horizon.max_trims or math.inf) > SHORT and is_quick:
+            few = replace(problem, horizon=replace(problem.horizon, max_trims=SHORT - tail))
+            best = min((one.cost for one in results[0].solutions), default=math.inf)
+            if alternatives == 0:
+                upper_bound = min(upper_bound, best)
             short = search_words(
                 few,
                 goal,
@@ -136,9 +143,9 @@ def _seconds(automaton: Automaton, most: int, tail: int) -> float:
     return math.fsum(moving**n * SECONDS_PER_WORD[n + tail] for n in range(1, most + 1))
 
 
-def _affordable(problem: Problem, goal: Goal, most_seconds: float = AFFORDABLE) -> bool:
+def _affordable(problem: Problem, goal: Goal) -> bool:
     """Whether every admitted word can be searched in a moment."""
     most = problem.horizon.max_trims
     if most is None or most > MOST_TRIMS - int(goal.free_heading):
         return False
-    return _seconds(problem.automaton, most, int(goal.free_heading)) <= most_seconds
+    return _seconds(problem.automaton, most, int(goal.free_heading)) <= AFFORDABLE

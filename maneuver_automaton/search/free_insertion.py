@@ -88,12 +88,15 @@ def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
 def _work(task: InsertionTask, setup: SearchSetup) -> _Work:
     """The work of a search for the goal of a task."""
     exact, setup = setup.goal, with_fewer_digits(setup)
-    many = len(setup.trims) > FEW
-    seeds = task.seeds
-    if seeds is None:
-        seeds = max(SEEDS_OF_MANY if many else SEEDS, 2 * task.alternatives + 1)
+    seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
     library = library_arrays(task.problem, setup)
     return _Work(task.problem, setup, library, exact, task, seeds)
+
+
+def _usual_seeds(task: InsertionTask, setup: SearchSetup) -> int:
+    """How many words a search starts from."""
+    few = SEEDS_OF_MANY if len(setup.trims) > FEW else SEEDS
+    return max(few, 2 * task.alternatives + 1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -121,12 +124,23 @@ class _Work:
 
 
 def _improved(work: _Work) -> SearchResult:
-    """Solutions of all seeds and of what insertion makes of them, each word once."""
+    """Solutions of all seeds and of what insertion makes of them, each word once.
+
+    Without seeds those of the known plan; where it has none, those of the usual seeds.
+    """
+    known = [] if work.task.known is None else list(_as_seed(work, work.task.known))
+    if work.seeds == 0:
+        found = _improved_from(work, known)
+        if found.solutions:
+            return found
+        work = replace(work, seeds=_usual_seeds(work.task, work.setup))
+    return _improved_from(work, [*known, *_seeds(work)])
+
+
+def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
+    """Solutions of some words and of what insertion makes of them, each word once."""
     problem, library, task, most = work.problem, work.library, work.task, work.most
     many = len(work.setup.trims) > FEW
-    begun = list(_seeds(work))
-    if task.known is not None:
-        begun = [*_as_seed(work, task.known), *begun]
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     limit = problem.search.max_expansions
     words: list[TimedWord] = []

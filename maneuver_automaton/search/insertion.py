@@ -45,7 +45,7 @@ def search_insertion(
         How many solutions beside the cheapest, as far as the seeds lead to different words.
     seeds : int, optional
         How many short words to start from; by default 4, or 10 for small libraries whose trims
-        switch at will.
+        switch at will. 0: from the known plan alone, as long as that has a solution.
     budget : Budget
         No further seed is begun once its time is over. Where the problem limits its expansions,
         every stage counts its work, and the time only ends it earlier.

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import StageCost, prices_switches
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.setup import SearchSetup, goal_from_start, is_still, search_setup
 from maneuver_automaton.words.library import moving_trims
 
 MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
@@ -31,7 +31,7 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
     """Why no word ends within the tolerance of a goal, as far as a glance proves it."""
     if not len(setup.trims):
         return "no trim of the library moves"
-    turn = _turn_to(setup, goal)
+    turn = _turn_to(setup.goal, goal)
     if turn > 1e-9 and not setup.twists[:, 2].any():
         return f"no trim of the library turns, and the goal is {turn:.6g} rad away"
     climb = abs(setup.goal[3]) - goal.tolerance_m
@@ -44,7 +44,7 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
         return "all trims of the library move along one and the same curve, which misses the goal"
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is not None:
-        distance = _distance_to(setup, goal)
+        distance = _distance_to(setup.goal, goal)
         speed = float(np.linalg.norm(setup.twists[:, [0, 1, 3]], axis=1).max())
         turning = float(np.abs(setup.twists[:, 2]).max())
         least = max(distance / speed if distance else 0.0, turn / turning if turn else 0.0)
@@ -56,16 +56,17 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
     return ""
 
 
-def _distance_to(setup: SearchSetup, goal: Goal) -> float:
-    """Distance to the nearest place within the tolerance of a goal [m]."""
-    return max(0.0, float(np.linalg.norm(setup.goal[[0, 1, 3]])) - goal.tolerance_m)
+def _distance_to(relative: Array, goal: Goal) -> float:
+    """Distance to the nearest place within the tolerance of a goal, seen from the start [m]."""
+    way = relative[[0, 1, 3]]
+    return max(0.0, math.sqrt(way.dot(way)) - goal.tolerance_m)
 
 
-def _turn_to(setup: SearchSetup, goal: Goal) -> float:
-    """Turn to the nearest heading within the tolerance of a goal [rad]."""
-    if setup.free_heading:
+def _turn_to(relative: Array, goal: Goal) -> float:
+    """Turn to the nearest heading within the tolerance of a goal, seen from the start [rad]."""
+    if goal.free_heading:
         return 0.0
-    return max(0.0, abs(math.remainder(setup.goal[2], 2.0 * math.pi)) - goal.tolerance_rad)
+    return max(0.0, abs(math.remainder(relative[2], 2.0 * math.pi)) - goal.tolerance_rad)
 
 
 def _misses(directions: Array, goal: Array) -> bool:
@@ -122,13 +123,16 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
 
 def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
     """The bounds of `closed_bound`, each by what it counts; a distance of 0 where none is known."""
-    setup = search_setup(problem, goal)
+    library, relative = (
+        moving_trims(problem.automaton, problem.cost),
+        goal_from_start(problem, goal),
+    )
     limit = problem.horizon.time
-    pads = limit is not None and setup.rest is not None
-    prices = _prices(problem.automaton, problem.cost, pads) if len(setup.rates) else None
-    if setup.start_is_goal or prices is None:
+    pads = limit is not None and library.rest is not None
+    prices = _prices(problem.automaton, problem.cost, pads) if len(library.rates) else None
+    if prices is None or is_still(relative, free_heading=goal.free_heading):
         return {"distance": 0.0}
-    distance, turn = _distance_to(setup, goal), _turn_to(setup, goal)
+    distance, turn = _distance_to(relative, goal), _turn_to(relative, goal)
     bounds = {
         "distance": distance * prices.per_metre if distance > 0.0 else 0.0,
         "turn": turn * prices.per_radian if turn > 0.0 else 0.0,
@@ -139,7 +143,7 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
             bounds["time"] = limit * prices.per_second
     if not math.isfinite(max(bounds.values())):
         bounds = {"distance": 0.0}
-    padded = setup.rest_rate * limit if pads and limit is not None else 0.0
+    padded = library.rest_rate * limit if pads and limit is not None else 0.0
     return {what: padded + bound for what, bound in bounds.items()}
 
 

@@ -13,6 +13,8 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims, moving_trims
 from maneuver_automaton.words.transitions import Transitions, identities
 
+STILL = 1e-12  # [m, rad] start and goal that are no farther apart are one
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SearchSetup:
@@ -36,9 +38,7 @@ class SearchSetup:
     @property
     def start_is_goal(self) -> bool:
         """Whether nothing need be done."""
-        turn = math.remainder(self.goal[2], FULL_TURN)
-        still = np.abs(self.goal[[0, 1, 3]]).max() <= 1e-12
-        return bool(still and (self.free_heading or abs(turn) <= 1e-12))
+        return is_still(self.goal, free_heading=self.free_heading)
 
 
 def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
@@ -59,6 +59,14 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
         transitions=identities(problem.automaton),
         shortest=problem.horizon.min_coast,
     )
+
+
+def is_still(goal: Array, *, free_heading: bool) -> bool:
+    """Whether a goal (4,) seen from the start is the start."""
+    x, y, turn, z = goal.tolist()
+    if abs(x) > STILL or abs(y) > STILL or abs(z) > STILL:
+        return False
+    return free_heading or abs(math.remainder(turn, FULL_TURN)) <= STILL
 
 
 def goal_from_start(problem: Problem, goal: Goal) -> Array:

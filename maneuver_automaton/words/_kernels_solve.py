@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
 
 SOLVED, FEASIBLE, FAILED = 0, 1, 2
+STALLED = 10  # steps in a row of next to no length, after which no more are tried
 
 
 @inner_kernel
@@ -38,6 +39,40 @@ def merit(rates: Array, times: Array, barrier: float, gap: Array, weight: float)
     for e in range(gap.size):
         value += weight * abs(gap[e])
     return value
+
+
+@inner_kernel
+def correct(
+    twists: Array,
+    goal: Array,
+    rows: Array,
+    targets: Array,
+    times: Array,
+    gap: Array,
+    columns: Array,
+) -> bool:
+    """Bring times after a full step, in place, nearer to the conditions; whether they stay inside.
+
+    The conditions are curved, so that a step along their tangent misses them, and the merit may
+    rise however near the solution is (the Maratos effect). Each time changes in proportion to
+    itself, so that the long ones give way; `gap` and `columns` are those at `times`, and become
+    those at the corrected ones.
+
+    Source: Nocedal, Wright, Numerical Optimization, 2nd ed., Sec. 15.6.
+    """
+    scaled = jacobian(columns, rows)
+    for e in range(gap.size):
+        gap[e] = -gap[e]
+        for i in range(times.size):
+            scaled[e, i] *= times[i]
+    change, _rank = least_squares(scaled, gap, 1e-11)
+    for i in range(times.size):
+        if change[i] < -0.5:
+            return False
+    for i in range(times.size):
+        times[i] += times[i] * change[i]
+    residual(twists, times, goal, rows, targets, columns, gap)
+    return True
 
 
 @inner_kernel
@@ -71,7 +106,10 @@ def interior_point(
     p = multipliers(jacobian(columns, rows), trial)
     system = np.empty((n + n_rows, n + n_rows))
     rhs = np.empty(n + n_rows)
+    stalled = 0  # steps in a row that led nowhere: degenerate words have no end of them
     for _ in range(iterations):
+        if stalled == STALLED:
+            break
         matrix = jacobian(columns, rows)
         lagrangian_hessian(columns, p[0], p[1], hessian)
         slope = 0.0
@@ -150,10 +188,24 @@ def interior_point(
             worst = residual(twists, trial, goal, rows, targets, columns, trial_gap)
             if merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(before):
                 break
+            inside = _attempt == 0 and correct(
+                twists, goal, rows, targets, trial, trial_gap, columns
+            )
+            if inside and merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(
+                before
+            ):
+                worst = 0.0
+                for e in range(n_rows):
+                    worst = max(worst, abs(trial_gap[e]))
+                break
             share *= 0.5
         for i in range(n):
             change = (barrier - slack[i] * step[i]) / times[i] - slack[i]
             slack[i] += longest_dual * change
+        moved = 0.0
+        for i in range(n):
+            moved = max(moved, abs(trial[i] - times[i]))
+        stalled = stalled + 1 if moved < 1e-13 or share < 0.002 * longest else 0
         assign(times, trial)
         assign(gap, trial_gap)
         for e in range(n_rows):

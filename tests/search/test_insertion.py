@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
@@ -425,6 +425,25 @@ def test_a_known_plan_is_improved(name):
     first = replace(problem, search=SearchSettings(max_expansions=1))
     found = search_insertion(first, first.goals[0], known=known).solutions
     assert found[0].cost <= costly.cost + 1e-9
+
+
+@compiled_only
+def test_without_seeds_a_known_plan_alone_is_improved():
+    problem = parking(max_trims=None)
+    costly = search_insertion(problem, problem.goals[0], alternatives=8).solutions[-1]
+    found = search_insertion(problem, problem.goals[0], known=plan_of(problem, costly), seeds=0)
+    assert found.counts["seeds"] == 1
+    assert found.solutions[0].cost <= costly.cost + 1e-9
+
+
+@compiled_only
+def test_without_seeds_or_a_solution_of_a_known_plan_the_usual_words_are_improved():
+    problem = parking(max_trims=None)
+    usual = search_insertion(problem, problem.goals[0])
+    astray = Plan(problem.start, problem.automaton.trims[1:2], durations=[1.0])
+    for known in (None, astray):
+        found = search_insertion(problem, problem.goals[0], known=known, seeds=0)
+        assert found.solutions[0].cost == usual.solutions[0].cost
 
 
 @compiled_only

@@ -10,6 +10,8 @@ from maneuver_automaton.words import (
     TimesStatus,
     solve_switching_times,
 )
+from maneuver_automaton.words._kernels_solve import correct
+from maneuver_automaton.words._kernels_times import residual
 from tests import reference
 from tests.quickly import quick_are
 
@@ -198,6 +200,34 @@ def test_beside_a_cusp_of_the_feasible_times_optimal_means_optimal():
     assert solved.status is TimesStatus.FEASIBLE or solved.cost < 1.32 + 1e-6
     if solved.status is TimesStatus.OPTIMAL:
         assert_optimal(word, solved)
+
+
+def ends_off(twists, times, goal):
+    columns, gap = np.zeros((len(times), 3)), np.zeros(3)
+    rows = np.zeros((0, len(times)))
+    worst = residual(twists, times, goal, rows, np.zeros(0), columns, gap)
+    return worst, (goal, rows, np.zeros(0)), gap, columns
+
+
+def test_a_step_along_curved_conditions_is_corrected():
+    twists = np.array([[1.0, 0, 1.0, 0], [1.0, 0, 0, 0], [1.0, 0, -1.0, 0], [0.5, 0, 0.5, 0]])
+    times = np.array([0.7, 1.3, 0.4, 0.9])
+    goal = np.append(reference.plain_end(twists[:, :3], times), 0.0)
+    for off in (1e-1, 1e-2, 1e-3):
+        near = times + off * np.array([1.0, -0.5, 0.3, 0.2])
+        before, conditions, gap, columns = ends_off(twists, near, goal)
+        assert correct(twists, *conditions, near, gap, columns)
+        after, _, there, _ = ends_off(twists, near, goal)
+        assert after < before * before
+        assert there == pytest.approx(gap, abs=1e-15)
+        assert near.min() > 0.0
+
+
+def test_a_correction_that_takes_half_of_a_time_is_none():
+    twists, times = np.array([[1.0, 0, 0, 0]]), np.array([2.0])
+    _, conditions, gap, columns = ends_off(twists, times, np.array([0.9, 0.0, 0.0, 0.0]))
+    assert not correct(twists, *conditions, times, gap, columns)
+    assert times.tolist() == [2.0]
 
 
 def test_no_time_at_all():
