@@ -292,7 +292,7 @@ def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> 
     low = (limit - ahead) / radius
     if low >= 1.0:
         return 0.0
-    reach = math.acos(low)
+    reach = math.acos(max(low, -1.0))  # by rounding it may be a little less
     now = math.atan2(b, a)
     return max(reach - now if turn > 0.0 else reach + now, 0.0) / abs(turn)
 
