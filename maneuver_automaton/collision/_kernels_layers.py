@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision.convex import Solids
+from maneuver_automaton.collision.slabs import Slabs
 from maneuver_automaton.collision.world import Buckets, Field, MovingObstacles, WorldArrays
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def layer_world(layers: LayerArrays, k: int) -> WorldArrays:
             moving.present[m_0:m_1],
             moving.rate,
             moving.arcs[m_0:m_1],
+            Slabs(sizes[k, 8], sizes[k, 9], counts[k, 2], counts[k, 3], moving.slabs.box),
         ),
     )
 

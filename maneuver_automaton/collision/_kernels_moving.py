@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
+from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
 from maneuver_automaton.groups._kernels import coast, compose
 
 if TYPE_CHECKING:
@@ -176,12 +177,23 @@ def free_of_moving(
 ) -> tuple[float, float]:
     """How long a motion is proven free of moving obstacles, as `free_time`; the last clearance.
 
-    Each obstacle is followed by itself, as long as it is there: most are too far away to be met,
-    which one look shows.
+    Those that are too far away to be met are passed over, by where they may be in the meantime:
+    the body never comes as near to them as it would stop at. Each of the others is followed by
+    itself, as long as it is there.
     """
     sign = 1.0 if duration >= 0.0 else -1.0
     free, nearest = abs(duration), math.inf
-    for m in range(moving.speed.shape[0]):
+    n, slabs = moving.speed.shape[0], moving.slabs
+    during, swept = (0, 0), (0.0, 0.0, 0.0, 0.0)
+    if slabs.leaves > 0:
+        during = slabs_during(slabs, clock, duration)
+        swept = swept_box(body, x, y, heading, v_x, v_y, turn_rate, duration)
+    for m in range(n):
+        if slabs.leaves > 0:
+            apart = apart_during(slabs, n, m, during, swept) - body.reach - keep
+            if apart > margin:
+                nearest = min(nearest, apart)
+                continue
         begin, end = moving.present[m, 0] - clock, moving.present[m, 1] - clock
         if sign < 0.0:
             begin, end = -end, -begin

@@ -13,6 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import Solids
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.shapes import AnyObstacle
+from maneuver_automaton.collision.slabs import NO_SLABS
 from maneuver_automaton.collision.world import Field, MovingObstacles, World, WorldArrays
 
 MOST_LAYERS = 24  # more are joined, the thinnest first
@@ -28,8 +29,8 @@ class LayerArrays(NamedTuple):
     solids: Solids  # of all layers
     start: IntArray  # (L, cells + 1) buckets
     items: IntArray
-    sizes: Array  # (L, 8) numbers of buckets and field, as `layer_world` puts them together
-    counts: IntArray  # (L, 2)
+    sizes: Array  # (L, 10) numbers of buckets, field and slabs, as `layer_world` has them
+    counts: IntArray  # (L, 4)
     distance: Array  # (L, rows, columns)
     moving: MovingObstacles
     first_moving: IntArray  # (L + 1,)
@@ -113,14 +114,8 @@ def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: Wor
         start[k, :known] = one.buckets.start + offset
         start[k, known:] = start[k, known - 1]
         items.append(one.buckets.items + of_static[k])
-    sizes = [
-        (
-            *(one.buckets.origin_x, one.buckets.origin_y, one.buckets.cell, one.buckets.reach),
-            *(one.field.origin_x, one.field.origin_y, one.field.cell, one.field.outside),
-        )
-        for one in arrays
-    ]
-    counts = [(one.buckets.columns, one.buckets.rows) for one in arrays]
+    boxes = np.cumsum([0, *(len(one.moving.slabs.box) for one in arrays)]).tolist()
+    sizes, counts = zip(*map(_numbers, arrays, boxes[:-1]), strict=True)
     return LayerArrays(
         low=np.array(low, dtype=np.float64),
         high=np.array(high, dtype=np.float64),
@@ -142,10 +137,7 @@ def single_layer(world: World) -> LayerArrays:
     """One world at all altitudes: kernels take it as it is, so that nothing is copied."""
     only = world.arrays
     buckets, field = only.buckets, only.field
-    sizes = (
-        *(buckets.origin_x, buckets.origin_y, buckets.cell, buckets.reach),
-        *(field.origin_x, field.origin_y, field.cell, field.outside),
-    )
+    sizes, counts = _numbers(only, 0)
     everywhere = np.full(1, math.inf)
     return LayerArrays(
         low=-everywhere,
@@ -155,13 +147,23 @@ def single_layer(world: World) -> LayerArrays:
         start=buckets.start[None],
         items=buckets.items,
         sizes=np.array([sizes], dtype=np.float64),
-        counts=np.array([(buckets.columns, buckets.rows)], dtype=np.int64),
+        counts=np.array([counts], dtype=np.int64),
         distance=field.distance[None],
         moving=only.moving,
         first_moving=np.array([0, len(only.moving.speed)]),
         plane=field,
         flat=True,
     )
+
+
+def _numbers(one: WorldArrays, first_box: int) -> tuple[tuple[float, ...], tuple[int, ...]]:
+    """Sizes (10,) and counts (4,) of a layer, whose boxes of slabs begin at a row."""
+    buckets, field, slabs = one.buckets, one.field, one.moving.slabs
+    return (
+        *(buckets.origin_x, buckets.origin_y, buckets.cell, buckets.reach),
+        *(field.origin_x, field.origin_y, field.cell, field.outside),
+        *(slabs.begin, slabs.width),
+    ), (buckets.columns, buckets.rows, slabs.leaves, first_box)
 
 
 def _thick(heights: Sequence[float]) -> list[tuple[float, float]]:
@@ -209,6 +211,7 @@ def _all_moving(
         present=np.concatenate([one.present for one in moving]),
         rate=np.concatenate([one.rate for one in moving]),
         arcs=np.concatenate([one.arcs for one in moving]),
+        slabs=NO_SLABS._replace(box=np.concatenate([one.slabs.box for one in moving])),
     )
 
 

@@ -35,6 +35,7 @@ from maneuver_automaton.collision.shapes import (
     OccupancyMap,
     Shape,
 )
+from maneuver_automaton.collision.slabs import NO_SLABS, Slabs, slabs_of
 from maneuver_automaton.groups import SE2
 
 MOST_FIELD_CELLS = 60_000
@@ -82,6 +83,7 @@ class MovingObstacles(NamedTuple):
     present: Array  # (M, 2) [s] it is there from and until; held at its first and last knot beyond
     rate: Array  # (K, 3) after each knot: of the pose, or the twist in the frame of what coasts
     arcs: NDArray[np.bool_]  # (M,) whether it coasts on arcs from knot to knot
+    slabs: Slabs  # where each may be, by time
 
 
 class WorldArrays(NamedTuple):
@@ -168,7 +170,7 @@ def world_of(
     solids, buckets, field = _static_arrays(static, footprint, frame, keep)
     there = present or tuple(one.presence for one in moving)
     followed = [_moving_of(obstacle) for obstacle in moving]
-    moving_arrays = _moving_obstacles(followed, pose, there)
+    moving_arrays = _moving_obstacles(followed, pose, there, body.reach)
     return World(
         frame=pose,
         body=body,
@@ -316,11 +318,12 @@ class _Moving(NamedTuple):
 
 
 def _moving_obstacles(
-    every: list[_Moving], frame: Array, present: tuple[tuple[float, float], ...]
+    every: list[_Moving], frame: Array, present: tuple[tuple[float, float], ...], reach: float
 ) -> MovingObstacles:
+    """All moving obstacles, for a body of some reach [m]."""
     knots = [one.motion.time.size for one in every]
     poses = np.concatenate([np.zeros((0, 3)), *(one.motion.pose for one in every)])
-    return MovingObstacles(
+    found = MovingObstacles(
         solids=solids_of([piece for one in every for piece in one.pieces]),
         first_piece=np.cumsum([0, *(len(one.pieces) for one in every)], dtype=np.int64),
         first_knot=np.cumsum([0, *knots], dtype=np.int64),
@@ -332,7 +335,9 @@ def _moving_obstacles(
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
         rate=np.concatenate([np.zeros((0, 3)), *(one.rate for one in every)]),
         arcs=np.array([one.motion.twist is not None for one in every], dtype=np.bool_),
+        slabs=NO_SLABS,
     )
+    return found._replace(slabs=slabs_of(found, reach))
 
 
 @functools.lru_cache(maxsize=4096)

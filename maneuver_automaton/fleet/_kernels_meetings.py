@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_kernel
+from maneuver_automaton._compile import bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_moving import free_of_moving
+from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
+from maneuver_automaton.collision.slabs import Slabs
 from maneuver_automaton.collision.world import MovingObstacles
 
 if TYPE_CHECKING:
@@ -24,37 +26,56 @@ def first_meetings(
     and from when it coasts so. Between two looks the bodies keep `keep`, at each of them more than
     that by `margin`.
     """
-    for m in range(out.shape[0]):
-        one = MovingObstacles(
-            moving.solids,
-            moving.first_piece[m : m + 2],
-            moving.first_knot[m : m + 2],
-            moving.time,
-            moving.pose,
-            moving.speed[m : m + 1],
-            moving.middle[m : m + 1],
-            moving.reach[m : m + 1],
-            moving.present[m : m + 1],
-            moving.rate,
-            moving.arcs[m : m + 1],
-        )
-        out[m] = math.inf
-        for k in range(coasts.shape[0]):
+    slabs, n = moving.slabs, out.shape[0]
+    out[:] = math.inf
+    for k in range(coasts.shape[0]):
+        x, y, heading = coasts[k, 0], coasts[k, 1], coasts[k, 2]
+        v_x, v_y, turn_rate, speed = coasts[k, 3], coasts[k, 4], coasts[k, 5], coasts[k, 6]
+        duration, clock = coasts[k, 7], coasts[k, 8]
+        during, swept = (0, 0), (0.0, 0.0, 0.0, 0.0)
+        if slabs.leaves > 0:
+            during = slabs_during(slabs, clock, duration)
+            swept = swept_box(body, x, y, heading, v_x, v_y, turn_rate, duration)
+        for m in range(n):
+            if out[m] < math.inf:
+                continue  # by an earlier coast
+            if slabs.leaves > 0:
+                apart = apart_during(slabs, n, m, during, swept) - body.reach - keep
+                if apart > margin:
+                    continue
             free, _ = free_of_moving(
-                one,
+                one_of(moving, m),
                 body,
-                coasts[k, 0],
-                coasts[k, 1],
-                coasts[k, 2],
-                coasts[k, 3],
-                coasts[k, 4],
-                coasts[k, 5],
-                coasts[k, 6],
-                coasts[k, 7],
+                x,
+                y,
+                heading,
+                v_x,
+                v_y,
+                turn_rate,
+                speed,
+                duration,
                 keep,
                 margin,
-                coasts[k, 8],
+                clock,
             )
-            if free < coasts[k, 7]:
-                out[m] = coasts[k, 8] + free
-                break
+            if free < duration:
+                out[m] = clock + free
+
+
+@inlined_kernel
+def one_of(moving: MovingObstacles, m: int) -> MovingObstacles:
+    """One of several moving obstacles by itself."""
+    return MovingObstacles(
+        moving.solids,
+        moving.first_piece[m : m + 2],
+        moving.first_knot[m : m + 2],
+        moving.time,
+        moving.pose,
+        moving.speed[m : m + 1],
+        moving.middle[m : m + 1],
+        moving.reach[m : m + 1],
+        moving.present[m : m + 1],
+        moving.rate,
+        moving.arcs[m : m + 1],
+        Slabs(0.0, 1.0, 0, 0, moving.slabs.box),
+    )

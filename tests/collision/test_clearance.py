@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap, Polygon
@@ -190,6 +190,7 @@ def test_a_clearance_to_a_flat_tail_is_not_cut_off():
     drop=st.floats(1e-6, 3.0),
     most=st.floats(1e-3, 4.0),
 )
+@example(place=(0.0, 1e-3), turn=0.5, ahead=1.0, drop=1e-3, most=1.0)  # down to its lowest place
 def test_a_corner_that_is_passed_over_would_not_have_come_down_in_time(
     place, turn, ahead, drop, most
 ):
