@@ -52,7 +52,7 @@ def improve_word(
     if status == 2:
         return n, np.inf, -np.inf, 0
     n = simplify(twists, word, times, n, free_tail)
-    least = -np.inf
+    least, is_priced = -np.inf, False
     used = 0
     values = np.empty(word.size)
     trims = np.empty(word.size, dtype=np.int64)
@@ -63,7 +63,7 @@ def improve_word(
         k = price_positions(
             twists, rates, rows, n_priced, word, times, free, p, values, trims, moments
         )
-        least = values[k]
+        least, is_priced = values[k], True
         if least >= -accuracy:
             break
         used += 1
@@ -106,7 +106,7 @@ def improve_word(
                     trial_cost += rates[trial[i]] * trial_times[i]
             length = simplify(twists, trial, trial_times, length, free_tail)
             if trial_cost < cost - 1e-11 * (1.0 + abs(cost)) and length - free_tail <= most:
-                gained = True
+                gained, is_priced = True, False
                 n, cost = length, trial_cost
                 for i in range(n):
                     word[i], times[i] = trial[i], trial_times[i]
@@ -116,7 +116,15 @@ def improve_word(
             n, cost = replace_runs(
                 twists, rates, goal, rows, targets, n_priced, free_tail, word, times, n, cost, most
             )
+            is_priced = is_priced and cost == before
             if not gained and cost == before:
                 break
+    if not is_priced:  # what was gained last is another word, with another certificate
+        p = word_multipliers(twists, rates, rows, word, times, n)
+        free = n - free_tail
+        k = price_positions(
+            twists, rates, rows, n_priced, word, times, free, p, values, trims, moments
+        )
+        least = values[k]
     cost = refine(twists, rates, goal, rows, targets, word, times, n, cost)
     return n, cost, least, used

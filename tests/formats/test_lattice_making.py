@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ import maneuver_automaton as ma
 from maneuver_automaton.cli import run
 from maneuver_automaton.formats.lattice_making import lattice_of_arcs
 from maneuver_automaton.formats.nav2_lattice import read_nav2_lattice
+from tests.formats.outside import DATA, needs_data
 
-NAV2 = Path(__file__).parents[2].parent / "shared" / "data" / "nav2-lattice"
+NAV2 = DATA / "nav2-lattice"
 SCENARIO = """schema: 1
 vehicle: {model: lattice_body, resolution_m: 0.1, turning_radius_m: 0.7}
 automaton: {preset: NAME}
@@ -53,6 +53,7 @@ def test_they_look_the_same_from_every_side():
         np.testing.assert_allclose(ends[-a % 16, -b % 16], [x, -y], atol=1e-12)
 
 
+@needs_data
 @pytest.mark.parametrize("name", ["ackermann_5cm_r0.5m", "diff_5cm_r1m"])
 def test_none_is_longer_than_that_of_nav2(name):
     """For the turns that its generator keeps; most end at the very same cell."""
