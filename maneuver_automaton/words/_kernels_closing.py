@@ -99,11 +99,12 @@ def smallest_change(columns: Array, gap: Array, rank: float, change: Array) -> N
                     a += columns[i, p] * columns[i, p]
                     b += columns[i, q] * columns[i, q]
                     d += columns[i, p] * columns[i, q]
-                if not abs(d) > ORTHOGONAL * math.sqrt(a * b):
+                # Products of next to nothing vanish: a column that has no length turns with none.
+                if a == 0.0 or b == 0.0 or not abs(d) > ORTHOGONAL * math.sqrt(a) * math.sqrt(b):
                     continue
                 turned = True
                 zeta = (b - a) / (2.0 * d)
-                t = math.copysign(1.0, zeta) / (abs(zeta) + math.sqrt(1.0 + zeta * zeta))
+                t = math.copysign(1.0, zeta) / (abs(zeta) + math.hypot(1.0, zeta))
                 c = 1.0 / math.sqrt(1.0 + t * t)
                 s = c * t
                 for i in range(n):

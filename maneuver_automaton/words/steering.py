@@ -292,7 +292,7 @@ def _settled(rows: Array, steps: Array, goal: Array, times: Array) -> Array | No
 
 def _periods(rows: Array) -> Array:
     """Time of a full turn of each trim (n,) [s], inf for straights."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         return np.asarray(FULL_TURN / np.abs(rows[:, 2]))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
@@ -131,8 +132,9 @@ def test_no_time_at_all_takes_no_slice():
 @pytest.mark.parametrize("name", ["car", "angle", "truck", "point", "disc"])
 def test_a_cut_body_is_the_same_body(name, twist):
     body = grown_body(FOOTPRINTS[name], 0.1, 1e-3)
+    # One after the other: of pieces that touch along their cuts `union_all` of GEOS 3.14 lost one.
     whole, parts = (
-        shapely.union_all([shapely.Polygon(corners) for corners in one.pieces])
+        functools.reduce(shapely.union, [shapely.Polygon(corners) for corners in one.pieces])
         for one in (body, cut_where_it_pivots(body, twist))
     )
     assert whole.buffer(1e-9).covers(parts)
