@@ -20,6 +20,7 @@ from maneuver_automaton.search.lattice_task import task_of
 from maneuver_automaton.search.prepared import Prepared
 from tests.quickly import quick_are
 from tests.scenes import CAR_BODY, differential_robot, random_scene, reeds_shepp, room_queries
+from tests.search.cases import compiled_only
 
 WALL = Obstacle(Box([1.0, 6.0], [6.0, 0.0]))
 CAR = Problem(reeds_shepp(), [0, 0, 0], [12, 2, 0.4], obstacles=(WALL,), footprint=CAR_BODY)
@@ -73,6 +74,7 @@ def test_the_first_call_does_what_the_search_does(seed: int) -> None:
         assert_begun_as(one, query)
 
 
+@compiled_only
 def test_random_scenes_are_begun_so() -> None:
     """Most of them: not with something in the way of an end, nor with one bound alone."""
     assert sum(begun(random_scene(seed), Prepared()) is not None for seed in range(40)) > 12
@@ -139,6 +141,7 @@ def test_what_moves_or_has_maneuvers_has_no_bench() -> None:
         assert begun(problem, prepared) is None
 
 
+@compiled_only  # otherwise the time is over first
 @pytest.mark.parametrize("seed", range(4))
 def test_a_planner_finds_what_a_plan_alone_finds(seed: int) -> None:
     room = room_queries(4, boxes=25)[seed]
@@ -152,6 +155,7 @@ def test_a_planner_finds_what_a_plan_alone_finds(seed: int) -> None:
         assert many.counts == alone.counts
 
 
+@compiled_only
 def test_threads_share_a_planner() -> None:
     robot = differential_robot()
     planner = Planner(robot, obstacles=(WALL,), footprint=Box([0.6, 0.4]), search=ONCE)
