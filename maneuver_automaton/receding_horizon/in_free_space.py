@@ -94,7 +94,8 @@ class InFreeSpace:
 
         It is the rest of what a search has found from several words, and other words lose to it. No
         theorem says so, but of 2832 steps with 1681 trims not one went on otherwise, and a step
-        takes a third of the time. Insertion takes the other words where it has no solution.
+        takes a third of the time; of the recorded loops a glider's alone costs more, by 2e-6.
+        Insertion takes the other words where it has no solution.
         """
         now = self.now
         searched = not (self.settings.continuous or bounded(self.here) or alternatives)
