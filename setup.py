@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -48,8 +49,14 @@ class BuildWhole(build_py):
         known = os.environ.get("PYTHONPATH")  # where pip puts what a build needs
         paths = os.pathsep.join(filter(None, (str(package.parent), known)))
         command = [sys.executable, "-c", COMPILE, str(package)]
-        if subprocess.run(command, env={**os.environ, "PYTHONPATH": paths}).returncode:
-            self.warn("kernels were not compiled: they will be when they are used first")
+        with contextlib.ExitStack() as stack:
+            shown = None  # standard output, of which pip shows nothing but with -v
+            with contextlib.suppress(OSError):  # no terminal
+                shown = stack.enter_context(Path("/dev/tty").open("w"))
+                print(file=shown, flush=True)
+            environment = {**os.environ, "PYTHONPATH": paths}
+            if subprocess.run(command, env=environment, stdout=shown).returncode:
+                self.warn("kernels were not compiled: they will be when they are used first")
 
 
 class WithMachineCode(Distribution):

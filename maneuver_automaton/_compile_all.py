@@ -8,25 +8,30 @@ from __future__ import annotations
 import contextlib
 import functools
 import gc
+import math
 import os
 import platform
+import shutil
 import subprocess
 import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 
 FIRST = ("refinement.", "search._kernels_lattice", "receding_horizon.")  # share most, take longest
+HELD = 2e9  # [bytes] that one process may come to hold; 1.6 to 1.9 GB are measured
+KEPT = 8  # folders of compiled kernels, of other versions and of sources that were edited
 LOCK = ".compiling"  # name of the lock in the folder
 STALE = 20.0  # [s] after which a lock that is touched no more is nobody's
 WORKER = "MANEUVER_AUTOMATON_COMPILES"  # set in the environment of the processes that compile
 X86_64_V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "xsave")
 
-Report = Callable[[int, int], None]  # how many kernels are compiled, of how many
+# Called again and again with the kernels that are compiled, and with all
+Report = Callable[[Sequence[str], Sequence[str]], None]
 
 
 def compile_kernels(
@@ -37,7 +42,7 @@ def compile_kernels(
     Parameters
     ----------
     jobs : int, optional
-        Processes at a time; as many as there are cores by default.
+        Processes at a time; by default one a core, as far as memory reaches.
     report : callable, optional
         Called as kernels are done.
     settings : dict, optional
@@ -47,7 +52,7 @@ def compile_kernels(
 
     names = sorted(listed(), key=lambda name: (not any(one in name for one in FIRST), name))
     waiting, failed, done = deque(names), list[str](), list[str]()
-    workers = [_worker(settings or {}) for _ in range(min(jobs or cores(), len(names)))]
+    workers = [_worker(settings or {}) for _ in range(min(jobs or affordable(), len(names)))]
 
     def serve(number: int, worker: subprocess.Popen[str]) -> None:
         assert worker.stdin is not None
@@ -72,7 +77,7 @@ def compile_kernels(
             threads[0].join(0.1)
             threads[-1].join(0.1)
             if report is not None:
-                report(len(done), len(names))
+                report(done, names)
     finally:
         for worker in workers:
             worker.kill()
@@ -103,14 +108,19 @@ def compile_missing(*, jobs: int | None = None) -> list[str] | None:
         finally:
             with contextlib.suppress(OSError):
                 (folder / LOCK).unlink()
+                others = sorted(
+                    folder.parent.glob(f"{KERNELS}*"), key=lambda one: one.stat().st_mtime
+                )
+                for old in others[:-KEPT]:
+                    shutil.rmtree(old, ignore_errors=True)
 
 
-def _report(lock: Path, bar: Report | None, done: int, total: int) -> None:
+def _report(lock: Path, bar: Report | None, done: Sequence[str], names: Sequence[str]) -> None:
     """Say that this process is still at work, and how far it is."""
     with contextlib.suppress(OSError):
         os.utime(lock)
     if bar is not None:
-        bar(done, total)
+        bar(done, names)
 
 
 def work() -> None:
@@ -132,10 +142,26 @@ def work() -> None:
 
 
 def ship(package: Path) -> list[str]:
-    """Compile all kernels into a package that is built, for every processor of its kind."""
-    folder = package / SHIPPED
+    """Compile all kernels into a package that is built, for every processor of its kind.
+
+    Prints a line when it begins, and one for each room that is done.
+    """
+    folder, jobs, said = package / SHIPPED, affordable(), set[str]()
+
+    def say(text: str) -> None:
+        begin = "\r" if sys.stdout.isatty() else ""  # over the sign that pip turns there
+        print(f"{begin}  {text}", flush=True)  # noqa: T201
+
+    def report(done: Sequence[str], names: Sequence[str]) -> None:
+        left = {_room(name) for name in set(names).difference(done)}
+        for room in sorted({_room(name) for name in names} - left - said):
+            said.add(room)
+            say(f"compiled {room} ({len(done)} of {len(names)} kernels)")
+
+    say(f"compiling kernels, {jobs} at a time; this takes some minutes of processor time")
     target = {"NUMBA_CPU_NAME": processors()[0], "NUMBA_CPU_FEATURES": ""}
-    failed = compile_kernels(settings={"NUMBA_CACHE_DIR": str(folder), **target})
+    settings = {"NUMBA_CACHE_DIR": str(folder), **target}
+    failed = compile_kernels(jobs=jobs, report=report, settings=settings)
     for other in folder.glob(f"{KERNELS}*"):
         if other.name != f"{KERNELS}{source_hash()}":
             for path in other.iterdir():
@@ -160,6 +186,43 @@ def cores() -> int:
     with contextlib.suppress(AttributeError):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def affordable(root: Path = Path("/")) -> int:
+    """How many processes may compile at a time: one a core, as far as memory reaches."""
+    free = [math.inf]
+    try:
+        stated = (root / "proc/meminfo").read_text().split("MemAvailable:")[1]
+        free.append(int(stated.split()[0]) * 1024)
+    except (OSError, IndexError):
+        with contextlib.suppress(AttributeError, OSError, ValueError):  # all there is, free or not
+            free.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    with contextlib.suppress(OSError):  # a container has less
+        for line in (root / "proc/self/cgroup").read_text().splitlines():
+            _, kinds, path = line.split(":", 2)
+            if kinds in ("", "memory"):
+                top = root / "sys/fs/cgroup" / kinds
+                group = top / path.lstrip("/")
+                free += [
+                    _left_in(one) for one in (group, *group.parents) if one.is_relative_to(top)
+                ]
+    return max(1, int(min(cores(), min(free) / HELD)))
+
+
+def _left_in(group: Path) -> float:
+    """Bytes that a control group may still use, files that can be dropped among them."""
+    for most, used in (("max", "current"), ("limit_in_bytes", "usage_in_bytes")):
+        with contextlib.suppress(OSError, ValueError):  # no such file, or "max": no limit
+            left = int((group / f"memory.{most}").read_text())
+            left -= int((group / f"memory.{used}").read_text())
+            stated = (group / "memory.stat").read_text().split("inactive_file ")
+            return left + (int(stated[1].split()[0]) if len(stated) > 1 else 0)
+    return math.inf
+
+
+def _room(name: str) -> str:
+    """The folder of the package that a kernel is from."""
+    return name.split(".")[1]
 
 
 def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:
@@ -196,4 +259,4 @@ def _bar() -> Iterator[Report | None]:
 
     with Progress(console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task("compiling kernels, once")
-        yield lambda done, total: progress.update(task, completed=done, total=total)
+        yield lambda done, names: progress.update(task, completed=len(done), total=len(names))

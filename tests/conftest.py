@@ -1,24 +1,26 @@
-"""What every test session gets: kernels of its own, and Hypothesis without a deadline."""
+"""What every test session gets: the user's compiled kernels, and Hypothesis without a deadline."""
 
 from __future__ import annotations
 
 import os
-import shutil
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
 
-from maneuver_automaton._kernel_folders import KERNELS, source_hash
+from maneuver_automaton._kernel_folders import kernel_folder
 from tests.quickly import FEW, MANY
 
-# Compiled kernels and failing examples are kept beside pytest's own cache, apart from the user's. A
-# folder `.hypothesis` in the root, which is searched for tests, would be warned about, and warnings
-# are errors.
+# Kernels are compiled once, for the tests and for the command line: their folder is named by a hash
+# of all their sources, so none can be stale. It is stated, since some tests have another cache.
+# Failing examples are kept beside pytest's own cache: a folder `.hypothesis` in the root, which is
+# searched for tests, would be warned about, and warnings are errors.
 _kept = Path(__file__).parent.parent / ".pytest_cache"
-_kernels = _kept / "kernels"
-os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels))
+_kernels = kernel_folder()
+os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels.parent if _kernels else _kept / "kernels"))
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
+if _kernels is None:  # the user's cache cannot be written, or not be trusted
+    kernel_folder.cache_clear()
 
 SOME = 3  # every third of the slow parameters of a test is tried before a change is offered
 
@@ -43,11 +45,8 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int | None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Choose how often laws are tried, and drop the kernels compiled from other sources."""
+    """Choose how often laws are tried."""
     settings.load_profile("many" if _takes_long(config) else "few")
-    for folder in _kernels.glob(f"{KERNELS}*"):
-        if folder.name != f"{KERNELS}{source_hash()}":
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 @pytest.hookimpl(tryfirst=True)  # before marks are chosen from

@@ -16,10 +16,10 @@ SCENARIOS = Path(__file__).parent.parent / "scenarios"
 SHOWN = re.compile(r"cost ([\d.]+), at least ([\d.]+), gap ([\d.]+) %, clearance ([\d.]+) m")
 
 
-def on_a_terminal(*arguments, cwd):
+def on_a_terminal(*arguments, cwd, run=("-m", "maneuver_automaton")):
     """What the command writes to a terminal as wide as a line needs to be."""
     reads, writes = pty.openpty()
-    command = [sys.executable, "-m", "maneuver_automaton", *map(str, arguments)]
+    command = [sys.executable, *run, *map(str, arguments)]
     process = subprocess.Popen(
         command,
         cwd=cwd,
@@ -63,3 +63,30 @@ def test_cost_bound_gap_and_clearance_are_shown_in_place(tmp_path, more):
 def test_quiet_is_quiet_on_a_terminal_too(tmp_path):
     scenario = SCENARIOS / "parking.yaml"
     assert on_a_terminal("plan", scenario, "--no-plot", "--quiet", cwd=tmp_path) == ""
+
+
+COMPILES = """
+import time
+from numba.core import event
+from maneuver_automaton._compile_all import _bar
+from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.progress import progress_bar, waiting
+
+with announced(), progress_bar("files", 2, quiet=False), waiting("planning", quiet=False):
+    time.sleep(0.3)
+    with event.trigger_event("numba:compile", data={}), _bar() as bar:
+        for count in range(3):
+            bar(["a", "b"][:count], ["a", "b"])
+            time.sleep(0.3)
+    time.sleep(0.3)
+"""
+
+
+def test_two_bars_are_never_shown_at_once(tmp_path):
+    text = on_a_terminal(cwd=tmp_path, run=("-c", COMPILES))
+    assert "planning" not in text  # a bar is there already
+    before, after = text.split("compiling kernels, once after", 1)
+    meanwhile = after[after.index("compiling") : after.rindex("compiling")]
+    assert "files" in before
+    assert "files" not in meanwhile
+    assert "files" in after[after.rindex("compiling") :]

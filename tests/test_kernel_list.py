@@ -112,9 +112,9 @@ def test_kernels_are_compiled_by_several_processes(monkeypatch):
     few = {f"maneuver_automaton.{name}": () for name in names}
     monkeypatch.setattr("maneuver_automaton._kernel_list.listed", lambda: few)
     seen = []
-    failed = _compile_all.compile_kernels(jobs=2, report=lambda done, of: seen.append((done, of)))
+    failed = _compile_all.compile_kernels(jobs=2, report=lambda *both: seen.append(both))
     assert failed == []
-    assert seen[-1] == (2, 2)
+    assert set(seen[-1][0]) == set(seen[-1][1]) == set(few)
     monkeypatch.setattr("maneuver_automaton._kernel_list.listed", lambda: {"no.kernel": ()})
     assert _compile_all.compile_kernels(jobs=1) == ["no.kernel: KeyError: 'no.kernel'"]
 
@@ -124,10 +124,80 @@ def test_the_lock_of_a_process_that_is_gone_is_taken(tmp_path):
     assert _compile_all._locked(lock)
     assert not _compile_all._locked(lock)
     os.utime(lock, (0.0, 0.0))
-    _compile_all._report(lock, None, 1, 2)  # its process is at work
+    _compile_all._report(lock, None, ["one"], ["one", "other"])  # its process is at work
     assert not _compile_all._locked(lock)
     os.utime(lock, (0.0, 0.0))
     assert _compile_all._locked(lock)
+
+
+def test_a_build_says_which_rooms_are_done(tmp_path, monkeypatch, capsys):
+    def compiled(*, jobs, report, settings):
+        report(["ma.words.a"], ["ma.words.a", "ma.search.b", "ma.words.c"])
+        report(["ma.words.a", "ma.words.c"], ["ma.words.a", "ma.search.b", "ma.words.c"])
+        report(["ma.words.a", "ma.words.c"], ["ma.words.a", "ma.search.b", "ma.words.c"])
+        return []
+
+    monkeypatch.setattr(_compile_all, "compile_kernels", compiled)
+    assert _compile_all.ship(tmp_path) == []
+    first, *rooms = capsys.readouterr().out.splitlines()
+    assert f"{_compile_all.affordable()} at a time" in first
+    assert rooms == ["  compiled words (2 of 3 kernels)"]
+
+
+V1, V2 = "4:memory:/me\n", "0::/me\n"
+
+
+@pytest.mark.parametrize(
+    ("meminfo", "groups", "files", "expected"),
+    [
+        ("MemAvailable: 5000000 kB", "", {}, 2),
+        ("MemAvailable: 500000 kB", "", {}, 1),
+        ("MemAvailable: 99000000 kB", "", {}, 8),
+        ("MemAvailable: 99000000 kB", V2, {"me/memory.max": "max"}, 8),
+        (
+            "MemAvailable: 99000000 kB",
+            V2,
+            {"memory.max": "7000000000", "memory.current": "2000000000", "memory.stat": "anon 5"},
+            2,
+        ),
+        (
+            "MemAvailable: 99000000 kB",
+            V2,
+            {
+                "me/memory.max": "7000000000",
+                "me/memory.current": "2000000000",
+                "me/memory.stat": "anon 5\ninactive_file 1500000000\nactive_file 7",
+            },
+            3,
+        ),
+        (
+            "MemAvailable: 99000000 kB",
+            V1,
+            {
+                "memory/me/memory.limit_in_bytes": "4100000000",
+                "memory/me/memory.usage_in_bytes": "0",
+                "memory/me/memory.stat": "",
+            },
+            2,
+        ),
+    ],
+)
+def test_as_many_compile_as_memory_admits(tmp_path, monkeypatch, meminfo, groups, files, expected):
+    monkeypatch.setattr(_compile_all, "cores", lambda: 8)
+    stated = {"proc/meminfo": meminfo, "proc/self/cgroup": groups}
+    stated |= {f"sys/fs/cgroup/{name}": text for name, text in files.items()}
+    for name, text in stated.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    assert _compile_all.affordable(tmp_path) == expected
+
+
+def test_without_a_word_of_the_system_memory_does_not_count(tmp_path, monkeypatch):
+    monkeypatch.setattr(_compile_all, "cores", lambda: 3)
+    monkeypatch.setattr(_compile_all.os, "sysconf", lambda name: 4e9, raising=False)
+    assert _compile_all.affordable(tmp_path) == 3
+    monkeypatch.delattr(_compile_all.os, "sysconf")
+    assert _compile_all.affordable(tmp_path) == 3
 
 
 def test_a_disk_that_is_full_ends_nothing(monkeypatch, caplog):

@@ -1,11 +1,13 @@
-"""A bar or a clock on a terminal, nothing elsewhere."""
+"""A bar or a clock on a terminal, nothing elsewhere; never two of them."""
 
 from __future__ import annotations
 
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
-from typing import Protocol
+from typing import Any, Protocol
+
+_shown: list[Any] = []  # what rich shows on the terminal: one bar at most
 
 
 class Advance(Protocol):
@@ -21,20 +23,43 @@ def has_terminal() -> bool:
     return sys.stderr.isatty()
 
 
+def make_room() -> None:
+    """Take the bar from the terminal, for lines and the bar of the compiler."""
+    for bar in _shown:
+        bar.stop()
+
+
+def come_back() -> None:
+    """Show the bar again."""
+    for bar in _shown:
+        bar.start()
+
+
+@contextlib.contextmanager
+def _live(bar: Any) -> Iterator[None]:
+    with bar:
+        _shown.append(bar)
+        try:
+            yield
+        finally:
+            _shown.remove(bar)
+
+
 def _nothing(n: int = 1) -> None:
-    """Where there is no terminal."""
+    """Where there is no terminal, or a bar already."""
 
 
 @contextlib.contextmanager
 def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
     """A bar for `total` pieces of work; yields what to call after each."""
-    if quiet or not has_terminal():
+    if quiet or _shown or not has_terminal():
         yield _nothing
         return
     from rich.console import Console
     from rich.progress import Progress
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
+    bar = Progress(console=Console(stderr=True), transient=True)
+    with _live(bar):
         task = bar.add_task(what, total=total)
 
         def advance(n: int = 1) -> None:
@@ -49,7 +74,7 @@ def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> 
 
     What `more` says is shown beside it, and asked for again and again.
     """
-    if quiet or not has_terminal():
+    if quiet or _shown or not has_terminal():
         yield
         return
     from rich.console import Console
@@ -68,6 +93,7 @@ def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> 
             return Text(more())
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), More())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as clock:
+    clock = Progress(*columns, console=Console(stderr=True), transient=True)
+    with _live(clock):
         clock.add_task(what, total=None)
         yield
