@@ -37,4 +37,4 @@ class NotATrim(ManeuverAutomatonError, ValueError):
 
 
 class MissingExtra(ManeuverAutomatonError, ImportError):
-    """A library of an optional extra is not installed: the message names the extra."""
+    """A library that is needed cannot be imported: the message names it, or its extra."""

@@ -22,7 +22,6 @@ HEAVY = ("numba", "scipy", "networkx", "matplotlib", "fcl", "casadi", "pydantic"
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 SAYS_EXTRA = {  # where an extra is asked for by its name
-    "optimal-control": "optimal_control/_casadi.py",
     "distributed": "_parallel.py",
     "pandas": "automaton/plan.py",
     "commonroad": "exports/commonroad_solution.py",

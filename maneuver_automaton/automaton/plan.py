@@ -54,6 +54,7 @@ class Plan:
     durations: Array = field(kw_only=True)  # (n,) [s] of the trims
     maneuvers: tuple[Maneuver | None, ...] = field(default=(), kw_only=True)  # (n - 1,) or none
     start_time: float = field(default=0.0, kw_only=True)  # [s]
+    notes: tuple[str, ...] = field(default=(), kw_only=True)  # of the file that it was read from
 
     __repr__ = brief
 
@@ -67,6 +68,7 @@ class Plan:
             durations: ArrayLike,
             maneuvers: Sequence[Maneuver | None] = (),
             start_time: float = 0.0,
+            notes: tuple[str, ...] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:

@@ -81,9 +81,11 @@ class PlanAnswer:
 
     @property
     def why_not(self) -> str:
-        """Status and reason, if there is no plan."""
+        """Status and reason, if there is no plan, and what was left out."""
         result = self.result
-        return "" if result.plan is not None else f"{result.status.value}: {result.reason}"
+        if result.plan is not None:
+            return ""
+        return "; ".join([f"{result.status.value}: {result.reason}", *result.notes])
 
     def save(self, path: Path) -> None:
         """Write plan.json."""

@@ -11,6 +11,7 @@ from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.loop_tables import shortened
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.fleet import DrivenVerdict, FleetLog, FleetStep
+from maneuver_automaton.planning.polishing import left_out
 
 MOST_NAMES = 4  # of vehicles in a cell
 
@@ -103,6 +104,7 @@ def _facts(log: FleetLog, driven: DrivenVerdict, folder: str) -> dict[str, str]:
         "apart": f"{driven.distance_m:.3g} m at least{kept}" if driven.closest else "",
         "nearest": "; ".join(map(pair_text, driven.closest[:3])),
         "collisions": f"{collisions}" if collisions else "none",
+        "left out": "; ".join(left_out(*log.problem.problems)),
         "written to": folder,
         "time per step": (
             f"{np.median(milliseconds):.2f} ms median, {milliseconds.max():.2f} ms at most"

@@ -53,6 +53,7 @@ def _facts(result: FleetResult, folder: str) -> dict[str, str]:
         "order": ", ".join(result.order),
         "timing": ", ".join(f"{spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
         "counts": ", ".join(f"{spoken(k)} {v}" for k, v in result.counts.items()),
+        "left out": "; ".join(result.notes),
         "written to": folder,
     }
 

@@ -8,6 +8,7 @@ import numpy as np
 from rich.text import Text
 
 from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.receding_horizon import ClosedLoop, Statistics
 
 MOST_ROWS = 60  # of the table of steps; the file has all of them
@@ -47,6 +48,8 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
     }
     if loop.problem.obstacles:
         facts |= {"least clearance": _clearance(loop), "collisions": _collisions(loop)}
+    if missing := left_out(loop.problem):
+        facts["left out"] = "; ".join(missing)
     facts["written to"] = folder
     if rows:
         milliseconds = 1e3 * loop.solve_s

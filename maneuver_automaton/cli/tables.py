@@ -73,6 +73,7 @@ def print_result(name: str, result: PlanResult, *, folder: str) -> None:
         "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
         "timing": ", ".join(f"{spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
         "counts": ", ".join(f"{spoken(k)} {n}" for k, n in result.counts.items()),
+        "left out": "; ".join(result.notes),
         "written to": folder,
     }
     for what, value in facts.items():

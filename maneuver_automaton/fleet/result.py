@@ -65,6 +65,11 @@ class FleetResult:
         return picture(self)
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out for any of the vehicles, and why."""
+        return tuple(dict.fromkeys(note for one in self.results.values() for note in one.notes))
+
+    @property
     def plans(self) -> dict[str, Plan]:
         """The plans of those that have one, by name."""
         return {name: one.plan for name, one in self.results.items() if one.plan is not None}

@@ -20,6 +20,7 @@ from maneuver_automaton.fleet.vehicle import Found, Vehicle
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import Omnidirectional, UserModel
 from maneuver_automaton.planning.checking import check_plan
+from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import SearchSettings
@@ -121,6 +122,7 @@ def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tup
             terminal_error=terminal_error(found.plan, goal),
             clearance_m=checked.audit.min_clearance_m,
             audit=checked.audit,
+            notes=left_out(problem),
         ),
         "",
     )

@@ -26,6 +26,7 @@ from maneuver_automaton.formats.plan_json import (
 )
 from maneuver_automaton.formats.word_json import plan_entries, plan_of_entries
 from maneuver_automaton.formats.yaml_source import shown
+from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
     Deed,
@@ -64,6 +65,7 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> dict[str, Any]:
         "automaton_hash": automaton_hash(loop.problem.automaton),
         "status": loop.status,
         "reason": loop.reason,
+        "notes": list(left_out(loop.problem)),
         "reached": loop.reached,
         "cost": loop.cost,
         "duration_s": float(loop.times[-1] - loop.times[0]),

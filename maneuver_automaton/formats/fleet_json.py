@@ -50,6 +50,7 @@ def fleet_to_dict(result: FleetResult, *, name: str = "") -> dict[str, Any]:
         "name": name,
         "status": result.status.value,
         "reason": reason_of(result),
+        "notes": list(result.notes),
         "objective": result.objective,
         "cost": float(result.cost),
         "alone_cost": float(result.alone_cost),

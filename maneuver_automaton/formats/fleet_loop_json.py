@@ -29,6 +29,7 @@ from maneuver_automaton.formats.plan_json import (
     write_document,
 )
 from maneuver_automaton.formats.word_json import plan_entries
+from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.problem import Problem
 
 NOT_DECIDED = ("gap_m", "distance_m", "solve_s")  # of the last entry of `steps`
@@ -71,6 +72,7 @@ def fleet_loop_to_dict(log: FleetLog, driven: DrivenVerdict, *, name: str = "") 
         "name": name,
         "status": log.status,
         "reason": log.reason,
+        "notes": list(left_out(*fleet.problems)),
         "reached": log.reached,
         "cost": float(log.cost),
         "duration_s": float(times[-1] - times[0]),

@@ -77,6 +77,7 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
         "automaton_hash": automaton_hash(result.problem.automaton),
         "status": result.status.value,
         "reason": result.reason,
+        "notes": list(result.notes),
         **_narrowest(result.narrowest),
         "cost": _number(result.cost),
         "duration_s": None if plan is None else plan.duration,
@@ -445,9 +446,10 @@ def plan_of_document(document: Mapping[str, Any]) -> Plan:
     }
     start = pose[0].copy()
     start[:2] += origin
-    return Plan.of_primitives(
+    plan = Plan.of_primitives(
         start, pieces, durations=durations, trims=passed, start_time=float(time[0])
     )
+    return replace(plan, notes=tuple(map(str, document.get("notes") or ())))
 
 
 def _rows(trajectory: Mapping[str, Any], key: str, count: int) -> Array:

@@ -72,6 +72,7 @@ def _result_of(document: Mapping[str, Any], problem: Problem) -> PlanResult:
             place=(float(narrowest["place"][0]), float(narrowest["place"][1])),
             missing=float(narrowest["missing_m"]),
         ),
+        notes=tuple(map(str, document.get("notes") or ())),
     )
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
-    from maneuver_automaton.optimal_control._casadi import has_casadi as has_casadi
     from maneuver_automaton.optimal_control._casadi import load_casadi as load_casadi
+    from maneuver_automaton.optimal_control._casadi import why_no_casadi as why_no_casadi
     from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective as ManeuverObjective
     from maneuver_automaton.optimal_control.maneuvers import TransferSettings as TransferSettings
     from maneuver_automaton.optimal_control.maneuvers import solve_transfer as solve_transfer
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.optimal_control.vehicles import moving_frame as moving_frame
 
 _HOMES = {
-    "has_casadi": "_casadi",
     "load_casadi": "_casadi",
+    "why_no_casadi": "_casadi",
     "ManeuverObjective": "maneuvers",
     "TransferSettings": "maneuvers",
     "solve_transfer": "maneuvers",

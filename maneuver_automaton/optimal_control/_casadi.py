@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import importlib.util
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,19 +11,22 @@ from maneuver_automaton.errors import MissingExtra
 
 
 @functools.cache
-def has_casadi() -> bool:
-    """Whether CasADi is installed; it is not imported."""
-    return importlib.util.find_spec("casadi") is not None
+def why_no_casadi() -> str:
+    """Why optimal control cannot be used: what the import of CasADi says; empty if it works."""
+    try:
+        load_casadi()
+    except MissingExtra as error:
+        return str(error)
+    return ""
 
 
 def load_casadi() -> Any:
-    """The module `casadi`; raises MissingExtra (an ImportError) if it is not installed."""
+    """The module `casadi`; raises MissingExtra (an ImportError) if it cannot be imported."""
     try:
         import casadi
-    except ImportError as error:
+    except Exception as error:  # whatever a broken installation raises
         raise MissingExtra(
-            "optimal control needs CasADi, which is not installed: "
-            "pip install 'maneuver-automaton[optimal-control]'"
+            f"optimal control needs CasADi, which cannot be imported ({error}): pip install casadi"
         ) from error
     return casadi
 

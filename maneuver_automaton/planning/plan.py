@@ -106,7 +106,7 @@ def _show(
     bound = known()
     if watch.bound > bound.value:
         bound = LowerBound(value=watch.bound, kind="cells")
-    on_better(found(bound=bound))
+    on_better(_noted(found(bound=bound)))
 
 
 def plan_in(
@@ -163,7 +163,16 @@ def plan_within(
         )
     else:
         result = _answered(problem, budget, workspace, alternatives=alternatives)
-    return with_proof(result, budget)
+    return _noted(with_proof(result, budget))
+
+
+def _noted(result: PlanResult) -> PlanResult:
+    """The result, with what was left out of planning."""
+    if not has_inertia(result.problem):
+        return result
+    from maneuver_automaton.planning.polishing import left_out
+
+    return replace(result, notes=(*result.notes, *left_out(result.problem)))
 
 
 def _answered(

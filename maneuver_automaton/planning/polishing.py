@@ -20,12 +20,12 @@ from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
-from maneuver_automaton.optimal_control import Guess, PolishSettings, has_casadi, load_casadi
+from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.needs import rests_at_both_ends
+from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
@@ -70,9 +70,16 @@ def why_not_polished(problem: Problem) -> str:
     unlimited = problem.horizon.time is None and problem.horizon.max_time is None
     if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
-    if not has_casadi():
-        return "CasADi is not installed"
-    return ""
+    return why_no_casadi()
+
+
+def left_out(*problems: Problem) -> tuple[str, ...]:
+    """What plans of some problems do without that they should have, and why: a sentence each."""
+    for one in problems:
+        why = why_not_polished(one) if has_inertia(one) else ""
+        if why and why == why_no_casadi():
+            return (f"plans are not polished, and may cost much more: {why}",)
+    return ()
 
 
 def load_polishing(problem: Problem) -> None:

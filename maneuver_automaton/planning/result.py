@@ -90,6 +90,7 @@ class PlanResult:
     narrowest: Narrowest | None = None  # the passage that is too narrow, of a proof
     reached: Array | None = None  # (n, 4, 2) squares that the pose never leaves, of that proof
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
+    notes: tuple[str, ...] = ()  # what was left out or done otherwise, and why: a sentence each
 
     def player(self, *, title: str = "") -> Player:
         """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""

@@ -15,8 +15,6 @@ from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.primitives.bang_bang import bang_bang
 from tests.plotting.cases import assert_picture
 
-pytest.importorskip("casadi")
-
 ROBOT = SecondOrderUnicycle(
     max_speed=2.0, max_turn_rate=2.0, max_acceleration=1.0, max_angular_acceleration=1.0
 )

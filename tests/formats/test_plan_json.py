@@ -30,6 +30,7 @@ KEYS = {
     "automaton_hash",
     "status",
     "reason",
+    "notes",
     "cost",
     "duration_s",
     "lower_bound",

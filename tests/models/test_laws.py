@@ -212,7 +212,8 @@ def test_components_are_the_arrays(model, data):
 
 @every_model
 def test_symbols_are_the_numbers(model):
-    casadi = pytest.importorskip("casadi")
+    import casadi
+
     from maneuver_automaton.optimal_control._casadi import numpy_on_symbols
 
     dof, n_z, n_u = sizes(model)

@@ -15,7 +15,6 @@ from maneuver_automaton.optimal_control.uniform_effort import END, START, exampl
 from tests.optimal_control import pontryagin
 from tests.reference_dynamics import dynamics_defect
 
-pytest.importorskip("casadi")
 PRINTED = 0.5141
 
 

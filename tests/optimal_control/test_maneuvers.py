@@ -20,8 +20,6 @@ from maneuver_automaton.optimal_control.maneuvers import (
 )
 from maneuver_automaton.optimal_control.solution import SolveStatus
 
-pytest.importorskip("casadi")
-
 CAR = SecondOrderCar(
     wheelbase=2.5, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
 )

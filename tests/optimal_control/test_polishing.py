@@ -25,7 +25,6 @@ from maneuver_automaton.optimal_control.separation import (
 )
 from tests.reference_dynamics import trailer_pose
 
-casadi = pytest.importorskip("casadi")
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 ROBOT = SecondOrderUnicycle(
     max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0, max_angular_acceleration=1.0

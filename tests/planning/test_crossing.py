@@ -7,7 +7,6 @@ import pytest
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Box, Zone
-from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.crossing import coasts_through
 from maneuver_automaton.problem import Problem, SearchSettings
@@ -29,7 +28,6 @@ def test_zones_are_crossed_where_a_plan_meets_them():
 @pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only
-@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_without_a_slow_trim_the_whole_way_is_driven_slowly():
     """The slower trims of the library only drive back: 24.3 s ahead, more than 50 s with them."""
     library = load_stock_library("car_with_trailer")

@@ -11,14 +11,12 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.polished_price import admitted_durations, polished_price
 from maneuver_automaton.planning.polishing import why_not_polished
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from tests.search.cases import compiled_only
 
-needs_casadi = pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 ROBOT = load_stock_library("second_order_unicycle")
 GOAL = (3.0, 1.0, 0.5)
 
@@ -42,7 +40,6 @@ def posed(**changes):
 @pytest.mark.slow
 @pytest.mark.exhaustive
 @compiled_only
-@needs_casadi
 def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
     """Slower takes less effort: half the accelerations for twice the time take an eighth."""
     quick = plan(posed(), time_limit=20.0)
@@ -56,7 +53,6 @@ def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
 @pytest.mark.slow
 @pytest.mark.exhaustive
 @compiled_only
-@needs_casadi
 def test_a_user_s_cost_is_polished_in_time():
     quick = plan(posed(), time_limit=20.0)
     problem = posed(cost=OfTurns())
@@ -93,7 +89,6 @@ def test_a_longest_time_bounds_what_is_polished():
     assert least < 1.0 < most <= 7.0
 
 
-@needs_casadi
 def test_effort_alone_has_no_quickest_motion():
     assert why_not_polished(posed(cost=Cost(effort=1.0))) == "time costs nothing"
     assert not why_not_polished(posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=9.0)))
@@ -101,7 +96,6 @@ def test_effort_alone_has_no_quickest_motion():
 
 @pytest.mark.slow
 @compiled_only
-@needs_casadi
 def test_what_is_passed_above_or_below_does_not_keep_from_polishing():
     bridge = Obstacle(Disc(1.6, [15.0, 2.0]), height=(50.0, 60.0))
     problem = Problem(

@@ -13,7 +13,6 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.polishing import guess_of_plan, polish_plans
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
@@ -23,7 +22,6 @@ from tests.search.cases import compiled_only
 
 pytestmark = [
     compiled_only,
-    pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi"),
 ]
 WORK = SearchSettings(max_expansions=200)
 CAR = Box([4.2, 1.8], [1.2, 0.0])

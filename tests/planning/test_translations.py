@@ -83,7 +83,6 @@ def crossing(**goal):
 @pytest.mark.slow
 def test_a_boat_is_polished_though_its_heading_is_in_its_pose_and_in_its_state():
     """What the last pose says already is not asked of the last state too, or no solver ends."""
-    pytest.importorskip("casadi")
     facing = plan(crossing(), time_limit=30.0)
     assert facing.cost < 4.961
     assert facing.audit.passed

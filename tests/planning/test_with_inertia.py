@@ -15,7 +15,6 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
@@ -79,7 +78,6 @@ def test_costs_fall_and_the_first_plan_stops_and_steers():
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_polishing_makes_it_quick():
     """10.19 s by polishing, more than 20 s by stopping and steering."""
     result = plan(parking(), time_limit=20.0)

@@ -13,8 +13,6 @@ from maneuver_automaton.primitives.equilibrium import trims_of
 from maneuver_automaton.primitives.resimulation import maneuver_defect
 from tests.reference_dynamics import trim_defect
 
-pytest.importorskip("casadi")
-
 CRAFT = Hovercraft(
     mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0,
     max_torque=0.2, max_speed=3.0,

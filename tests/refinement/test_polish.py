@@ -15,7 +15,6 @@ from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.optimal_control import has_casadi
 from maneuver_automaton.optimal_control.polish_values import Polished, PolishSettings
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.separation import BodyPart
@@ -175,7 +174,6 @@ def test_the_goal_needs_a_place_and_the_start_its_limits() -> None:
 
 
 def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
-    pytest.importorskip("casadi")
     task = swerve()
     motion = polish_guesses(task, [around()], budget=UNLIMITED).motion
     assert motion is not None
@@ -190,7 +188,6 @@ def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
 
 
 def test_a_moved_problem_has_the_moved_solution() -> None:
-    pytest.importorskip("casadi")
     here = polish_guesses(swerve(), [around()], budget=UNLIMITED).motion
     there = polish_guesses(swerve(SE2([700.0, -300.0, 2.0])), [around()], budget=UNLIMITED).motion
     assert here is not None
@@ -200,7 +197,6 @@ def test_a_moved_problem_has_the_moved_solution() -> None:
 
 
 def test_what_is_not_accepted_is_not_returned() -> None:
-    pytest.importorskip("casadi")
     result = polish_guesses(swerve(), [around()], budget=UNLIMITED, accepts=lambda motion: False)
     assert result.motion is None
     assert result.reason == "what was found is not accepted"
@@ -249,7 +245,6 @@ def is_free(motion) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_what_the_solver_did_not_finish_counts_if_it_is_sound() -> None:
     """Thirty iterations of fifty lead near the best motion, which was thrown away."""
     best = polish_guesses(swerve(), [wide()], budget=UNLIMITED, accepts=is_free)
@@ -268,7 +263,6 @@ def test_what_the_solver_did_not_finish_counts_if_it_is_sound() -> None:
     assert again.motion.duration == pytest.approx(best.motion.duration, rel=0.02)
 
 
-@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_work_is_counted_in_iterations() -> None:
     result = polish_guesses(swerve(), [wide()] * 4, budget=UNLIMITED, most_iterations=60)
     assert 60 <= sum(one.iterations for one in result.attempts) < 60 + 8 * 60
@@ -277,7 +271,6 @@ def test_work_is_counted_in_iterations() -> None:
     assert kinds[0] == kinds[1]
 
 
-@pytest.mark.skipif(not has_casadi(), reason="polishing needs CasADi")
 def test_a_change_of_direction_by_millimetres_is_none_that_a_plan_keeps() -> None:
     speeds = np.array([0.0, 0.8, 0.8, 0.0, -0.006, 0.0, 0.01, 0.0, -0.8, 0.0])
     state = np.zeros((len(speeds), 5))

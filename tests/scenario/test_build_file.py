@@ -62,7 +62,6 @@ maneuvers: {pairs: 1, intervals: 10}
 
 
 def test_maneuvers_by_optimal_control(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("casadi")
     monkeypatch.chdir(tmp_path)
     (tmp_path / "craft.yaml").write_text(CRAFT)
     assert run(["automaton", "build", "craft.yaml", "-o", "craft.json"]) == 0
