@@ -10,4 +10,5 @@ from maneuver_automaton.bounds.pose_scene import PoseScene as PoseScene
 from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene
 from maneuver_automaton.bounds.separation import Narrowest as Narrowest
 from maneuver_automaton.bounds.separation import Separation as Separation
+from maneuver_automaton.bounds.separation import goals_blocked as goals_blocked
 from maneuver_automaton.bounds.separation import separation as separation

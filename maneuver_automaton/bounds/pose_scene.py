@@ -13,7 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.bounds import _kernels_boxes
 from maneuver_automaton.collision import AnyObstacle
 from maneuver_automaton.collision.convex import Solids, solids_of
-from maneuver_automaton.collision.layers import always, bands_of
+from maneuver_automaton.collision.layers import always
 from maneuver_automaton.collision.world import Buckets, World, own_frame, world_of
 from maneuver_automaton.problem import Bounds, Problem, moves
 
@@ -121,7 +121,7 @@ def lasting_obstacles(problem: Problem) -> tuple[AnyObstacle, ...]:
         return obstacles
     low, high = problem.bounds.z or (-math.inf, math.inf)
     below, above = problem.body_height
-    return always(bands_of(obstacles, in_space=True), low=low + below, high=high + above)
+    return always(obstacles, low=low + below, high=high + above)
 
 
 def _turns(problem: Problem, world: World) -> bool:

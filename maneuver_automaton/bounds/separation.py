@@ -59,7 +59,9 @@ def separation(
     """A proof that obstacles part the start from every goal; None if it is not found.
 
     Only the poses of the body count, not how the vehicle moves: what is proven holds for every
-    vehicle with this body, with any library, cost and horizon.
+    vehicle with this body, with any library, cost and horizon. The body is as it is: concave, of
+    several parts, wherever its pose lies. What moves, what can be flown over, zones, and what is
+    carried are left out, and a goal is all of its tolerance.
 
     Parameters
     ----------
@@ -93,6 +95,22 @@ def separation(
         return None
     narrowest = _narrowest(problem, scene, start, goals, deadline)
     return Separation(boxes=proof.boxes, reached=proof.reached, narrowest=narrowest)
+
+
+def goals_blocked(problem: Problem, *, most_boxes: int, deadline: float = math.inf) -> bool:
+    """Whether every pose at which a plan may end is proven to collide or to be out of bounds.
+
+    Of all goals, with their tolerances; the proof rests on what that of `separation` rests on.
+    """
+    scene = pose_scene(problem)
+    for goal in problem.goals:
+        ends = _box_of(scene, goal)
+        proof = connectivity(
+            scene, ends, ends, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
+        )
+        if proof.answer is not Connection.SEPARATED:
+            return False
+    return True
 
 
 def _seen(scene: PoseScene, pose: Array) -> Array:

@@ -53,7 +53,8 @@ def touched_all_round(
     """
     import shapely
 
-    reach = body_of(footprint).reach + margin
+    known = body_of(footprint)
+    reach = math.hypot(known.middle_x, known.middle_y) + known.reach + margin
     solid = _solid_near(obstacles, place, reach)
     if solid.is_empty:
         return False

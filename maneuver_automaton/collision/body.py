@@ -13,6 +13,7 @@ from maneuver_automaton.collision.convex import convex_pieces, solids_of
 from maneuver_automaton.collision.shapes import Shape
 
 MOST_DISCS = 6  # that cover one piece
+ON_EDGE = 1e-9  # [m] a pose so near to the rim of a body is on it
 
 
 class Body(NamedTuple):
@@ -25,8 +26,8 @@ class Body(NamedTuple):
     middle_x: float  # [m] of a disc that holds the body ...
     middle_y: float
     reach: float  # ... and its radius
-    inscribed: float  # [m] radius of the largest disc around the pose inside the body
-    half_width: float  # [m] of the narrowest piece
+    inscribed: float  # [m] radius of the largest disc around the pose inside the body; -inf: none
+    half_width: float  # [m] of the widest piece
 
 
 @functools.lru_cache(maxsize=1024)  # a fleet has as many as it has vehicles
@@ -57,7 +58,7 @@ def body_of(footprint: tuple[Shape, ...]) -> Body:
         middle_y=float(middle[1]),
         reach=reach,
         inscribed=_inscribed(footprint),
-        half_width=min(width for _, width in covers),
+        half_width=max(width for _, width in covers),
     )
 
 
@@ -94,21 +95,25 @@ def _cover(ring: Array, rounding: float) -> tuple[Array, float]:
 
 
 def _inscribed(footprint: tuple[Shape, ...]) -> float:
-    """Radius of the largest disc around the pose inside the body; 0 if the pose is not inside."""
+    """Radius of the largest disc around the pose inside the body; -inf if the pose is not in it."""
     import shapely
 
     from maneuver_automaton.collision.shapes import Disc
 
-    parts = []
-    best = 0.0
     # A part alone bounds it from below; polygons are united, as the pose may be on a seam.
-    for shape in footprint:
-        if isinstance(shape, Disc):
-            best = max(best, shape.radius - float(np.hypot(*shape.center)))
-        else:
-            parts += [shapely.Polygon(ring) for ring, _ in convex_pieces(shape) if len(ring) >= 3]
+    discs = [one for one in footprint if isinstance(one, Disc)]
+    radii = [one.radius - float(np.hypot(*one.center)) for one in discs]
+    parts = [
+        shapely.Polygon(ring)
+        for shape in footprint
+        if not isinstance(shape, Disc)
+        for ring, _ in convex_pieces(shape)
+        if len(ring) >= 3
+    ]
     if parts:
         union, pose = shapely.union_all(parts), shapely.Point(0.0, 0.0)
-        if union.contains(pose):
-            best = max(best, float(union.boundary.distance(pose)))
-    return best
+        edge = float(union.boundary.distance(pose))
+        radii.append(edge if union.contains(pose) or edge <= ON_EDGE else -1.0)
+    return max(
+        (radius for radius in radii if radius >= 0.0), default=-math.inf if footprint else 0.0
+    )

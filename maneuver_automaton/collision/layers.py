@@ -64,27 +64,25 @@ def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Lay
     return tuple(bands) or (Layer(-math.inf, math.inf, (), ()),)
 
 
-def always(bands: Sequence[Layer], *, low: float, high: float) -> tuple[AnyObstacle, ...]:
+def always(
+    obstacles: tuple[AnyObstacle, ...], *, low: float, high: float
+) -> tuple[AnyObstacle, ...]:
     """Obstacles that stand at every height between two, so that no path leads over or under them.
 
     Examples
     --------
     >>> from maneuver_automaton.collision import Disc, Obstacle
     >>> tower = Obstacle(Disc(1.0), height=(0.0, 20.0))
-    >>> [len(always(bands_of((tower,), in_space=True), low=1.0, high=h)) for h in (9.0, 30.0)]
+    >>> [len(always((tower,), low=1.0, high=h)) for h in (9.0, 30.0)]
     [1, 0]
     """
-    inside = sorted(band for band in bands if band.low < high and band.high > low)
-    if not inside or inside[0].low > low or inside[-1].high < high:
-        return ()
-    if any(a.high < b.low for a, b in pairwise(inside)):
-        return ()
-    numbers = set(inside[0].numbers).intersection(*(band.numbers for band in inside))
-    return tuple(
-        one
-        for one, number in zip(inside[0].obstacles, inside[0].numbers, strict=True)
-        if number in numbers
-    )
+    lasting = [
+        number
+        for layer in layers_of(obstacles, in_space=True)
+        if layer.low <= low and layer.high >= high
+        for number in layer.numbers
+    ]
+    return tuple(obstacles[number] for number in sorted(lasting))
 
 
 def layer_arrays(worlds: Sequence[World], *, low: Array, high: Array, plane: World) -> LayerArrays:

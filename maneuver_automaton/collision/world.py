@@ -271,8 +271,8 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     area, longest = max(float(padded.prod()), 1e-12), float(padded.max())
     cell = max(0.25 * scale, math.sqrt(area / most), longest / most)
     # Every piece writes as far as the cap: where all is further away, a step is as long as the cap
-    # allows.
-    cap = keep + max(4.0 * body.half_width, 8.0 * cell)
+    # allows. The inscribed disc is told by the field, so the cap is no less.
+    cap = keep + max(4.0 * body.half_width, body.inscribed, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     distance = np.full((rows, columns), cap)
     origin = low - cap

@@ -24,7 +24,11 @@ from maneuver_automaton.search.lattice_worlds import CLEARLY, ends_of, world_aro
 
 
 def blocked_ends(problem: Problem) -> PlanResult | None:
-    """The verdict, if the start or every goal is out of bounds or touches an obstacle."""
+    """The verdict, if the start or every goal is out of bounds or touches an obstacle.
+
+    Exact, for bodies of any shape; goals are poses, or places of any heading: tolerances are left
+    out, and whoever has them must ask again.
+    """
     reason = outside(problem.start, problem.bounds)
     sure = _surely_free(problem)
     if reason:

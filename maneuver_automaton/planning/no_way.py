@@ -14,6 +14,7 @@ from maneuver_automaton.problem import Horizon, Problem
 
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
+MOST_AT_GOALS = 100_000  # ... within the tolerance of a goal
 MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
 ROUNDING = 1e-6  # relative
 BEYOND = 1.25  # times the longest time: plans that take longer are not looked at
@@ -53,6 +54,18 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
         reason=proof.reason,
         narrowest=proof.narrowest,
         reached=proof.reached,
+    )
+
+
+def proven_blocked(problem: Problem, budget: Budget) -> bool:
+    """Whether no plan can end within the tolerance of any goal, as far as the time proves it."""
+    from maneuver_automaton.bounds import goals_blocked
+
+    left = budget.left
+    _load()
+    deadline = Budget.from_now(left).deadline
+    return left >= FIRST_BOXES and goals_blocked(
+        problem, most_boxes=MOST_AT_GOALS, deadline=deadline
     )
 
 

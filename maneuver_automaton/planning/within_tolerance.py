@@ -21,6 +21,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.no_way import proven_blocked
 from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
@@ -65,7 +66,7 @@ def plan_within_tolerance(
     if not found.plans:
         if found.why_unchecked:
             return found.none(PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
-        return found.none(*_why_none(problem, results[0], found.why_refused))
+        return found.none(*_why_none(problem, results[0], found.why_refused, budget))
     return found.found(bound=_lower_bound(problem, results[0]), nodes=results[0].nodes)
 
 
@@ -204,10 +205,14 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
             yield index
 
 
-def _why_none(problem: Problem, exact: PlanResult, refused: str) -> tuple[PlanStatus, str]:
+def _why_none(
+    problem: Problem, exact: PlanResult, refused: str, budget: Budget
+) -> tuple[PlanStatus, str]:
     """The verdict on the poses that were aimed at, as far as it holds for all within tolerance."""
     if refused:
         return PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
     if exact.status is PlanStatus.UNREACHABLE and not why_impossible(problem):
         return PlanStatus.NO_PLAN, exact.reason  # proven for these poses alone
+    if exact.status is PlanStatus.GOAL_BLOCKED and not proven_blocked(problem, budget):
+        return PlanStatus.NO_PLAN, f"no free pose was found within the tolerance: {exact.reason}"
     return exact.status, exact.reason

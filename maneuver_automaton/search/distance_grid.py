@@ -18,6 +18,7 @@ from maneuver_automaton.search.prepared import RECENT, Prepared
 MOST_CELLS = 1_000_000
 OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one
 COARSER = 3  # field cells along a side of a coarse cell
+TOUCHING = 1e-6  # [m] what is less deep in an obstacle may pass: checks and places are rounded
 COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed radius, at most
 
 
@@ -66,6 +67,10 @@ def distance_grid(
     disc of the body's inscribed radius around it must be free. A wall between the middles of two
     neighbours is at most half a diagonal from one of them, which is blocked if the radius is a
     whole diagonal.
+
+    A blocked cell rests on no more than that: static obstacles of the world, whatever their number
+    and shape; the part of the vehicle whose frame is the pose, and of it a disc around the pose. A
+    pose outside its body blocks no cell. Where the field is capped nothing is blocked.
     """
     if not world.arrays.field.distance.size:
         return _none()
@@ -103,7 +108,7 @@ def laid_grid(
     layout = plain(_kernels_distance.grid_layout)
     first_i, columns, start_x = layout(field.origin_x, low_x, high_x, cell, field.cell, stride)
     first_j, rows, start_y = layout(field.origin_y, low_y, high_y, cell, field.cell, stride)
-    half_diagonal = cell * math.sqrt(0.5)
+    half_diagonal, inscribed = cell * math.sqrt(0.5), world.body.inscribed
     aim_x, aim_y = aim[:2].tolist()
     return (like or _none())._replace(
         origin_x=start_x,
@@ -114,9 +119,9 @@ def laid_grid(
         stride=stride,
         shift_x=first_i * stride,
         shift_y=first_j * stride,
-        inflation=world.body.inscribed - half_diagonal,
-        wanted=world.body.inscribed,
-        cut=half_diagonal if world.body.inscribed < 2.0 * half_diagonal else -math.inf,
+        inflation=min(inscribed - half_diagonal - TOUCHING, field.outside),
+        wanted=min(max(inscribed, 0.0), field.outside),
+        cut=min(half_diagonal, field.outside) if inscribed < 2.0 * half_diagonal else -math.inf,
         detour=plain(_kernels_distance.detour_of)(columns, rows),
         aim_i=math.floor((aim_x - start_x) / cell),
         aim_j=math.floor((aim_y - start_y) / cell),

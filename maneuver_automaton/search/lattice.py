@@ -213,7 +213,15 @@ def _grid(query: LatticeQuery, sign: float, *, coarse: bool) -> DistanceGrid:
 
 
 def _enclosed(query: LatticeQuery, grids: Grids) -> str:
-    """Why no plan can exist: the plane around the goals, or the start, is closed."""
+    """Why no plan can exist: the plane around the goals, or the start, is closed.
+
+    By cells that are blocked as `distance_grid` says. Goals that the query left out had to be
+    blocked themselves; of those of any heading it knows that of some headings only.
+    """
+    asked = set(query.goal_index)
+    goals = enumerate(query.problem.goals)
+    if any(goal.free_heading and k not in asked for k, goal in goals):
+        return ""
     from maneuver_automaton.search._kernels_distance import AT_RIM, distances
 
     for grid, name, far in (
@@ -222,7 +230,7 @@ def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     ):
         if not grid.columns:
             continue
-        lengths = distances(grid, query.world.arrays.field, np.ascontiguousarray(far[:, :2]))
+        lengths = distances(grid, query.plane.arrays.field, np.ascontiguousarray(far[:, :2]))
         if np.isinf(lengths).all() and (query.bounded or not grid.state[AT_RIM]):
             return f"obstacles enclose the {name}"
     return ""

@@ -47,5 +47,6 @@ def window_of(
     window = np.array([low[0], low[1], high[0], high[1], 0.0, 0.0, c, s, slack])
     inner = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
     back = np.asarray(SE2(np.array([0.0, 0.0, -turn])).act(inner))
-    box = np.concatenate([back.min(axis=0), back.max(axis=0)])
+    # What lies on a bound is inside of it, wherever its place is rounded to.
+    box = np.concatenate([back.min(axis=0) - slack, back.max(axis=0) + slack])
     return box, window, bounds.x is not None and bounds.y is not None

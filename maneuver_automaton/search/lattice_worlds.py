@@ -113,7 +113,7 @@ def _worlds(
 
     bands = bands_of(obstacles, in_space=heights is not None)
     whole = around(obstacles)
-    plane = whole if heights is None else around(always(bands, low=heights[0], high=heights[1]))
+    plane = whole if heights is None else around(always(obstacles, low=heights[0], high=heights[1]))
     plane = replace(plane, body=body_of(bodies[0]))
     solid = tuple(Obstacle(zone.shape) for zone in zones)
     between = tuple(around(band.obstacles) for band in bands)

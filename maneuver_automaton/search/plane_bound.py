@@ -14,17 +14,18 @@ def plane_bound(query: LatticeQuery) -> float:
 
     The shortest path round blocked cells leads over their corners, and among the corners of cells
     an octile path is at most 1.0824 times as long; start and goal are at most half a diagonal from
-    a corner. Cells are blocked only where the pose cannot be at all.
+    a corner. Cells are blocked only where the pose cannot be at all, as `distance_grid` says: by
+    obstacles at every altitude, and the body that the pose lies in.
 
     Source: Bailey, Tovey, Uras, Koenig, Nash (2015), *Path planning on grids: the effect of vertex
     placement on path length*.
     """
-    grid = distance_grid(query.world, query.box, query.goals, query.start, prepared=query.prepared)
+    grid = distance_grid(query.plane, query.box, query.goals, query.start, prepared=query.prepared)
     if not grid.columns:
         return 0.0
     length: float = _kernels_plane.corner_path(
         grid,
-        query.world.arrays.field,
+        query.plane.arrays.field,
         np.ascontiguousarray(query.goals[:, :2]),
         float(query.start[0]),
         float(query.start[1]),

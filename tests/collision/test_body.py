@@ -57,7 +57,9 @@ def test_discs_and_reach_cover_the_body(name):
 def test_the_inscribed_disc_is_inside(name):
     footprint = BODIES[name]
     body, shape = body_of(footprint), outline_of(footprint)
-    disc = shapely.Point(0.0, 0.0).buffer(body.inscribed * (1.0 - 1e-9), quad_segs=8)
+    pose = shapely.Point(0.0, 0.0)
+    assert (body.inscribed >= 0.0) is (shape.distance(pose) <= 1e-9)
+    disc = pose.buffer(max(body.inscribed, 0.0) * (1.0 - 1e-9), quad_segs=8)
     assert disc.difference(shape).area <= 0.02 * disc.area  # discs are many-sided here
     assert body.half_width >= 0.0
 
@@ -72,9 +74,11 @@ def test_by_hand():
     assert (point.reach, point.inscribed, point.half_width) == (0.0, 0.0, 0.0)
     assert point.discs.tolist() == [[0.0, 0.0, 0.0]]
     beside = body_of((Box([2.0, 1.0], [5.0, 0.0]),))  # the pose is not in the body
-    assert beside.inscribed == 0.0
+    assert beside.inscribed == -math.inf
     assert body_of((Disc(2.0, [0.5, 0.0]), Box([9.0, 1.0]))).inscribed == pytest.approx(1.5)
-    assert body_of((scenes.FRAME,)).inscribed == 0.0
+    assert body_of((scenes.FRAME,)).inscribed == -math.inf
+    assert body_of((Box([2.0, 1.0], [1.0, 0.0]),)).inscribed == 0.0  # it is on the rim
+    assert body_of((Box([0.9, 0.6]), Disc(0.02))).half_width == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("name", BODIES)

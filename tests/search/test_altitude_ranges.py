@@ -198,8 +198,11 @@ def test_bands_hold_what_stands_in_them():
         (-math.inf, 0.0, (3,)), (0.0, 3.0, (0, 3)), (3.0, 5.0, (0, 1, 3)), (5.0, 9.0, (1, 3)),
         (9.0, 20.0, (3,)), (20.0, 30.0, (2, 3)), (30.0, math.inf, (3,)),
     ]  # fmt: skip
-    assert always(bands, low=-50.0, high=50.0) == (bands[0].obstacles[0],)
-    assert len(always(bands, low=3.5, high=4.5)) == 3
+    everything = (*obstacles, Obstacle(disc))
+    assert always(everything, low=-50.0, high=50.0) == everything[3:]
+    assert len(always(everything, low=3.5, high=4.5)) == 3
+    thin = tuple(Obstacle(disc, height=(k, k + 0.5)) for k in range(2 * MOST_LAYERS))
+    assert always(thin, low=3.0, high=4.2) == ()  # however many heights are joined to one band
     assert bands_of(obstacles, in_space=False) == (
         Layer(-math.inf, math.inf, obstacles, (0, 1, 2)),
     )

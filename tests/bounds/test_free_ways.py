@@ -1,0 +1,121 @@
+"""Scenes with a free way that is known by construction: nothing says that there is none."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Problem, Unicycle, plan
+from maneuver_automaton.bounds import goals_blocked, separation
+from maneuver_automaton.groups import SE2xR
+from maneuver_automaton.models import UserModel
+from maneuver_automaton.planning.lower_bound import known_bound
+from maneuver_automaton.problem import Bounds, Goal, SearchSettings
+from maneuver_automaton.scenario import load_scenario
+from tests.benchmarks.free_ways import drawn, planned, wrong
+
+FIELD = Path(__file__).parents[3] / "shared" / "data" / "field"
+ROBOT = Automaton.of_controls(
+    Unicycle(), {"ahead": (0.4, 0.0), "left": (0.3, 0.6), "right": (0.3, -0.6), "spin": (0.0, 0.6)}
+)
+QUICKLY = range(0, 5000, 167)
+
+
+@pytest.mark.parametrize("seed", QUICKLY)
+def test_no_drawn_scene_is_called_impossible(seed):
+    assert wrong(drawn(seed)) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 5000, 250))
+def test_none_of_5000_drawn_scenes_is_called_impossible(first):
+    said = {k: what for k in range(first, first + 250) if (what := wrong(drawn(k)))}
+    assert said == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(0, 300, 20))
+def test_no_drawn_scene_that_is_planned_is_called_impossible(first):
+    said = {k: planned(drawn(k)) for k in range(first, first + 20)}
+    assert not [one for one in said.items() if ":" in one[1]]
+
+
+@pytest.mark.skipif(not FIELD.exists(), reason="the scenes of others are not here")
+@pytest.mark.parametrize(("name", "cost"), [("thin-part", 3.75), ("u-dock", 7.5)])
+def test_scenes_of_others(name, cost):
+    problem = load_scenario(FIELD / f"{name}.yaml").problem
+    assert plan(problem, time_limit=20.0).cost == pytest.approx(cost)
+
+
+def corridor(footprint, **more):
+    """A corridor 0.9 m wide, straight ahead."""
+    walls = [Box([7.5, 0.1], [0.75, 0.5 * s]) for s in (1, -1)]
+    return Problem(ROBOT, [0, 0, 0], [1.5, 0, 0], obstacles=walls, footprint=footprint, **more)
+
+
+@pytest.mark.parametrize(
+    "small", [Disc(0.02), Disc(0.02, [0.25, 0.0]), Box([0.3, 0.01], [0.3, 0.1]), Box([0.02, 0.4])]
+)
+def test_a_thin_part_changes_nothing(small):
+    settings = SearchSettings(max_expansions=500)
+    alone = plan(corridor([Box([0.5, 0.36])], search=settings), time_limit=30.0)
+    both = plan(corridor([Box([0.5, 0.36]), small], search=settings), time_limit=30.0)
+    assert both.cost == pytest.approx(alone.cost) == pytest.approx(3.75)
+
+
+def test_a_wall_that_thick_parts_enclose_is_still_proven():
+    """What is proven of a convex body is proven of one with a thin part."""
+    shut = [Box([6.0, 0.2], [0.0, 1.5 * s]) for s in (1, -1)]
+    shut += [Box([0.2, 3.0], [3.0 * s, 0.0]) for s in (1, -1)]
+    settings = SearchSettings(max_expansions=2000)
+    for more in ([], [Disc(0.02)]):
+        body = [Box([0.5, 0.4]), *more]
+        problem = Problem(
+            ROBOT, [0, 0, 0], [6, 0, 0], obstacles=shut, footprint=body, search=settings
+        )
+        result = plan(problem, time_limit=30.0)
+        assert (result.status, result.reason) == (
+            PlanStatus.UNREACHABLE,
+            "obstacles enclose the start",
+        )
+
+
+def test_towers_that_can_be_flown_over_enclose_nothing():
+    glider = UserModel(
+        name="glider",
+        group=SE2xR,
+        control_names=("speed", "turn_rate", "climb"),
+        velocity=lambda z, u: [u[0], 0.0, u[1], u[2]],
+    )
+    rates = {"on": (1, 0, 0), "up": (1, 0, 0.4), "down": (1, 0, -0.4), "left": (1, 0.5, 0)}
+    robot = Automaton.of_controls(glider, {**rates, "right": (1, -0.5, 0)})
+    ring = [
+        Obstacle(
+            Disc(1.0, [10.0 + 4.0 * math.cos(a), 4.0 * math.sin(a)]), height=(0.0, 2.0 + 0.01 * k)
+        )
+        for k, a in enumerate(np.arange(40) * math.tau / 40)
+    ]
+    problem = Problem(
+        robot,
+        [-10.0, 0, 0, 1.0],
+        [10.0, 0, 0, 4.0],
+        footprint=Disc(0.4),
+        obstacles=ring,
+        bounds=Bounds(z=(0.5, 8.0)),
+        search=SearchSettings(max_expansions=3000),
+    )
+    assert separation(problem, most_boxes=20_000) is None
+    result = plan(problem, time_limit=30.0)
+    assert result.status is PlanStatus.FOUND
+    assert known_bound(problem).value <= result.cost
+
+
+def test_a_goal_is_blocked_only_if_all_of_its_tolerance_is():
+    def within(radius):
+        goal = Goal([5.0, 0.0, 0.0], tolerance_m=1.0, tolerance_rad=0.3)
+        around = [Disc(radius, [5.0, 0.0])]
+        return Problem(ROBOT, [0, 0, 0], goal, obstacles=around, footprint=Disc(0.1))
+
+    assert goals_blocked(within(1.5), most_boxes=50_000)
+    assert not goals_blocked(within(0.8), most_boxes=50_000)
