@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from maneuver_automaton.bounds import _kernels_certificate
 from maneuver_automaton.bounds.pose_scene import PoseScene
 
 ON_EDGE = 1e-7  # of a cell's size: a pose this near to a neighbour lies in it too
+JUDGED = 20_000  # cells between two looks at the clock
 MOST_BOXED = 12_000_000  # nodes of the box around the cells of one level
 
 Index = tuple[int, int, int]
@@ -103,7 +105,14 @@ class Cells:
         )
 
 
-def first_cells(scene: PoseScene, *, size: float, headings: int, box: Array) -> Cells:
+def first_cells(
+    scene: PoseScene,
+    *,
+    size: float,
+    headings: int,
+    box: Array,
+    over: Callable[[], bool] = lambda: False,
+) -> Cells:
     """All cells of a rectangle (4,) of places, and of all headings, that a plan may visit."""
     low = np.floor(box[:2] / size).astype(np.int64)
     high = np.maximum(np.ceil(box[2:] / size).astype(np.int64), low + 1)
@@ -115,10 +124,15 @@ def first_cells(scene: PoseScene, *, size: float, headings: int, box: Array) -> 
         active=np.ones(shape, dtype=np.uint8),
         round_trip=True,
     )
-    return _classified(cells, scene)
+    return _classified(cells, scene, over)
 
 
-def finer(cells: Cells, kept: NDArray[np.bool_], scene: PoseScene) -> Cells | None:
+def finer(
+    cells: Cells,
+    kept: NDArray[np.bool_],
+    scene: PoseScene,
+    over: Callable[[], bool] = lambda: False,
+) -> Cells | None:
     """Halves of the cells that are kept; None if there are none left, or too many to hold."""
     active = np.where(kept, cells.active, 0).astype(np.uint8)
     low = cells.low
@@ -148,17 +162,21 @@ def finer(cells: Cells, kept: NDArray[np.bool_], scene: PoseScene) -> Cells | No
         active=halves,
         round_trip=round_trip,
     )
-    return _classified(halved, scene)
+    return _classified(halved, scene, over)
 
 
-def _classified(cells: Cells, scene: PoseScene) -> Cells:
-    """Without the cells all of whose poses collide; those that are free are known to be."""
+def _classified(cells: Cells, scene: PoseScene, over: Callable[[], bool]) -> Cells:
+    """Without the cells all of whose poses collide, as far as there is time to judge them."""
     unknown = np.argwhere(cells.active == 1)
     half = 0.5 * np.array([cells.size, cells.size, cells.turn])
     boxes = np.empty((len(unknown), 6))
     boxes[:, :3] = (unknown + cells.low) * (2.0 * half) + half
     boxes[:, 3:] = half
-    cells.active[tuple(unknown.T)] = scene.states(boxes)
+    for at in range(0, len(boxes), JUDGED):
+        if over():  # a cell that is not judged may be visited
+            break
+        part = slice(at, at + JUDGED)
+        cells.active[tuple(unknown[part].T)] = scene.states(boxes[part])
     return cells
 
 

@@ -22,6 +22,7 @@ def cell_proofs(
     *,
     incumbent: Callable[[], float] = lambda: math.inf,
     ends: Callable[[int], bool] = lambda _work: False,
+    over: Callable[[], bool] = lambda: False,
 ) -> Iterator[Proof]:
     """Better and better lower bounds of the cost of a problem's plans; none if it has no motions.
 
@@ -34,6 +35,8 @@ def cell_proofs(
         kinematic one at its limits.
     ends : callable
         Asked with the work done, in steps times cells: whether to polish what there is and end.
+    over : callable
+        Asked now and then, while polishing too: whether to end at once.
 
     Yields
     ------
@@ -68,6 +71,7 @@ def cell_proofs(
         incumbent=lambda: incumbent() - besides,
         cap=_cap(scene, motions, start, goals),
         ends=ends,
+        over=over,
     ):
         yield replace(proof, value=proof.value + besides)
 

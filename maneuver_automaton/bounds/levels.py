@@ -78,17 +78,18 @@ def proofs(
     incumbent: Callable[[], float],
     cap: float,
     ends: Callable[[int], bool],
+    over: Callable[[], bool],
 ) -> Iterator[Proof]:
     """Better and better bounds; `incumbent` is asked for the cost of the best plan at each level.
 
-    Where `ends` says so of the work done, a level is left, and what it has is polished. Poses are
-    seen from the scene's frame, in which the first goal is the origin. Plans that cost
-    more than `cap` are left out, so no bound exceeds it; `cap` and what the incumbent costs are
-    without what every plan costs besides.
+    Where `ends` says so of the work done, a level is left, and what it has is polished until it is
+    `over`. Poses are seen from the scene's frame, in which the first goal is the origin. Plans that
+    cost more than `cap` are left out, so no bound exceeds it; `cap` and what the incumbent costs
+    are without what every plan costs besides.
     """
     limit = min(cap, incumbent())
     gears = 2 if motions.price > 0.0 else 1
-    cells: Cells | None = _coarsest(scene, motions, start, goals, limit)
+    cells: Cells | None = _coarsest(scene, motions, start, goals, limit, over)
     level: _Level | None = None
     best, work, depth, reach = 0.0, 0, 0, limit
     function: CostToGo | None = None
@@ -105,7 +106,7 @@ def proofs(
             proof = _proof(cells, limit, total, work)
             yield replace(proof, optimal=True, function=function)
             return
-        if total > MOST_CELLS:
+        if total > MOST_CELLS or over():
             return
         fixed = _nodes_of(cells, last, exact=_exact_node(cells, goals))
         if level is None:
@@ -137,7 +138,7 @@ def proofs(
             if ends(work):
                 break
         columns = program.columns
-        found = raised(program, found, fixed=fixed, sweeps=POLISHING)
+        found = raised(program, found, fixed=fixed, sweeps=POLISHING, over=over)
         found = found / max(slope(cells, columns, motions, found), 1.0)
         best = max(best, _fall(cells, found, at, fixed))
         function = CostToGo(
@@ -161,10 +162,10 @@ def proofs(
             program.dual,
             program.weight,
         )
-        kept = _tube(level, program, found, at, seeds, fixed, limit)
+        kept = _tube(level, program, found, at, seeds, fixed, limit, over)
         for index in (*seeds, *last):
             kept[index] = cells.active[index] > 0
-        cells, reach = finer(cells, kept, scene), limit
+        cells, reach = finer(cells, kept, scene, over), limit
         depth += 1
 
 
@@ -227,12 +228,13 @@ def _tube(
     seeds: list[Index],
     fixed: NDArray[np.bool_],
     limit: float,
+    over: Callable[[], bool],
 ) -> NDArray[np.bool_]:
     """Cells that a plan cheaper than a limit may visit."""
     cells, columns = level.cells, program.columns
-    level.to_goal = _lifted(program, level.to_goal, fixed, backward=False)
+    level.to_goal = _lifted(program, level.to_goal, fixed, over, backward=False)
     sources = _nodes_of(cells, seeds, exact=None)
-    level.from_start = _lifted(program, level.from_start, sources, backward=True)
+    level.from_start = _lifted(program, level.from_start, sources, over, backward=True)
     whole = cells.value_at(found, at)
     onward = np.maximum(_least(cells, columns, level.to_goal), _least(cells, columns, found))
     before = np.maximum(
@@ -242,14 +244,21 @@ def _tube(
     return (cells.active > 0) & (np.maximum(onward, 0.0) + np.maximum(before, 0.0) < limit)
 
 
-def _lifted(program: Program, value: Array, fixed: NDArray[np.bool_], *, backward: bool) -> Array:
+def _lifted(
+    program: Program,
+    value: Array,
+    fixed: NDArray[np.bool_],
+    over: Callable[[], bool],
+    *,
+    backward: bool,
+) -> Array:
     """An admissible function that is zero at fixed nodes, raised."""
     cells, columns, motions = program.cells, program.columns, program.motions
     value = value.copy()
     value[:, fixed] = 0.0
     sign = -1.0 if backward else 1.0
     value /= max(slope(cells, columns, motions, sign * value), 1.0)
-    value = raised(program, value, fixed=fixed, sweeps=SWEEPS, backward=backward)
+    value = raised(program, value, fixed=fixed, sweeps=SWEEPS, over=over, backward=backward)
     return value / max(slope(cells, columns, motions, sign * value), 1.0)
 
 
@@ -260,7 +269,12 @@ def _least(cells: Cells, columns: NDArray[np.int64], value: Array) -> Array:
 
 
 def _coarsest(
-    scene: PoseScene, motions: Motions, start: Array, goals: tuple[Goal, ...], limit: float
+    scene: PoseScene,
+    motions: Motions,
+    start: Array,
+    goals: tuple[Goal, ...],
+    limit: float,
+    over: Callable[[], bool],
 ) -> Cells:
     """All cells that a plan of a cost may visit."""
     length = limit * motions.speed
@@ -289,7 +303,8 @@ def _coarsest(
     size = min(2.0 * math.pi / HEADINGS * radius, length / 8.0)
     while float(np.prod((high - low) / size + 1.0)) * HEADINGS > MOST_FIRST:
         size *= 1.25
-    return first_cells(scene, size=size, headings=HEADINGS, box=np.concatenate([low, high]))
+    box = np.concatenate([low, high])
+    return first_cells(scene, size=size, headings=HEADINGS, box=box, over=over)
 
 
 def _goal_cells(cells: Cells, goals: tuple[Goal, ...]) -> list[Index]:

@@ -10,6 +10,7 @@ Source: Pock and Chambolle (2011), diagonal preconditioning for first order prim
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -147,9 +148,10 @@ def raised(
     *,
     fixed: NDArray[np.bool_],
     sweeps: int,
+    over: Callable[[], bool],
     backward: bool = False,
 ) -> Array:
-    """A function that obeys the rows, raised where it has room, node by node.
+    """A function that obeys the rows, raised where it has room, node by node, until it is `over`.
 
     `backward`: it is one from the start, which rises along motions. It obeys the rows to within
     single precision; `slope` says how well.
@@ -167,6 +169,8 @@ def raised(
     free = np.where(fixed, 0.0, 1.0).astype(np.float32).reshape(-1)
     work = np.zeros(_kernels_ascent.ROWS * _kernels_dual.LANES, dtype=np.float32)
     for _ in range(sweeps):
+        if over():
+            break
         _kernels_ascent.room_above(
             single.reshape(-1),
             room.reshape(-1),

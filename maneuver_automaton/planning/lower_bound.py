@@ -25,7 +25,6 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
 from maneuver_automaton.search.lattice_query import lattice_query
 
-WAITED = 0.5  # share of the time that proofs wait for a plan
 LOOK = 0.002  # [s] between two looks whether there is one
 SHARES = (0.0, 0.5, 2.0)  # of a plan's cost, shared by the changes it may have: prices of one
 POLISHING = 0.85  # share of the time after which what there is gets polished
@@ -149,20 +148,21 @@ class Proving:
     def run(self, *, after_a_plan: bool = False) -> None:
         """Prove what can be proven; `after_a_plan` cells wait for one, without which they are many.
 
-        They wait for a share of the time at most.
+        Where there is none, all the time is for the search, and the proof that there is none.
         """
         self._better(known_bound(self.problem))
         if self.kept is not None:
             value = in_costs(self.problem, self.kept.bound(self.problem))
             self._better(LowerBound(value=value, kind="cells"))
-        until = WAITED * self.budget.seconds
-        while after_a_plan and self.watch.cost == math.inf and self.budget.elapsed < until:
+        while after_a_plan and self.watch.cost == math.inf:
             if self._over():
                 return
             time.sleep(LOOK)
         if self._over():
             return
-        for proof in proofs_of(self.problem, incumbent=lambda: self.watch.cost, ends=self._late):
+        for proof in proofs_of(
+            self.problem, incumbent=lambda: self.watch.cost, ends=self._late, over=self._over
+        ):
             self.work = proof.work
             self._remember(proof.function)
             kind = "incumbent" if proof.optimal and proof.value >= self.watch.cost else "cells"
@@ -219,11 +219,19 @@ def known_bound(problem: Problem) -> LowerBound:
 
 
 def proofs_of(
-    problem: Problem, *, incumbent: Callable[[], float], ends: Callable[[int], bool]
+    problem: Problem,
+    *,
+    incumbent: Callable[[], float],
+    ends: Callable[[int], bool],
+    over: Callable[[], bool] = lambda: False,
 ) -> Iterator[Proof]:
     """Better and better bounds by cells, as `cell_proofs`, in costs of the problem itself."""
     ramp = _ramp(problem)
-    for proof in cell_proofs(problem, incumbent=lambda: ramp.without(incumbent()), ends=ends):
+
+    def limit() -> float:
+        return ramp.without(incumbent())
+
+    for proof in cell_proofs(problem, incumbent=limit, ends=ends, over=over):
         yield replace(proof, value=ramp.added(proof.value))
 
 
