@@ -32,7 +32,7 @@ def test_show_lists_trims_and_maneuvers(folder, capsys, name):
     assert "duration [s]" in said
     assert "maneuver" in said
     assert "dispersion" in said
-    assert "spanning factor" in said
+    assert "stretch factor" in said
 
 
 def test_draw_makes_two_pictures(folder, capsys):

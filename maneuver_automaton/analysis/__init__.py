@@ -2,12 +2,12 @@
 
 from maneuver_automaton.analysis.coverage import CoverageSettings as CoverageSettings
 from maneuver_automaton.analysis.coverage import Dispersion as Dispersion
-from maneuver_automaton.analysis.coverage import SpanningFactor as SpanningFactor
+from maneuver_automaton.analysis.coverage import StretchFactor as StretchFactor
 from maneuver_automaton.analysis.coverage import dispersion as dispersion
 from maneuver_automaton.analysis.coverage import planned as planned
 from maneuver_automaton.analysis.coverage import settings_for as settings_for
-from maneuver_automaton.analysis.coverage import spanning_factor as spanning_factor
 from maneuver_automaton.analysis.coverage import straight_line as straight_line
+from maneuver_automaton.analysis.coverage import stretch_factor as stretch_factor
 from maneuver_automaton.analysis.feasible import FeasibleSet as FeasibleSet
 from maneuver_automaton.analysis.feasible import feasible_set as feasible_set
 from maneuver_automaton.analysis.feasible import least_times as least_times

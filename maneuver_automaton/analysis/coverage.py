@@ -38,7 +38,7 @@ class CoverageSettings:
     radius: float = 2.0  # [m] of the disc of positions; headings are all
     metres_per_radian: float = 1.0  # what a radian of heading counts for in a distance [m]
     samples: int = 2000  # for the dispersion
-    pairs: int = 100  # for the spanning factor
+    pairs: int = 100  # for the stretch factor
     seed: int = 0  # of the scrambled Halton sequence
     reach: ReachSettings = field(default_factory=ReachSettings)
 
@@ -62,7 +62,7 @@ class Dispersion:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SpanningFactor:
+class StretchFactor:
     """By how much the library detours at most, against a reference."""
 
     largest: float
@@ -134,13 +134,13 @@ def dispersion(
     )
 
 
-def spanning_factor(
+def stretch_factor(
     automaton: Automaton,
     *,
     reference: Reference | None = None,
     start: str | None = None,
     settings: CoverageSettings | None = None,
-) -> SpanningFactor:
+) -> StretchFactor:
     """The t by which the library spans what it reaches: its cost over that of a reference, at most.
 
     Poses are those at which words of the library end within the ball, next to the samples of a
@@ -170,7 +170,7 @@ def spanning_factor(
     --------
     >>> from maneuver_automaton.models import Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
-    >>> spanning_factor(robot, settings=CoverageSettings(radius=1.0, pairs=20)).largest > 2.0
+    >>> stretch_factor(robot, settings=CoverageSettings(radius=1.0, pairs=20)).largest > 2.0
     True
     """
     settings = settings or CoverageSettings()
@@ -180,7 +180,7 @@ def spanning_factor(
     inside &= words.costs > 0.0
     if not inside.any():
         raise ValueError(
-            f"spanning factor: no word of at most {settings.reach.most:g} ends within "
+            f"stretch factor: no word of at most {settings.reach.most:g} ends within "
             f"{settings.radius:g} m"
         )
     poses, costs = words.poses[inside], words.costs[inside]
@@ -190,10 +190,10 @@ def spanning_factor(
     references = np.array([least(pose) for pose in poses[chosen]])
     known = np.isfinite(references) & (references > 0.0)
     if not known.any():
-        raise ValueError("spanning factor: the reference reaches none of the poses")
+        raise ValueError("stretch factor: the reference reaches none of the poses")
     ratios = costs[chosen][known] / references[known]
     worst = int(ratios.argmax())
-    return SpanningFactor(
+    return StretchFactor(
         largest=float(ratios[worst]),
         median=float(np.median(ratios)),
         pose=_shown(poses[chosen][known][worst]),
@@ -243,7 +243,7 @@ def planned(automaton: Automaton, *, measure: str = "time") -> Reference:
     """The cost of the plan that a reference library finds in free space, for each pose.
 
     For few trims all words are searched, so the plan is the best; for many it may be costlier than
-    that, and a spanning factor against it too small.
+    that, and a stretch factor against it too small.
 
     Examples
     --------

@@ -134,20 +134,20 @@ def show(file: Path, *, coverage: bool = False, model_text: str | None = None) -
 
 
 def coverage_lines(automaton: Automaton) -> list[str]:
-    """Dispersion and spanning factor, in words, with what they depend on."""
-    from maneuver_automaton.analysis import dispersion, settings_for, spanning_factor
+    """Dispersion and stretch factor, in words, with what they depend on."""
+    from maneuver_automaton.analysis import dispersion, settings_for, stretch_factor
 
     settings = settings_for(automaton)
     try:
         gap = dispersion(automaton, settings=settings)
-        factor = spanning_factor(automaton, settings=settings)
+        factor = stretch_factor(automaton, settings=settings)
     except ValueError as error:
         return [str(error)]
     return [
         f"dispersion {gap.largest:.3g} m, mean {gap.mean:.3g} m: of {settings.samples} poses "
         f"within {settings.radius:.3g} m (1 rad counts {settings.metres_per_radian:g} m) from the "
         f"nearest of {gap.reached} reached in at most {gap.most:.3g} s",
-        f"spanning factor {factor.largest:.3g}, median {factor.median:.3g}: time of words to "
+        f"stretch factor {factor.largest:.3g}, median {factor.median:.3g}: time of words to "
         f"{factor.pairs} poses over that of a body that drives and turns any way as fast; worst at "
         f"{vector_text(factor.pose)}",
     ]

@@ -67,7 +67,7 @@ def _vehicle(
     off = float(np.abs(pieces[0].start - problem.start).max())
     clearance = verdict.clearances_m[name]
     jump = verdict.jumps_m[name]
-    beside = f", put elsewhere by {jump:.3g} m at most" if jump > THERE else ""
+    beside = f", moved by disturbances, by {jump:.3g} m at most" if jump > THERE else ""
     wrong = [
         said
         for bad, said in (

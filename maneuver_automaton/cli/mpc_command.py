@@ -70,6 +70,8 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         return fleet_loops.drive(path, scenario, out, settings=settings, parts=parts)
     if settings.seeds is not None and settings.resume is not None:
         raise InvalidScenario("--resume: goes on with one loop, and --seeds runs many; need one")
+    from maneuver_automaton.receding_horizon import Guarantee
+
     make_folder(out)
     if settings.seeds is not None:
         return _statistics(path, scenario, out, settings)
@@ -84,6 +86,9 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         print_loop(scenario.name, loop, folder=str(out))
     for number, violation in loop.violations:
         complain(f"{path}: step {number} broke a guarantee: {violation}")
+    for number, violation in loop.disturbed:
+        if violation.guarantee is not Guarantee.DECREASE:  # what noise does, in every other step
+            complain(f"{path}: step {number} was disturbed: {violation}")
     if not loop.reached:
         complain(f"{path}: {loop.status}: {loop.reason}")
     return FOUND if loop.reached and not any(loop.collisions) else NO_PLAN

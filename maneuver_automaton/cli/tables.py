@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rich import box
-from rich.console import Console
+from rich.console import Console, JustifyMethod
 from rich.table import Table
 from rich.text import Text
 
@@ -18,14 +19,14 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.problem import Problem
 
-WIDE = 160  # columns where the output goes to no terminal
+WIDE = 160  # columns where the output goes to no terminal, and COLUMNS does not say
 
 
 def console() -> Console:
     """Standard output, without markup: names are printed as they are."""
     return Console(
         file=sys.stdout,
-        width=None if sys.stdout.isatty() else WIDE,
+        width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE,
         markup=False,
         emoji=False,
         highlight=False,
@@ -40,9 +41,18 @@ def table(
     numbers: Sequence[int] = (),
 ) -> Table:
     """Rows under `columns`; those in `numbers` are aligned to the right."""
-    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", title_style="bold")
+    made = Table(
+        title=title or None,
+        box=box.SIMPLE_HEAD,
+        title_justify="left",
+        title_style="bold",
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
     for k, column in enumerate(columns):
-        made.add_column(column, justify="right" if k in numbers else "left", overflow="fold")
+        number = k in numbers
+        justify: JustifyMethod = "right" if number else "left"
+        made.add_column(column, justify=justify, overflow="fold", no_wrap=number)
     for row in rows:
         made.add_row(*(Text(cell) for cell in row))
     return made

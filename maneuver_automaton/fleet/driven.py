@@ -50,7 +50,7 @@ class DrivenVerdict:
     passed: bool  # nobody touched anybody or anything, and all drove as their models say
     closest: tuple[Closest, ...]  # pairs that came near each other, the nearest first
     clearances_m: Mapping[str, float]  # of each to obstacles; inf where there are none
-    jumps_m: Mapping[str, float]  # how far each was put elsewhere at most, not by its plans
+    jumps_m: Mapping[str, float]  # how far disturbances moved each at most
     defects: Mapping[str, str]  # who did not drive as its model says, and how
     collisions: tuple[str, ...]  # each in a line
 

@@ -7,7 +7,7 @@ not been. One entry per step applied, and a last one where the vehicle ended.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
-    Deed,
+    Decision,
     Guarantee,
     Origin,
     Step,
@@ -80,10 +80,8 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> dict[str, Any]:
         },
         "min_clearance_m": loop.min_clearance_m,
         "collisions": len(list(loop.collisions)),
-        "broken_guarantees": [
-            {"step": number, "guarantee": one.guarantee.value, "reason": one.reason}
-            for number, one in loop.violations
-        ],
+        "broken_guarantees": entries_of(loop.violations),
+        "disturbed": entries_of(loop.disturbed),
         "steps": [
             *(
                 _step(step, where.tolist(), loop.problem.automaton)
@@ -209,12 +207,11 @@ def _step(step: Step, vehicle_pose: list[float], automaton: Automaton) -> dict[s
         "gap": step.gap,
         "exhaustive": step.exhaustive,
         "arrived": step.arrived,
-        "deed": step.deed.value,
+        "decision": step.decision.value,
         "free_until_s": step.free_until,
         "clearance_m": step.clearance_m,
-        "broken_guarantees": [
-            {"guarantee": one.guarantee.value, "reason": one.reason} for one in step.violations
-        ],
+        "broken_guarantees": [_violation(one) for one in step.violations],
+        "disturbed": [_violation(one) for one in step.disturbed],
     }
 
 
@@ -252,12 +249,25 @@ def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Ste
         solve_s=float(entry["solve_s"]),
         number=int(entry["number"]),
         arrived=bool(entry["arrived"]),
-        deed=Deed(entry["deed"]),
+        decision=Decision(entry["decision"] if "decision" in entry else entry["deed"]),
         free_until=entry["free_until_s"],
         clearance_m=entry["clearance_m"],
         measured=None if entry["measured_pose"] is None else np.array(entry["measured_pose"]),
-        violations=tuple(
-            Violation(guarantee=Guarantee(one["guarantee"]), reason=one["reason"])
-            for one in entry["broken_guarantees"]
-        ),
+        violations=_violations(entry["broken_guarantees"]),
+        disturbed=_violations(entry.get("disturbed", ())),
+    )
+
+
+def entries_of(found: Iterable[tuple[int, Violation]]) -> list[dict[str, Any]]:
+    """Guarantees with the numbers of their steps, as the files have them."""
+    return [{"step": number, **_violation(one)} for number, one in found]
+
+
+def _violation(one: Violation) -> dict[str, Any]:
+    return {"guarantee": one.guarantee.value, "reason": one.reason}
+
+
+def _violations(entries: Iterable[Mapping[str, Any]]) -> tuple[Violation, ...]:
+    return tuple(
+        Violation(guarantee=Guarantee(one["guarantee"]), reason=one["reason"]) for one in entries
     )

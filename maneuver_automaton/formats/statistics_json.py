@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.formats.closed_loop_json import entries_of
 from maneuver_automaton.formats.plan_json import package_version
 from maneuver_automaton.receding_horizon import Statistics
 
@@ -39,10 +40,8 @@ def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bo
             "cost": one.cost,
             "first_value": one.first_value,
             "reason": one.reason,
-            "broken_guarantees": [
-                {"step": number, "guarantee": broken.guarantee.value, "reason": broken.reason}
-                for number, broken in one.violations
-            ],
+            "broken_guarantees": entries_of(one.violations),
+            "disturbed": entries_of(one.disturbed),
             "solve_s": one.solve_s.tolist(),
         }
         for one in statistics.outcomes

@@ -34,7 +34,7 @@ from maneuver_automaton.plotting.pages import (
     write_figure,
 )
 from maneuver_automaton.plotting.plan_page import BETWEEN, LEFT, PLANE, RIGHT
-from maneuver_automaton.receding_horizon import ClosedLoop
+from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee
 
 LEAST_PLANE, LEAST_SHARE = 1.0, 0.6  # [in] of the plane in a page of stated height; of the rest
 VALUE, PANEL, GAP = 1.6, 0.95, 0.2  # [in] heights over time, and between them
@@ -205,6 +205,9 @@ def _remarks(loop: ClosedLoop) -> list[str]:
         lines.append(textwrap.shorten(text, TEXT_WIDTH, placeholder=" …"))
     if (more := len(broken) - MOST_REASONS) > 0:
         lines.append(f"and {more} more guarantee{'s' if more > 1 else ''} broken")
+    rises = sum(one.guarantee is Guarantee.DECREASE for _, one in loop.disturbed)
+    if rises:
+        lines.append(f"noise raised the value in {rises} step{'s' if rises > 1 else ''}")
     return lines
 
 

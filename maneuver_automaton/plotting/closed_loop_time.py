@@ -31,7 +31,7 @@ class ValueArtists:
     both: Line2D  # their sum
     bound: Line2D  # below which no plan of the step can cost
     replanned: PathCollection
-    broken: PathCollection  # steps that broke a guarantee
+    broken: PathCollection  # steps that broke a guarantee, or lost one to noise
     legend: Legend | None
 
 
@@ -47,8 +47,8 @@ def draw_value(ax: Axes, loop: ClosedLoop, *, legend: bool = True) -> ValueArtis
     """Draw the value of every step of a `loop`, the cost accumulated by then, and their sum.
 
     The sum never rises while nothing disturbs the loop: it falls where a step finds a better plan.
-    Rings mark the steps that replanned, red crosses those that broke a guarantee, and a pale line
-    is the lower bound of the value.
+    Rings mark the steps that replanned, red crosses those that broke a guarantee, grey ones those
+    that a disturbance took one from, and a pale line is the lower bound of the value.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def draw_value(ax: Axes, loop: ClosedLoop, *, legend: bool = True) -> ValueArtis
     bounds = np.array([step.lower_bound for step in loop.steps])
     bounds = np.where(np.isfinite(bounds), bounds, np.nan)
     replanned = np.array([step.replanned for step in loop.steps], dtype=bool)
-    broken = np.array([bool(step.violations) for step in loop.steps], dtype=bool)
+    crossed = [step for step in loop.steps if step.violations or step.disturbed]
     begins = times[: len(loop.steps)]
     (bound,) = ax.plot(begins, bounds, color=shaded(VALUE, 0.6), linewidth=3.2, zorder=2.0)
     (both,) = ax.plot(times, values + spent, color=BOTH, linewidth=1.0, dashes=(4, 2), zorder=2.4)
@@ -100,8 +100,9 @@ def draw_value(ax: Axes, loop: ClosedLoop, *, legend: bool = True) -> ValueArtis
             edgecolors=[INK], linewidths=1.0, zorder=3.0,
         ),
         broken=ax.scatter(
-            begins[broken], heights[broken], s=34.0, marker="x", color=[BROKEN],
-            linewidths=1.6, zorder=3.2,
+            [step.time for step in crossed], [step.value for step in crossed], s=34.0, marker="x",
+            color=[BROKEN if step.violations else GREY for step in crossed], linewidths=1.6,
+            zorder=3.2,
         ),
         legend=_legend(ax, [value, cost, both, bound], loop) if legend else None,
     )  # fmt: skip
@@ -162,14 +163,17 @@ def _legend(ax: Axes, lines: list[Line2D], loop: ClosedLoop) -> Legend:
         [], [], linestyle="none", marker="o", markersize=5.5, markerfacecolor="white",
         markeredgecolor=INK, markeredgewidth=1.0,
     )  # fmt: skip
-    cross = Line2D(
-        [], [], linestyle="none", marker="x", markersize=5.8, color=BROKEN, markeredgewidth=1.6
+    cross, grey = (
+        Line2D([], [], linestyle="none", marker="x", markersize=5.8, color=one, markeredgewidth=1.6)
+        for one in (BROKEN, GREY)
     )
     handles, names = lines, ["value V", "spent", "sum", "lower bound"]
     if any(step.replanned for step in loop.steps):
         handles, names = [*handles, ring], [*names, "replanned"]
     if any(step.violations for step in loop.steps):
         handles, names = [*handles, cross], [*names, "broken"]
+    if any(step.disturbed for step in loop.steps):
+        handles, names = [*handles, grey], [*names, "disturbed"]
     legend = ax.legend(
         handles, [str(k) for k in range(len(names))], loc="lower left",
         bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False, fontsize=SMALL_PT, handlelength=1.5,

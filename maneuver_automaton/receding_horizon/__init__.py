@@ -11,7 +11,7 @@ from maneuver_automaton.receding_horizon.failsafe_search import (
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
 from maneuver_automaton.receding_horizon.guarantees import promises as promises
 from maneuver_automaton.receding_horizon.log import ClosedLoop as ClosedLoop
-from maneuver_automaton.receding_horizon.log import Deed as Deed
+from maneuver_automaton.receding_horizon.log import Decision as Decision
 from maneuver_automaton.receding_horizon.log import Guarantee as Guarantee
 from maneuver_automaton.receding_horizon.log import Origin as Origin
 from maneuver_automaton.receding_horizon.log import Step as Step

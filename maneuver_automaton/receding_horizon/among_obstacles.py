@@ -23,7 +23,7 @@ from maneuver_automaton.planning.tracking import (
 from maneuver_automaton.problem import Bounds, Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed
 from maneuver_automaton.receding_horizon.failsafe import predicted
-from maneuver_automaton.receding_horizon.log import Deed, Origin
+from maneuver_automaton.receding_horizon.log import Decision, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation, mitigate
 from maneuver_automaton.receding_horizon.shifting import moves_on
 from maneuver_automaton.receding_horizon.situation import Situation
@@ -115,14 +115,14 @@ class AmongObstacles:
             f"{self.here.start_time:.6g} s{end}"
         )
 
-    def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
+    def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
         """Towards the goal as long as it is safe, then to wait or evade, then the last plan."""
         here, rest = self.here, self.now.rest
         for plan in self._ambitions() if here.moves else ():
             for share in SHARES:
                 towards = self.predicted.continued(plan, share * self.settings.step)
                 if towards is not None:
-                    yield towards, Deed.APPROACHED
+                    yield towards, Decision.APPROACHED
         found = self.predicted.fail_safe(here.start, here.start_time)
         if found.complete:
             yield found.plan, _evading(found.plan)
@@ -136,7 +136,7 @@ class AmongObstacles:
         """Paths to the goal that may be followed for a moment."""
         now, here = self.now, self.here
         yield from self.unsafe
-        if now.last is not None and now.last.deed.leads and now.rest is not None:
+        if now.last is not None and now.last.decision.leads and now.rest is not None:
             yield now.rest
         static = tuple(one for one in here.obstacles if not moves(one))
         anyhow = Horizon(max_trims=here.horizon.max_trims, min_coast=here.horizon.min_coast)
@@ -155,10 +155,10 @@ class AmongObstacles:
         return min(closed_bound(self.here, goal) for goal in self.here.goals)
 
 
-def _evading(plan: Plan) -> Deed:
+def _evading(plan: Plan) -> Decision:
     """Fail-safe trajectories: to wait, or to make room."""
     waits = bool(plan.trims) and plan.trims[0].is_rest
-    return Deed.STOPPED if waits else Deed.EVADED
+    return Decision.STOPPED if waits else Decision.EVADED
 
 
 def as_it_stands(here: Problem) -> tuple[Problem, str]:

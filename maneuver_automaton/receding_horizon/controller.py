@@ -18,7 +18,13 @@ from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
 from maneuver_automaton.receding_horizon.decision import StepSearch, decide
 from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
-from maneuver_automaton.receding_horizon.log import Deed, Origin, Step, Violation
+from maneuver_automaton.receding_horizon.log import (
+    Decision,
+    Guarantee,
+    Origin,
+    Step,
+    Violation,
+)
 from maneuver_automaton.receding_horizon.pace import is_uniform
 from maneuver_automaton.receding_horizon.proving import LoopBounds
 from maneuver_automaton.receding_horizon.searches import load_search, started
@@ -195,8 +201,8 @@ class RecedingHorizon:
         Notes
         -----
         Where no plan leads to the goal, in whatever time, the log says so: its value is infinite,
-        and the vehicle rests. Among obstacles its value is then a lower bound, and ``deed`` names
-        the motion that it drives instead.
+        and the vehicle rests. Among obstacles its value is then a lower bound, and ``decision``
+        names the motion that it drives instead.
         """
         dof = self.problem.automaton.model.group.dof
         pose = np.array(as_array("measured_state", measured_state, last=dof))
@@ -233,7 +239,7 @@ class RecedingHorizon:
         assert self.proven is not None
         if now.changed:
             self.proven.forget()
-        elif now.last is None or now.off_plan or not now.last.deed.leads:
+        elif now.last is None or now.off_plan or not now.last.decision.leads:
             self.proven.leave()
         here = now.as_it_moves
         return 0.0 if here is None else self.proven.known(here, _accumulated(now))
@@ -263,9 +269,9 @@ class RecedingHorizon:
             instants = here.start_time + delta * np.arange(1, 2 + most)
             plan = with_samples_at(plan, instants, here.automaton.model)
         same = is_rest_of(plan, now.rest)
-        deed = _deed(chosen, now, same=same)
+        decision = _decision(chosen, now, same=same)
         bound = self._bound(chosen, search, now)
-        value = chosen.value if deed.leads or search.knows_all else bound
+        value = chosen.value if decision.leads or search.knows_all else bound
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
         step = Step(
             time=here.start_time,
@@ -285,18 +291,20 @@ class RecedingHorizon:
             solve_s=now.budget.elapsed,
             number=0 if last is None else last.number + 1,
             arrived=chosen.arrived,
-            deed=deed,
+            decision=decision,
             free_until=chosen.free_until,
             is_sole=now.is_sole,
         )
         self._count(step, now)
         broken = (*now.violations, *self._broken(step, now))
-        return replace(step, violations=broken) if broken else step
+        taken = tuple(one for one in broken if _is_taken(one, now))
+        kept = tuple(one for one in broken if one not in taken)
+        return replace(step, violations=kept, disturbed=taken) if broken else step
 
     def _count(self, step: Step, now: Situation) -> None:
         """Bound the number of steps, from here on if something disturbed."""
         if (now.last is None or step.off_plan or now.changed) and not self.settings.continuous:
-            most = self.promises.most_steps(step.value) if step.deed.leads else None
+            most = self.promises.most_steps(step.value) if step.decision.leads else None
             self.most_steps = None if most is None else most + step.number
         if now.here.moves:
             self.most_steps = None  # to wait may cost nothing
@@ -304,7 +312,7 @@ class RecedingHorizon:
     def _broken(self, step: Step, now: Situation) -> Iterator[Violation]:
         """The guarantees that a step breaks."""
         here, last, retimed = now.here, now.last, self.settings.continuous
-        if last is not None and step.deed.leads and last.deed.leads:
+        if last is not None and step.decision.leads and last.decision.leads:
             yield from broken(
                 self.promises,
                 here.goals[step.goal_index],
@@ -315,7 +323,7 @@ class RecedingHorizon:
                 moved=here.moves or now.changed,
             )
         steady = self.promises.steady and not (here.moves or retimed)
-        if steady and step.deed.leads and not step.arrived:
+        if steady and step.decision.leads and not step.arrived:
             yield from too_cheap(self.promises, step)
 
     def _bound(self, chosen: Chosen, search: StepSearch, now: Situation) -> float:
@@ -339,15 +347,26 @@ def _accumulated(now: Situation) -> float:
     return 0.0 if now.last is None else now.last.accumulated_cost + now.last.applied_cost
 
 
-def _deed(chosen: Chosen, now: Situation, *, same: bool) -> Deed:
-    """The deed of a step, where the decision does not say it; `same`: its word is the last one."""
-    if chosen.deed is not None:
-        return chosen.deed
+def _is_taken(violation: Violation, now: Situation) -> bool:
+    """Whether a disturbance took a guarantee away: all but the time budget's need calm.
+
+    What was taken once, say the horizon by a push, is not given back by the next step.
+    """
+    if now.last is None or violation.guarantee is Guarantee.BUDGET:
+        return False
+    before = {one.guarantee for one in now.last.disturbed}
+    return bool(now.off_plan or now.changed or violation.guarantee in before)
+
+
+def _decision(chosen: Chosen, now: Situation, *, same: bool) -> Decision:
+    """What a step decides, where the plan tells; `same`: its word is the last one."""
+    if chosen.decision is not None:
+        return chosen.decision
     if now.last is None:
-        return Deed.PLANNED
+        return Decision.PLANNED
     if chosen.origin is not Origin.SEARCHED:
-        return Deed.KEPT
-    return Deed.IMPROVED if same and now.last.deed.leads else Deed.REPLANNED
+        return Decision.KEPT
+    return Decision.IMPROVED if same and now.last.decision.leads else Decision.REPLANNED
 
 
 ManeuverHorizon = RecedingHorizon  # the name it has had for vehicles with inertia

@@ -14,7 +14,7 @@ from typing import Protocol
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.receding_horizon.candidates import Candidate
 from maneuver_automaton.receding_horizon.holding import holding
-from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
+from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.situation import Chosen, Situation
 
@@ -46,8 +46,8 @@ class StepSearch(Protocol):
     def why_none(self) -> str:
         """Why there is no plan to the goal."""
 
-    def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
-        """Fail-safe trajectories with their deeds; the first one is driven."""
+    def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
+        """Fail-safe trajectories with their decisions; the first one is driven."""
 
     def mitigation(self) -> Mitigation:
         """The motion that collides last, where none is safe."""
@@ -117,7 +117,7 @@ def _kept(now: Situation, search: StepSearch) -> Candidate | None:
     inertia before a detour.
     """
     last = now.last
-    if last is None or (now.here.moves and not last.deed.leads):
+    if last is None or (now.here.moves and not last.decision.leads):
         return None
     safe: list[Candidate] = []
     for plan, origin in now.rests():
@@ -134,17 +134,19 @@ def _kept(now: Situation, search: StepSearch) -> Candidate | None:
 
 def _without_plan(now: Situation, search: StepSearch) -> Chosen:
     """No safe plan leads to the goal from here, now."""
-    if not now.here.moves or (now.last is not None and now.last.deed.leads):
+    if not now.here.moves or (now.last is not None and now.last.decision.leads):
         now.flag(Guarantee.FEASIBILITY, search.why_none())
-    for plan, deed in search.fail_safe():
-        return _known_free(_leading_nowhere(now, plan, deed, None), search)
+    for plan, decision in search.fail_safe():
+        return _known_free(_leading_nowhere(now, plan, decision, None), search)
     least = search.mitigation()
     now.flag(Guarantee.SAFETY, least.reason)
-    return _leading_nowhere(now, least.plan, Deed.MITIGATED, least.contact)
+    return _leading_nowhere(now, least.plan, Decision.MITIGATED, least.contact)
 
 
-def _leading_nowhere(now: Situation, plan: Plan, deed: Deed, free_until: float | None) -> Chosen:
+def _leading_nowhere(
+    now: Situation, plan: Plan, decision: Decision, free_until: float | None
+) -> Chosen:
     index = 0 if now.last is None else now.last.goal_index
     origin = Origin.SHIFTED if plan is now.rest else Origin.SEARCHED
     one = Candidate(plan=plan, cost=math.inf, goal_index=index, origin=origin)
-    return replace(now.as_chosen(one, None), deed=deed, free_until=free_until)
+    return replace(now.as_chosen(one, None), decision=decision, free_until=free_until)

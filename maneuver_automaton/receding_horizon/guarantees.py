@@ -129,7 +129,9 @@ def broken(
     uniform: bool,
     moved: bool = False,
 ) -> Iterator[Violation]:
-    """The guarantees that the step from `last` to `now` broke, each with the reason.
+    """What the step from `last` to `now` does not keep of the guarantees, each with the reason.
+
+    The paper gives them to the undisturbed loop; the caller knows whether something disturbed it.
 
     `uniform`: the controls are continuous and the effort is uniform, so that the paper's decrease
     by the effort is promised too. `moved`: obstacles move, or were seen anew.
@@ -150,10 +152,11 @@ def broken(
         padding += promised.switch
     allowed = last.value - last.applied_cost + padding
     if now.value > allowed + tolerance and not (now.arrived or last.arrived):
-        yield Violation(
-            guarantee=Guarantee.DECREASE,
-            reason=f"the value is {now.value:.9g}, need at most {allowed:.9g}; {why}",
-        )
+        said = f"the value is {now.value:.9g}, need at most {allowed:.9g}; {why}"
+        if off > 0.0:
+            rise = now.value - allowed
+            said = f"noise raised the value by {rise:.3g} above {allowed:.9g}; {why}"
+        yield Violation(guarantee=Guarantee.DECREASE, reason=said)
     elif uniform and off == 0.0:
         least = promised.effort_decrease(last.pose, goal)
         if last.value - now.value < least - tolerance:

@@ -11,7 +11,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import prices_switches
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
-from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin
+from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.reanchoring import quickest, rejoining
 from maneuver_automaton.receding_horizon.shifting import rested
@@ -160,11 +160,11 @@ class InFreeSpace:
         """Why there is no plan to the goal."""
         return f"no plan leads from {self.here.start.tolist()} to the goal, in whatever time"
 
-    def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
+    def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
         """Rest for a step."""
         plan = Plan(self.here.start, (), durations=[], start_time=self.here.start_time)
         pad = self.settings.pad
-        yield (plan if pad is None else rested(plan, pad, self.settings.step)), Deed.STOPPED
+        yield (plan if pad is None else rested(plan, pad, self.settings.step)), Decision.STOPPED
 
     def mitigation(self) -> Mitigation:
         """Nothing is hit in free space."""

@@ -19,7 +19,7 @@ from maneuver_automaton.problem import Problem
 
 
 class Guarantee(enum.Enum):
-    """Guarantees of the paper for every step; the values are those of closed_loop.json."""
+    """What holds in every step of an undisturbed loop; the values are those of closed_loop.json."""
 
     FEASIBILITY = "recursive feasibility"
     DECREASE = "value decrease"
@@ -35,7 +35,7 @@ class Guarantee(enum.Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Violation:
-    """A guarantee that a step broke, and why."""
+    """A guarantee that a step broke, or that a disturbance took from it, and why."""
 
     guarantee: Guarantee
     reason: str  # one line, with the numbers
@@ -55,8 +55,8 @@ class Origin(enum.Enum):
     SEARCHED = "searched"  # found anew
 
 
-class Deed(enum.Enum):
-    """Kinds of motion that a step applies."""
+class Decision(enum.Enum):
+    """What a step decides to drive."""
 
     PLANNED = "planned"  # the first plan to the goal
     KEPT = "kept"  # the last plan
@@ -70,7 +70,7 @@ class Deed(enum.Enum):
     @property
     def leads(self) -> bool:
         """Whether the step's plan ends at the goal."""
-        return self in (Deed.PLANNED, Deed.KEPT, Deed.IMPROVED, Deed.REPLANNED)
+        return self in (Decision.PLANNED, Decision.KEPT, Decision.IMPROVED, Decision.REPLANNED)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -79,7 +79,7 @@ class Step:
 
     time: float  # [s]
     pose: Array  # (dof,) the plan starts here [m, m, rad(, m)]
-    plan: Plan  # from `pose` to the goal, or, if its deed does not lead there, fail-safe
+    plan: Plan  # from `pose` to the goal, or, if its decision does not lead there, fail-safe
     goal_index: int  # which of the problem's goals it reaches
     value: float  # cost of the whole plan; of one that does not lead to the goal, a lower bound
     applied: float  # [s] until the next step
@@ -95,8 +95,9 @@ class Step:
     number: int  # 0 for the first
     arrived: bool = False  # nothing remains to be done but to rest
     violations: tuple[Violation, ...] = ()
+    disturbed: tuple[Violation, ...] = ()  # what noise, or obstacles seen anew, took from it
     measured: Array | None = None  # (dof,) pose that was measured, if it is used a step later
-    deed: Deed = Deed.PLANNED
+    decision: Decision = Decision.PLANNED
     free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
     is_sole: bool = False  # no other plan was found that costs as much
     clearance_m: float | None = None  # least one while it was driven, by the audit
@@ -176,6 +177,13 @@ class ClosedLoop:
         """Number of the step and the guarantee it broke, in order."""
         for step in self.steps:
             for violation in step.violations:
+                yield step.number, violation
+
+    @property
+    def disturbed(self) -> Iterator[tuple[int, Violation]]:
+        """Number of the step and the guarantee that a disturbance took from it, in order."""
+        for step in self.steps:
+            for violation in step.disturbed:
                 yield step.number, violation
 
     @property

@@ -26,7 +26,7 @@ from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import LEAST_AHEAD, looked_at, settled
 from maneuver_automaton.receding_horizon.failsafe_search import FailSafe, search_fail_safe
-from maneuver_automaton.receding_horizon.log import Deed, Origin, first_part
+from maneuver_automaton.receding_horizon.log import Decision, Origin, first_part
 from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
@@ -260,7 +260,7 @@ class OverManeuvers:
         off = self.now.off_plan or 0.0
         return f"no word was found to the goal from {off:.3g} off the plan{self.reason}"
 
-    def fail_safe(self) -> Iterator[tuple[Plan, Deed]]:
+    def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
         """Fail-safe trajectories: to go on for a while, to brake, to evade, or the last plan.
 
         The last plan comes first unless obstacles have changed. The committed part is driven in
@@ -271,14 +271,14 @@ class OverManeuvers:
             for share in SHARES:
                 towards = self._continued(plan, share * self.settings.step)
                 if towards is not None:
-                    yield towards, Deed.APPROACHED
+                    yield towards, Decision.APPROACHED
         motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
         kept = [plan for plan in motions if plan is not None and plan.trims]
         self.tried = [*kept]
         for until in (self.until, -math.inf):
             for plan in kept:
                 if not self._hit(plan, until=until):
-                    yield plan, Deed.APPROACHED if moves_on(plan) else Deed.STOPPED
+                    yield plan, Decision.APPROACHED if moves_on(plan) else Decision.STOPPED
             if here.moves and until == self.until:
                 yield from self._evasions()
 
@@ -286,7 +286,7 @@ class OverManeuvers:
         """Plans to the goal that may be followed for a moment."""
         yield from self.unsafe
         now, onward = self.now, self._onward()
-        if now.last is not None and now.last.deed.leads and now.rest is not None:
+        if now.last is not None and now.last.decision.leads and now.rest is not None:
             yield now.rest
         if onward is None or now.budget.is_over:
             return
@@ -297,7 +297,7 @@ class OverManeuvers:
         if found is not None:
             yield found.plan
 
-    def _evasions(self) -> Iterator[tuple[Plan, Deed]]:
+    def _evasions(self) -> Iterator[tuple[Plan, Decision]]:
         """Motions from the end of the committed part that stay free, or from that of the last plan.
 
         One that does not stay free for long enough may be the one that is hit last.
@@ -310,7 +310,7 @@ class OverManeuvers:
                 continue
             plan = followed_by(begun, found.plan)
             if found.complete and not self._hit(plan, until=self.until):
-                yield plan, Deed.EVADED if moves_on(found.plan) else Deed.STOPPED
+                yield plan, Decision.EVADED if moves_on(found.plan) else Decision.STOPPED
             self.tried.append(plan)
 
     def _braking(self) -> Plan | None:

@@ -143,7 +143,7 @@ def simulate(
                 controller.last = track.log[-1] if track.log else last
                 break
             track.log.append(replace(now, measured=measured) if upset.delay else now)
-            stuck = not (now.deed.leads or problem.moves or obstacles is not None)
+            stuck = not (now.decision.leads or problem.moves or obstacles is not None)
             if stuck and (stops or not moves_on(now.plan)):
                 break
             track.drive(audit=audit)
@@ -226,7 +226,7 @@ def _closed_loop(
     value, reason, status, bound = 0.0, "", "reached", controller.most_steps
     if helpless:
         value, status = log[-1].lower_bound, "no_plan"
-        reason = str(log[-1].violations[-1])
+        reason = str((*log[-1].violations, *log[-1].disturbed)[-1])
     elif not inside[-1]:
         if applied and stopped():  # what the plan of the last step has left
             value = max(applied[-1].value - applied[-1].applied_cost, 0.0)
@@ -263,7 +263,7 @@ def _arrives(step: Step, *, stops: bool) -> bool:
     If it `stops` where it likes, it does so on a plan to the goal; otherwise at the end of a plan.
     """
     if stops:
-        return step.deed.leads
+        return step.decision.leads
     left = tail_of(step.plan, step.applied)
     return left.duration <= NOTHING or not moves_on(left)
 

@@ -14,7 +14,7 @@ from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
 from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, preference, within
-from maneuver_automaton.receding_horizon.log import Deed, Guarantee, Origin, Step, Violation
+from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.pace import between_trims
 from maneuver_automaton.receding_horizon.reanchoring import (
     distance,
@@ -40,7 +40,7 @@ class Chosen:
     origin: Origin
     shifted_value: float | None
     arrived: bool = False
-    deed: Deed | None = None  # None: told by the plan
+    decision: Decision | None = None  # None: told by the plan
     free_until: float | None = None  # [s]
 
 

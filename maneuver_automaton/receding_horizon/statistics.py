@@ -35,6 +35,7 @@ class Outcome:
     cost: float
     first_value: float
     violations: tuple[tuple[int, Violation], ...]
+    disturbed: tuple[tuple[int, Violation], ...]
     audits_failed: int
     reason: str  # why the goal was not reached, or not kept; empty if all is well
     solve_s: Array  # (steps,)
@@ -245,6 +246,7 @@ def outcome_of(loop: ClosedLoop, *, seed: int = 0) -> Outcome:
         cost=loop.cost,
         first_value=loop.steps[0].value if loop.steps else 0.0,
         violations=tuple(loop.violations),
+        disturbed=tuple(loop.disturbed),
         audits_failed=sum(not audit.passed for audit in loop.audits),
         reason=reason,
         solve_s=loop.solve_s,

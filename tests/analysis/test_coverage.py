@@ -12,8 +12,8 @@ from maneuver_automaton.analysis import (
     planned,
     reached,
     settings_for,
-    spanning_factor,
     straight_line,
+    stretch_factor,
 )
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.formats.lattice import Lattice, Move, automaton_of_lattice
@@ -90,10 +90,10 @@ def test_dispersion_moves_with_the_problem():
     assert found[0].largest == pytest.approx(found[1].largest, abs=1e-9)
 
 
-def test_the_spanning_factor_of_manhattan():
+def test_the_stretch_factor_of_manhattan():
     """Turns cost nothing by length, so ways are |x| + |y|: at most sqrt 2 of the straight line."""
     settings = CoverageSettings(radius=3.0, pairs=400, reach=reach(6.0, measure="length"))
-    found = spanning_factor(manhattan(), settings=settings)
+    found = stretch_factor(manhattan(), settings=settings)
     assert found.largest == pytest.approx(np.sqrt(2.0))
     assert abs(found.pose[0]) == pytest.approx(abs(found.pose[1]))
     assert abs(found.pose[2]) <= np.pi
@@ -104,9 +104,9 @@ def test_a_library_spans_itself():
         Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
     )  # fmt: skip
     settings = CoverageSettings(radius=1.5, pairs=5, reach=reach(2.0, edge_cost=0.5))
-    found = spanning_factor(robot, reference=planned(robot), settings=settings)
+    found = stretch_factor(robot, reference=planned(robot), settings=settings)
     assert 1.0 - 1e-6 <= found.largest < 1.5
-    found = spanning_factor(robot, settings=settings)
+    found = stretch_factor(robot, settings=settings)
     assert found.largest >= 1.0
 
 
@@ -129,7 +129,7 @@ def test_settings_fit_the_library():
 def test_what_cannot_be_measured():
     rest = Automaton.of_controls(Unicycle(), {"rest": (0, 0)})
     with pytest.raises(ValueError, match="no word of at most 8 ends within 2 m"):
-        spanning_factor(rest)
+        stretch_factor(rest)
     with pytest.raises(ValueError, match="measure must be one of time, length, got 'fuel'"):
         ReachSettings(measure="fuel")
     with pytest.raises(ValueError, match="most must be positive"):

@@ -131,8 +131,10 @@ def driven(vehicle: Vehicle, seed: int, *, time_limit: float, changes: bool) -> 
         "steps": len(loop.steps),
         "took_s": float(loop.times[-1]),
         "solve_s": loop.solve_s.tolist(),
-        "deeds": [one.deed.value for one in loop.steps],
-        "violations": [[n, one.guarantee.value, one.reason] for n, one in loop.violations],
+        "decisions": [one.decision.value for one in loop.steps],
+        "violations": [
+            [n, one.guarantee.value, one.reason] for n, one in (*loop.violations, *loop.disturbed)
+        ],
         "audited": [one.passed for one in loop.audits].count(False),
         **judged(problem, loop),
     }
@@ -193,7 +195,7 @@ def report(rows: list[dict[str, Any]]) -> None:
         ])  # fmt: skip
     show(["vehicle", "loops", "steps", "reached", "hit", "hit standing", "least [mm]",
           "step [s]", "broken"], lines)  # fmt: skip
-    print(Counter(deed for row in rows for deed in row["deeds"]))
+    print(Counter(decision for row in rows for decision in row["decisions"]))
 
 
 def main() -> None:

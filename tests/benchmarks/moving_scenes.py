@@ -252,7 +252,7 @@ def main() -> None:
     options = parser.parse_args()
     counts = {(escape, hit): 0 for escape in (True, False) for hit in (True, False)}
     reached, solves, clearances, notes, judging = 0, [], [], [], 0.0
-    deeds: Counter[str] = Counter()
+    decisions: Counter[str] = Counter()
     for seed in range(options.first, options.first + options.scenes):
         problem = moving_scene(seed)
         began = time.perf_counter()
@@ -263,7 +263,7 @@ def main() -> None:
         hit = clearance <= 0.0
         counts[escape, hit] += 1
         reached += loop.reached
-        deeds.update(step.deed.value for step in loop.steps)
+        decisions.update(step.decision.value for step in loop.steps)
         clearances.append(clearance)
         solves += (1e3 * loop.solve_s).tolist()
         if hit or not escape or not loop.reached:
@@ -274,7 +274,10 @@ def main() -> None:
          [["yes", counts[True, False], counts[True, True]],
           ["not seen", counts[False, False], counts[False, True]]])  # fmt: skip
     print(f"goal reached: {reached} of {options.scenes}; steps [ms]: {spread(solves)}")
-    print("what the steps did: " + ", ".join(f"{n} {deed}" for deed, n in deeds.most_common()))
+    print(
+        "what the steps did: "
+        + ", ".join(f"{n} {decision}" for decision, n in decisions.most_common())
+    )
     print(f"least clearance [m]: {min(clearances):.3f}; judging a scene: "
           f"{judging / options.scenes:.2f} s")  # fmt: skip
     for note in notes:

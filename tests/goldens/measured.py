@@ -115,7 +115,9 @@ def record_of_loop(loop: ClosedLoop) -> dict[str, Any]:
         "reached": loop.reached,
         "steps": len(loop.steps),
         "cost": rounded(loop.cost),
-        "guarantees": sorted({one.guarantee.value for _, one in loop.violations}),
+        "guarantees": sorted(
+            {one.guarantee.value for _, one in (*loop.violations, *loop.disturbed)}
+        ),
         "values": [rounded(step.value) for step in loop.steps],
     }
 

@@ -41,7 +41,7 @@ def parking_loop() -> ClosedLoop:
 
 @functools.cache
 def pushed_loop() -> ClosedLoop:
-    """Noise after every step, and a push that breaks a guarantee."""
+    """Noise after every step, and a push that raises the value."""
     upset = Disturbance(position_m=0.03, heading_rad=0.03, seed=3, pushes={4: (0.3, 0.3, 0.2)})
     return simulate(parking(NEAR), step=0.5, disturbance=upset, audit=False)
 

@@ -114,10 +114,11 @@ def test_the_value_falls_by_what_is_spent():
     assert len(artists.broken.get_offsets()) == 0
 
 
-def test_replanned_and_broken_steps_are_marked():
+def test_replanned_and_disturbed_steps_are_marked():
     loop = pushed_loop()
     artists = draw_value(axes(), loop)
-    broken = [step for step in loop.steps if step.violations]
+    assert not any(step.violations for step in loop.steps)
+    broken = [step for step in loop.steps if step.disturbed]
     assert broken
     assert np.allclose(artists.broken.get_offsets(), [[s.time, s.value] for s in broken])
     new = [step for step in loop.steps if step.replanned]

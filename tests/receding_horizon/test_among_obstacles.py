@@ -13,7 +13,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon import (
-    Deed,
+    Decision,
     Disturbance,
     Guarantee,
     RecedingHorizon,
@@ -53,7 +53,12 @@ def test_undisturbed_all_that_is_promised_is_kept(seed):
         assert one.shifted_value is not None or one.number == 0
         assert one.lower_bound <= one.value
         assert one.clearance_m is not None
-        assert one.deed in (Deed.PLANNED, Deed.KEPT, Deed.IMPROVED, Deed.REPLANNED)
+        assert one.decision in (
+            Decision.PLANNED,
+            Decision.KEPT,
+            Decision.IMPROVED,
+            Decision.REPLANNED,
+        )
     assert loop.min_clearance_m == min(one.clearance_m or 0.0 for one in loop.steps)
     assert loop.steps_bound is not None
     assert len(loop.steps) <= loop.steps_bound
@@ -70,7 +75,7 @@ def test_a_margin_is_kept_and_what_is_promised_too(seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", quick_are([4], range(6)))
-def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
+def test_with_noise_it_arrives_free_and_says_what_the_noise_took(seed):
     problem = replace(
         seeded(seed), goals=(Goal(pose=[6, 0, 0], tolerance_m=0.1, tolerance_rad=0.1),)
     )
@@ -79,7 +84,8 @@ def test_with_noise_it_arrives_free_and_says_what_the_noise_broke(seed):
     assert loop.reached
     assert list(loop.collisions) == []
     assert clearances(loop).min() > 0.0
-    for _, violation in loop.violations:
+    assert not list(loop.violations)
+    for _, violation in loop.disturbed:
         assert violation.guarantee in (Guarantee.DECREASE, Guarantee.FEASIBILITY, Guarantee.SAFETY)
         if violation.guarantee is not Guarantee.SAFETY:
             assert "off the plan" in violation.reason

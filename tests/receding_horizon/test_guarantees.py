@@ -57,8 +57,8 @@ def test_the_reason_says_whether_the_plan_was_followed():
     assert lines == [
         "recursive feasibility: the rest of the last plan does not lead to the goal in time; the "
         "state was measured 0.25 off the plan",
-        "value decrease: the value is 0.7, need at most 0.5; the state was measured 0.25 off the "
-        "plan",
+        "value decrease: noise raised the value by 0.2 above 0.5; the state was measured 0.25 off "
+        "the plan",
     ]
     (one,) = broken(PROMISED, GOAL, LAST, replace(GOOD, value=0.7), most_steps=2, uniform=False)
     assert str(one) == "value decrease: the value is 0.7, need at most 0.5; the plan was followed"

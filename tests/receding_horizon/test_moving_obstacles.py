@@ -13,7 +13,7 @@ from maneuver_automaton.formats.closed_loop_json import load_steps, save_closed_
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon
 from maneuver_automaton.receding_horizon import (
-    Deed,
+    Decision,
     Disturbance,
     Guarantee,
     RecedingHorizon,
@@ -32,11 +32,11 @@ from tests.receding_horizon.scenes import (
 )
 from tests.scenes import moving_scene
 
-WAITING = (Deed.STOPPED, Deed.APPROACHED, Deed.EVADED)
+WAITING = (Decision.STOPPED, Decision.APPROACHED, Decision.EVADED)
 
 
-def deeds(loop) -> list[Deed]:
-    return [step.deed for step in loop.steps]
+def decisions(loop) -> list[Decision]:
+    return [step.decision for step in loop.steps]
 
 
 def assert_free(loop) -> None:
@@ -62,7 +62,7 @@ class TestWaitingAndEvading:
         loop = simulate(among(on_the_goal()), step=0.5, time_limit=0.3)
         assert loop.reached
         assert_free(loop)
-        assert set(deeds(loop)[:10]) <= set(WAITING)
+        assert set(decisions(loop)[:10]) <= set(WAITING)
         assert 12.0 < loop.times[-1] < 14.0
 
     @pytest.mark.slow
@@ -147,10 +147,11 @@ class TestPredictions:
         )
         assert loop.reached
         assert_free(loop)
-        broken = {violation.guarantee for number, violation in loop.violations if number == 4}
-        assert Guarantee.FEASIBILITY in broken
-        assert all(number == 4 for number, _ in loop.violations)
-        assert all(violation.reason.endswith("obstacles moved") for _, violation in loop.violations)
+        taken = {violation.guarantee for number, violation in loop.disturbed if number == 4}
+        assert Guarantee.FEASIBILITY in taken
+        assert all(number == 4 for number, _ in loop.disturbed)
+        assert all(violation.reason.endswith("obstacles moved") for _, violation in loop.disturbed)
+        assert not list(loop.violations)
 
     def test_what_is_not_seen_is_hit_and_judged_by_what_there_is(self):
         loop = simulate(among(crossing()), step=0.5, obstacles=lambda _: [])
@@ -163,9 +164,9 @@ class TestPredictions:
     def test_the_controller_takes_new_obstacles_and_keeps_them(self):
         controller = RecedingHorizon(among(), step=0.5)
         _, first = controller.step([0.0, 0.0, 0.0])
-        assert (first.deed, first.free_until) == (Deed.PLANNED, None)
+        assert (first.decision, first.free_until) == (Decision.PLANNED, None)
         _, second = controller.step(first.predicted, obstacles=[Disc(1.0, [3.0, 0.0])])
-        assert second.deed is Deed.REPLANNED
+        assert second.decision is Decision.REPLANNED
         _, third = controller.step(second.predicted)
         assert third.value <= second.value - second.applied_cost + 1e-9
         assert len(controller.problem.obstacles) == 1
@@ -187,18 +188,18 @@ class TestCollisionMitigation:
         wall = moving_obstacle([0.0, 1.0], [(0.0, -3.0), (0.0, 3.0)], Box([20.0, 0.2]))
         loop = simulate(among(wall), step=0.5)
         assert loop.reached
-        assert deeds(loop)[0] is Deed.MITIGATED
+        assert decisions(loop)[0] is Decision.MITIGATED
         assert loop.steps[0].violations[0].guarantee is Guarantee.SAFETY
         assert "contact is predicted at 0.4" in loop.steps[0].violations[0].reason
         assert loop.steps[0].free_until == pytest.approx(0.45, abs=0.05)
         assert next(loop.collisions)[0] == 0
-        assert deeds(loop)[-1] is not Deed.MITIGATED
+        assert decisions(loop)[-1] is not Decision.MITIGATED
 
     @pytest.mark.slow
     def test_it_is_put_off_as_long_as_can_be(self):
         faster = moving_obstacle([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
         loop = simulate(among(faster, goal=[-9.0, 0.0, 0.0]), step=0.5, steps=6)
-        assert set(deeds(loop)) == {Deed.MITIGATED}
+        assert set(decisions(loop)) == {Decision.MITIGATED}
         assert loop.poses[-1] == pytest.approx([3.0, 0.0, 0.0])
 
 
@@ -207,7 +208,7 @@ def test_a_moved_scene_has_the_moved_loop():
     move = SE2(np.array([-20.0, 5.0, 1.1]))
     one, two = (simulate(each, step=0.5) for each in (problem, problem.moved(move)))
     assert [step.plan.word for step in one.steps] == [step.plan.word for step in two.steps]
-    assert deeds(one) == deeds(two)
+    assert decisions(one) == decisions(two)
     assert (move @ SE2(one.poses)).pose == pytest.approx(two.poses, abs=1e-6)
 
 
@@ -220,13 +221,13 @@ def test_a_loop_goes_on_from_its_file(tmp_path, after):
     begun = simulate(problem, step=0.5, steps=after)
     save_closed_loop(begun, tmp_path / "closed_loop.json")
     steps, poses = load_steps(tmp_path / "closed_loop.json", problem.automaton)
-    assert [step.deed for step in steps] == deeds(begun)
+    assert [step.decision for step in steps] == decisions(begun)
     assert [step.clearance_m for step in steps] == [step.clearance_m for step in begun.steps]
     rest = simulate(replace(problem, start=poses[-1]), step=0.5, last=steps[-1])
     assert len(rest.steps) == len(whole.steps) - after
     for one, other in zip(rest.steps, whole.steps[after:], strict=True):
         assert_same_steps(one, other)
-        assert one.deed is other.deed
+        assert one.decision is other.decision
     assert rest.cost == whole.cost
 
 

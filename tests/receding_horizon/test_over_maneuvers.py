@@ -23,7 +23,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import (
-    Deed,
+    Decision,
     Disturbance,
     Guarantee,
     ManeuverHorizon,
@@ -90,11 +90,11 @@ def test_disturbed_it_stays_feasible_and_interrupts_no_maneuver(seed):
     assert loop.reached, loop.reason
     assert loop.problem.goals[0].off(loop.poses[-1])[0] < 0.06
     assert all(audit.passed for audit in loop.audits)
-    assert {one.guarantee for _, one in loop.violations} <= {
+    assert {one.guarantee for _, one in loop.disturbed} <= {
         Guarantee.DECREASE,
         Guarantee.FEASIBILITY,
     }
-    assert all(step.off_plan for _, one in loop.violations for step in [loop.steps[_]])
+    assert not list(loop.violations)
     assert_nothing_interrupted(loop)
     assert any(step.origin is Origin.REANCHORED for step in loop.steps)
 
@@ -105,7 +105,7 @@ def test_a_push_during_a_maneuver_is_answered_after_it():
     _, log = first.step([0.0, 0.0, 0.0])
     assert committed(log.plan, 0.25) > 0.0
     _, then = first.step(log.predicted + np.array([0.02, 0.03, 0.01]))
-    assert then.deed.leads
+    assert then.decision.leads
     assert max(problem.goals[0].off(then.plan.end)) < 1e-8
     assert then.plan.primitives[0].name == log.plan.primitives[0].name
     assert then.off_plan == pytest.approx(np.hypot(0.02, 0.03), abs=1e-6)
@@ -154,7 +154,7 @@ def test_among_obstacles_only_free_plans_are_driven():
 def test_what_cannot_be_reached_is_said():
     problem = posed([3.0, 1.0, 1.0], horizon=Horizon(max_time=1.0))
     _, log = ManeuverHorizon(problem, step=0.5, time_limit=0.2).step([0.0, 0.0, 0.0])
-    assert log.deed is Deed.STOPPED
+    assert log.decision is Decision.STOPPED
     assert [one.guarantee for one in log.violations] == [Guarantee.FEASIBILITY]
 
 
@@ -220,7 +220,7 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
     assert all(audit.passed for audit in loop.audits)
     assert goal.off(loop.steps[0].plan.end)[0] > 1e-3  # it is not the middle
     if not noise:
-        assert [step.deed for step in loop.steps[1:]] == [Deed.KEPT] * (len(loop.steps) - 1)
+        assert [step.decision for step in loop.steps[1:]] == [Decision.KEPT] * (len(loop.steps) - 1)
 
 
 @pytest.mark.slow
@@ -229,7 +229,7 @@ def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
     monkeypatch.setattr(over_maneuvers, "search_insertion", lambda *_, **__: 1 / 0)
     zone = Zone(shape=Box([0.5, 0.5], [1.5, 0.5]), max_speed=0.9)
     _, step = ManeuverHorizon(posed(zones=[zone]), step=0.5).step([0.0, 0.0, 0.0])
-    assert step.deed is Deed.PLANNED
+    assert step.decision is Decision.PLANNED
 
 
 @pytest.mark.slow
@@ -250,11 +250,11 @@ def test_the_goal_must_stay_free_for_as_long_as_is_asked():
         footprint=Disc(0.2),
         search=SearchSettings(max_expansions=2000),
     )
-    for stand, deed in ((0.5, Deed.PLANNED), (6.0, Deed.APPROACHED)):
+    for stand, decision in ((0.5, Decision.PLANNED), (6.0, Decision.APPROACHED)):
         _, step = ManeuverHorizon(problem, step=0.5, stand=stand, time_limit=30.0).step([0, 0, 0])
-        assert step.deed is deed, stand
+        assert step.decision is decision, stand
         arrives = bool(np.abs(step.plan.end - problem.goals[0].pose).max() < 1e-9)
-        assert arrives is (deed is Deed.PLANNED)
+        assert arrives is (decision is Decision.PLANNED)
 
 
 def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
@@ -266,7 +266,7 @@ def test_what_cannot_be_evaded_is_flagged_with_the_time_of_contact():
         search=SearchSettings(max_expansions=200),
     )
     _, step = ManeuverHorizon(problem, step=1.0, time_limit=30.0).step([0.0, 0.0, 0.0])
-    assert step.deed is Deed.MITIGATED
+    assert step.decision is Decision.MITIGATED
     assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
     assert 0.925 < step.free_until < 1.2  # as it stands it would be hit first of these
 
@@ -286,10 +286,10 @@ def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, sto
         search=SearchSettings(max_expansions=200),
     )
     controller = ManeuverHorizon(
-        problem, step=0.5, look_ahead=look_ahead, last=replace(begun, deed=Deed.APPROACHED)
+        problem, step=0.5, look_ahead=look_ahead, last=replace(begun, decision=Decision.APPROACHED)
     )
     _, step = controller.step(begun.predicted)
-    assert step.deed is Deed.APPROACHED
+    assert step.decision is Decision.APPROACHED
     assert step.plan.end[0] == pytest.approx(stops_at)
     assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
 
@@ -423,7 +423,7 @@ class TestAmongWhatMoves:
         for loop in (one, two):
             assert loop.reached, loop.reason
             assert not list(loop.violations)
-        assert [step.deed for step in one.steps] == [step.deed for step in two.steps]
+        assert [step.decision for step in one.steps] == [step.decision for step in two.steps]
         assert (move @ SE2(one.poses)).pose[:, :2] == pytest.approx(two.poses[:, :2], abs=1e-6)
 
     def test_where_it_stands_it_makes_room(self):
@@ -438,9 +438,9 @@ class TestAmongWhatMoves:
             search=SearchSettings(max_expansions=20),
         )
         loop = simulate(problem, step=0.5, time_limit=30.0, steps=22)
-        deeds = {step.deed for step in loop.steps}
-        assert Deed.EVADED in deeds
-        assert Deed.MITIGATED not in deeds
+        decisions = {step.decision for step in loop.steps}
+        assert Decision.EVADED in decisions
+        assert Decision.MITIGATED not in decisions
         assert loop.min_clearance_m > 0.0
         assert_nothing_interrupted(loop)
 
@@ -499,7 +499,7 @@ class TestAmongWhatMoves:
         )
         loop = simulate(problem, step=0.5, time_limit=5.0, steps=14)
         assert loop.min_clearance_m > 0.0
-        assert not any(step.deed is Deed.MITIGATED for step in loop.steps)
+        assert not any(step.decision is Decision.MITIGATED for step in loop.steps)
 
     @pytest.mark.parametrize("begins_there", [True, False])
     def test_at_its_goal_it_makes_room_for_what_comes(self, begins_there):
@@ -517,7 +517,7 @@ class TestAmongWhatMoves:
         loop = simulate(problem, step=0.5, steps=22, stand=2.0, stay=True, time_limit=20.0)
         assert loop.reached
         assert loop.min_clearance_m > 0.0
-        assert Deed.MITIGATED not in {step.deed for step in loop.steps}
+        assert Decision.MITIGATED not in {step.decision for step in loop.steps}
         assert_nothing_interrupted(loop)
 
     @pytest.mark.parametrize(
@@ -549,6 +549,6 @@ class TestAmongWhatMoves:
         _, step = controller.step([0.0, -0.05, 0.0])  # 0.05 m
         assert [one.guarantee for one in step.violations] == [Guarantee.SAFETY]
         assert "the clearance is 0.05 m, need 0.08 m" in step.violations[0].reason
-        assert step.deed is Deed.PLANNED
+        assert step.decision is Decision.PLANNED
         _, step = controller.step([0.0, 0.0, 0.0], elapsed=0.0)
         assert Guarantee.SAFETY not in [one.guarantee for one in step.violations]

@@ -145,9 +145,9 @@ class SearchChart {
     this.begin = Math.min(...costs.map(([at]) => at), ...bounds.map(([at]) => at));
     this.begin = Math.max(1e-3, Math.min(this.begin, 0.5 * this.end));
     const final = costs[costs.length - 1][1];
-    const dearest = Math.max(...costs.map(([, cost]) => cost));
+    const costliest = Math.max(...costs.map(([, cost]) => cost));
     const least = bounds.length ? bounds[0][1] : Math.min(...costs.map(([, cost]) => cost));
-    const top = Math.min(dearest, 1.6 * final), bottom = Math.min(least, final);
+    const top = Math.min(costliest, 1.6 * final), bottom = Math.min(least, final);
     const room = 0.12 * (top - bottom) || 0.1 * Math.abs(final) || 1;
     this.range = [bottom - room, top + room];
   }

@@ -246,7 +246,9 @@ def _loop_facts(loop: ClosedLoop) -> list[Fact]:
     if loop.min_clearance_m is not None:
         facts.append(("clearance", f"{loop.min_clearance_m:.3g} m"))
     broken = sum(1 for _ in loop.violations)
-    return [*facts, ("guarantees", f"{broken} broken" if broken else "all kept")]
+    taken = sum(1 for _ in loop.disturbed)
+    kept = f"kept but {taken}, taken by noise" if taken else "all kept"
+    return [*facts, ("guarantees", f"{broken} broken" if broken else kept)]
 
 
 def _values(loop: ClosedLoop) -> dict[str, Any]:
@@ -285,7 +287,7 @@ def _step(step: Step, local: Local, names: dict[str, int]) -> dict[str, Any]:
     return {
         "t": float(step.time),
         "value": float(step.value),
-        "deed": step.deed.value,
+        "decision": step.decision.value,
         "replanned": step.replanned,
         "broken": [str(one) for one in step.violations],
         "solve_s": float(step.solve_s),
