@@ -197,7 +197,7 @@ def test_obstacles_are_told_of(folder, capsys):
     printed = capsys.readouterr().out
     assert document["clearance_m"] >= 0.1 - 1e-9
     assert f"{document['clearance_m']:.3g} m to the nearest obstacle, 0.1 m asked for" in printed
-    assert f"(at least {document['lower_bound']:.9g}, gap " in printed
+    assert f"(proven: at least {document['lower_bound']:.9g})" in printed
     assert f"expansions {document['counts']['expansions']}, " in printed
     assert "rejected by FCL 0, rejected by audit 0" in printed
     assert "first plan" in printed

@@ -91,8 +91,7 @@ class TestPlan:
             "plans:          2 of 2",
             "sum:",
             "last arrival:",
-            "at least",
-            "gap",
+            "(proven",
             "nearest:",
         ):
             assert said in printed.out

@@ -78,6 +78,7 @@ class PlanAnswer:
 
     name: str
     result: PlanResult
+    share: bool = False  # whether the gap is told as a share of the cost
 
     @property
     def why_not(self) -> str:
@@ -116,7 +117,7 @@ class PlanAnswer:
         """Print it."""
         from maneuver_automaton.cli.tables import print_result
 
-        print_result(self.name, self.result, folder=folder)
+        print_result(self.name, self.result, folder=folder, share=self.share)
 
     def row(self, path: Path) -> Row:
         """For the table of a folder."""
@@ -152,7 +153,7 @@ class PlanTask:
         return self.settings.time_limit or self.scenario.time_limit_s
 
     def so_far(self) -> str:
-        """Cost, bound, gap and clearance of the best plan so far."""
+        """Cost, bound and clearance of the best plan so far, and its gap if one was asked for."""
         return self.shown.text
 
     def answer(self) -> PlanAnswer:
@@ -184,7 +185,11 @@ class PlanTask:
         if stopped() and result.plan is None:
             result = replace(result, reason=INTERRUPTED)
         timing = {**self.scenario.timing_s, **result.timing_s}
-        return PlanAnswer(name=self.scenario.name, result=replace(result, timing_s=timing))
+        return PlanAnswer(
+            name=self.scenario.name,
+            result=replace(result, timing_s=timing),
+            share=self.settings.gap is not None,
+        )
 
 
 @dataclass(slots=True, kw_only=True)
@@ -205,13 +210,15 @@ class SoFar:
 
     @property
     def text(self) -> str:
-        """Cost, bound, gap and clearance."""
+        """Cost, bound, gap if one was asked for, and clearance."""
         best = self.best
         if best is None or best.cost is None:
             return ""
         bound = max(self.watch.bound, best.lower_bound or 0.0)
         share = max(0.0, 1.0 - bound / best.cost) if best.cost > 0.0 else 0.0
-        parts = [f"cost {best.cost:.6g}, at least {bound:.6g}, gap {100.0 * share:.2g} %"]
+        parts = [f"cost {best.cost:.6g}, proven: at least {bound:.6g}"]
+        if self.watch.gap > -math.inf:
+            parts.append(f"gap {100.0 * share:.2g} %")
         if best.clearance_m is not None:
             parts.append(f"clearance {best.clearance_m:.3g} m")
         return ", ".join(parts)

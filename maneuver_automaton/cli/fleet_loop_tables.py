@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from rich.text import Text
 
 from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.loop_tables import shortened
-from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.cli.tables import console, kept_text, print_facts, table
 from maneuver_automaton.fleet import DrivenVerdict, FleetLog, FleetStep
 from maneuver_automaton.planning.polishing import left_out
 
@@ -29,9 +28,7 @@ def print_fleet_loop(name: str, log: FleetLog, driven: DrivenVerdict, *, folder:
     vehicles = [_vehicle_row(log, driven, one) for one in log.problem.names]
     columns = ["vehicle", "status", "arrival [s]", "cost", "swaps", "off plan [m]", "clearance [m]"]
     out.print(table("" if rows else name, columns, vehicles, numbers=(2, 3, 4, 5, 6)))
-    for what, value in _facts(log, driven, folder).items():
-        if value:
-            out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+    print_facts(_facts(log, driven, folder))
 
 
 def _spent(log: FleetLog) -> list[float]:
@@ -90,8 +87,7 @@ def _vehicle_row(log: FleetLog, driven: DrivenVerdict, name: str) -> list[str]:
 
 def _facts(log: FleetLog, driven: DrivenVerdict, folder: str) -> dict[str, str]:
     broken = len({number for number, _ in log.violations})
-    margin = log.problem.margin
-    kept = f", {margin:g} m asked for" if margin else ""
+    kept = kept_text(driven.distance_m, log.problem.margin) if driven.closest else ""
     milliseconds = 1e3 * np.array([step.solve_s for step in log.steps])
     collisions = len(driven.collisions)
     return {

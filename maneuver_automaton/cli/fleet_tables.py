@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton.cli.tables import console, spoken, table
+from maneuver_automaton.cli.tables import console, kept_text, print_facts, proven, spoken, table
 
 if TYPE_CHECKING:
     from maneuver_automaton.fleet import Closest, FleetResult
@@ -14,9 +14,7 @@ MOST_PAIRS = 3  # that are named, the nearest first
 
 
 def print_fleet(name: str, result: FleetResult, *, folder: str) -> None:
-    """Cost, arrival, clearance and length of every plan; sums, bound, gap, and who is nearest."""
-    from rich.text import Text
-
+    """Cost, arrival, clearance and length of every plan; sums, bound, and who is nearest."""
     out = console()
     rows = [
         [
@@ -31,14 +29,12 @@ def print_fleet(name: str, result: FleetResult, *, folder: str) -> None:
     ]
     columns = ["vehicle", "status", "cost", "arrival [s]", "clearance [m]", "primitives"]
     out.print(table(name, columns, rows, numbers=(2, 3, 4, 5)))
-    for what, value in _facts(result, folder).items():
-        if value:
-            out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+    print_facts(_facts(result, folder))
 
 
 def _facts(result: FleetResult, folder: str) -> dict[str, str]:
     n, of = len(result.plans), len(result.results)
-    kept = f", {result.problem.margin:g} m asked for" if result.problem.margin else ""
+    kept = kept_text(result.clearance_m, result.problem.margin)
     near = "; ".join(map(pair_text, result.closest[:MOST_PAIRS]))
     return {
         "plans": f"{n} of {of}",
@@ -79,9 +75,8 @@ def least_clearance(result: FleetResult) -> float | None:
 def _bound(result: FleetResult) -> str:
     if result.gap is None:
         return ""
-    bound = f"{result.lower_bound:.9g}" + (" s" if result.objective == "last" else "")
-    of = "" if result.objective == "sum" else " of the last arrival"
-    return f" (at least {bound}{of}, gap {100 * result.gap:.2g} %)"
+    unit = " s of the last arrival" if result.objective == "last" else ""
+    return f" ({proven(result.lower_bound or 0.0, optimal=result.gap <= 0.0)}{unit})"
 
 
 def pair_text(one: Closest) -> str:

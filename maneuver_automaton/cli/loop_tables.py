@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 from rich.text import Text
 
-from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.cli.tables import console, kept_text, print_facts, table
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, Statistics
 
@@ -56,8 +56,7 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
         facts["time per step"] = (
             f"{np.median(milliseconds):.2f} ms median, {milliseconds.max():.2f} ms at most"
         )
-    for what, value in facts.items():
-        out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+    print_facts(facts)
 
 
 def shortened(rows: list[list[str]]) -> list[list[str]]:
@@ -98,7 +97,9 @@ def _under_noise(loop: ClosedLoop, disturbed: int) -> str:
 
 def _clearance(loop: ClosedLoop) -> str:
     least = loop.min_clearance_m
-    return "nothing was driven" if least is None else f"{least:.4g} m"
+    if least is None:
+        return "nothing was driven"
+    return f"{least:.4g} m{kept_text(least, loop.problem.margin) if least > 0.0 else ''}"
 
 
 def _collisions(loop: ClosedLoop) -> str:
@@ -127,8 +128,7 @@ def print_statistics(name: str, statistics: Statistics, *, folder: str) -> None:
             f"{np.median(milliseconds):.2f} ms median, {np.percentile(milliseconds, 99):.2f} ms p99"
         )
     out.print(Text(f"{name}\n"))
-    for what, value in facts.items():
-        out.print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)
+    print_facts(facts)
     for what, found in (
         ("broken", [violation for one in outcomes for _, violation in one.violations]),
         ("taken by noise", [violation for one in outcomes for _, violation in one.disturbed]),

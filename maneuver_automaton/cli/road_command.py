@@ -17,8 +17,6 @@ from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
-    from rich.text import Text
-
     from maneuver_automaton.automaton import Plan
     from maneuver_automaton.cli import mpc_command
     from maneuver_automaton.cli.plan_settings import Settings as PlanSettings
@@ -205,14 +203,10 @@ def _drive_facts(drive: RoadDrive, before: RoadPlanResult | None, out: Path) -> 
 
 
 def _print(name: str, facts: dict[str, str]) -> None:
-    from rich.text import Text
+    from maneuver_automaton.cli.tables import console, print_facts
 
-    from maneuver_automaton.cli.tables import console
-
-    lines: list[Text] = [Text(name)]
-    lines += [Text(f"  {what + ':':<16}{value}") for what, value in facts.items()]
-    for line in lines:
-        console().print(line, soft_wrap=True)
+    console().print(name, soft_wrap=True)
+    print_facts(facts)
 
 
 def _in_file(path: Path, error: ValueError) -> InvalidScenario:

@@ -245,7 +245,7 @@ def _draw(
 
 
 def _print(result: RoadFleetResult, out: Path) -> None:
-    from maneuver_automaton.cli.tables import console, table
+    from maneuver_automaton.cli.tables import console, print_facts, table
 
     rows = [
         [
@@ -259,7 +259,7 @@ def _print(result: RoadFleetResult, out: Path) -> None:
         for name, one in result.results.items()
     ]
     console().print(table(result.name, COLUMNS, rows, numbers=(2, 3, 4, 5)))
-    _print_facts(
+    print_facts(
         {
             "plans": f"{len(result.plans)} of {len(result.results)}",
             "nearest": _nearest(result.pairs),
@@ -271,7 +271,7 @@ def _print(result: RoadFleetResult, out: Path) -> None:
 
 
 def _print_drive(drive: RoadFleetDrive, out: Path) -> None:
-    from maneuver_automaton.cli.tables import console, table
+    from maneuver_automaton.cli.tables import console, print_facts, table
 
     rows = [
         [
@@ -287,7 +287,7 @@ def _print_drive(drive: RoadFleetDrive, out: Path) -> None:
     steps = [step for one in drive.results.values() for step in one.steps]
     milliseconds = sorted(1e3 * step.solve_s for step in steps)
     console().print(table(drive.name, COLUMNS, rows, numbers=(2, 3, 4, 5)))
-    _print_facts(
+    print_facts(
         {
             "reached": f"{sum(one.reached for one in drive.results.values())} of {len(rows)}",
             "nearest": _nearest(drive.pairs),
@@ -307,13 +307,3 @@ def _nearest(pairs: Sequence[RoadPair]) -> str:
         return ""
     one = pairs[0]
     return f"{' and '.join(one.pair)} {one.distance_m:.3g} m at {one.time_s:.4g} s"
-
-
-def _print_facts(facts: Mapping[str, str]) -> None:
-    from rich.text import Text
-
-    from maneuver_automaton.cli.tables import console
-
-    for what, value in facts.items():
-        if value:
-            console().print(Text(f"  {what + ':':<16}{value}"), soft_wrap=True)

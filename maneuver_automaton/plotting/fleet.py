@@ -93,7 +93,7 @@ def headline(result: FleetResult) -> str:
     if with_plan:
         parts += [f"sum {result.sum_s:.5g} s", f"last {result.last_s:.5g} s"]
     if result.gap is not None:
-        parts.append(f"gap at most {100.0 * result.gap:.3g} %" if result.gap else "optimal")
+        parts.append(f"at least {result.lower_bound:.5g}" if result.gap else "proven optimal")
     if with_plan and math.isfinite(result.clearance_m):
         parts.append(f"clearance {result.clearance_m:.3g} m")
     return " · ".join(parts)

@@ -163,8 +163,7 @@ class SearchChart {
     const share = Math.min(Math.max((x - left) / width, 0), 1);
     const time = this.begin * (this.end / this.begin) ** share;
     const cost = SearchChart.at(this.costs, time), bound = SearchChart.at(this.bounds, time);
-    const gap = cost !== null && bound !== null && cost > 0 ? 1 - bound / cost : null;
-    return { time, cost, bound, gap };
+    return { time, cost, bound };
   }
 
   area() {

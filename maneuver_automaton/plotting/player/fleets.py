@@ -156,7 +156,7 @@ def _facts(result: FleetResult) -> list[Fact]:
         if np.isfinite(result.clearance_m):
             facts.append(("clearance", f"{result.clearance_m:.3g} m"))
     if result.gap is not None:
-        facts.append(("gap", f"{100.0 * result.gap:.3g} %" if result.gap else "proven optimal"))
+        facts.append(("proven", f"at least {result.lower_bound:.6g}" if result.gap else "optimal"))
     if result.problem.margin > 0.0:
         facts.append(("margin", f"{result.problem.margin:g} m"))
     return facts

@@ -281,10 +281,9 @@ function buildSearch() {
   }
   canvas.addEventListener("pointermove", (event) => {
     searchHover = event.clientX - canvas.getBoundingClientRect().left;
-    const { time, cost: price, bound: least, gap } = searchChart.readAt(searchHover);
+    const { time, cost: price, bound: least } = searchChart.readAt(searchHover);
     const rows = [["search time", `${shownNumber(time, 3)} s`], ["cost", shownNumber(price, 6)]];
-    if (least !== null) rows.push(["bound", shownNumber(least, 6)]);
-    if (gap !== null) rows.push(["gap", `${shownNumber(100 * gap, 3)} %`]);
+    if (least !== null) rows.push(["proven", `at least ${shownNumber(least, 6)}`]);
     showTip(rows, event);
     redraw();
   });

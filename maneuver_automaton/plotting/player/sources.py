@@ -81,7 +81,7 @@ def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Pl
     facts = _plan_facts(
         cost=document.get("cost"),
         duration=plan.duration,
-        gap=document.get("gap"),
+        bound=None if document.get("gap") is None else document.get("lower_bound"),
         clearance=document.get("clearance_m"),
         error=(error.get("position_m"), error.get("heading_rad")),
     )
@@ -206,15 +206,15 @@ def _plan_facts(
     *,
     cost: float | None,
     duration: float,
-    gap: float | None,
+    bound: float | None,
     clearance: float | None,
     error: tuple[float | None, float | None],
 ) -> list[Fact]:
     """The numbers that head a plan, those that are known."""
     facts = [] if cost is None else [("cost", f"{cost:.6g}")]
     facts.append(("duration", f"{duration:.5g} s"))
-    if gap is not None:
-        facts.append(("gap", "proven optimal" if gap <= 0.0 else f"{100.0 * gap:.2g} %"))
+    if bound is not None and cost is not None:
+        facts.append(("proven", "optimal" if cost <= bound else f"at least {bound:.6g}"))
     if clearance is not None:
         facts.append(("clearance", f"{clearance:.3g} m"))
     apart, turned = error
@@ -230,7 +230,7 @@ def _result_facts(result: PlanResult) -> list[Fact]:
     return _plan_facts(
         cost=result.cost,
         duration=plan.duration,
-        gap=result.gap,
+        bound=None if result.gap is None else result.lower_bound,
         clearance=result.clearance_m,
         error=(None, None) if error is None else (error.position_m, error.heading_rad),
     )

@@ -165,7 +165,7 @@ def _has_layers(page):
     page.keyboard.press("1")
     assert page.locator(".card").count() == 2
     page.hover("#search canvas")
-    assert "gap" in page.inner_text("#tip")
+    assert "at least" in page.inner_text("#tip")
     theme = page.evaluate("document.documentElement.dataset.theme")
     page.keyboard.press("d")
     assert page.evaluate("document.documentElement.dataset.theme") != theme

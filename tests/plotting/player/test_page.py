@@ -203,7 +203,7 @@ def test_a_file_is_played_with_its_numbers():
     }
     content = player_of_file(document, plan, title="parking").content
     assert content["title"] == "parking"
-    assert dict(content["facts"])["gap"] == "7.7 %"
+    assert dict(content["facts"])["proven"] == "at least 9"
     assert content["search"]["costs"] == [[0.1, 12.0], [0.4, 9.75]]
     assert content["search"]["bounds"] == [[0.2, 8.0]]
 
