@@ -126,7 +126,7 @@ def test_a_drive_that_missed_its_goal_is_told(road, tmp_path, capsys):
     asked = ["export", str(path), "--to", "commonroad", "--with", str(road / "road.xml")]
     assert run(asked) == 0
     assert capsys.readouterr().err == (
-        f"{path}: the goal was not reached: the official checker refuses "
+        f"{path}: it is no clean drive to a goal: the official checker refuses "
         f"{tmp_path / 'closed_loop_commonroad.xml'}\n"
     )
 

@@ -10,7 +10,7 @@ from PIL import Image
 
 from maneuver_automaton.cli import run
 from maneuver_automaton.plotting.pages import DPI
-from tests.roads.files import GOAL, LANES, commonroad, interval, problem
+from tests.roads.files import GOAL, LANES, car, commonroad, interval, problem
 
 QUICK = ["--no-plot", "--quiet"]
 LATE = GOAL.replace(interval("time", 20, 40), interval("time", 0, 5))
@@ -53,6 +53,33 @@ def test_a_goal_that_is_missed_ends_with_one(folder, capsys):
     assert run(["plan", "late.xml", "--time-limit", "0.001", *QUICK]) == 1
     document = json.loads(Path("out/plan.json").read_text())
     assert (document["status"], document["cost"], document["primitives"]) == ("no_plan", None, [])
+
+
+def test_a_contact_ends_with_one_in_every_output(folder, capsys):
+    """Also where the start made it unavoidable, and the goal is reached."""
+    goal = "<goalState>" + interval("time", 15, 20) + "</goalState>"
+    parts = *LANES, car(7, x=31.0, y=2.5, speed=4.0, steps=45), problem(goal=goal, x=30.0)
+    Path("hit.xml").write_text(commonroad(*parts))
+    said = "collision with car 7; a goal was reached at 1.5 s"
+    assert run(["mpc", "hit.xml", "--no-plot", "--html"]) == 1
+    document = json.loads(Path("out/closed_loop.json").read_text())
+    assert (document["status"], document["reason"]) == ("touched", said)
+    assert document["reached"] is False
+    assert document["audit"]["passed"] is False
+    assert document["broken_guarantees"] == [
+        {"step": None, "guarantee": "no collision", "reason": "collision with car 7"}
+    ]
+    printed = capsys.readouterr()
+    assert f"touched: {said}" in printed.out
+    assert printed.err.endswith(f"hit.xml: touched: {said}\n")
+    assert f'"ending":"{said}"' in Path("out/closed_loop.html").read_text().replace(": ", ":")
+    away = problem(101, goal=goal, x=90.0)
+    Path("two.xml").write_text(commonroad(*parts, away))
+    assert run(["mpc", "two.xml", "--no-plot", "--html"]) == 1
+    document = json.loads(Path("out/closed_loop.json").read_text())
+    assert (document["status"], document["reason"]) == ("touched", f"100: {said}")
+    assert (document["reached"], document["vehicles"]["101"]["status"]) == (False, "reached")
+    assert capsys.readouterr().err.endswith(f"two.xml: touched: 100: {said}\n")
 
 
 def test_one_plan(folder):

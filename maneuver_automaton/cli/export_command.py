@@ -69,7 +69,7 @@ def export(
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
     if kind == "commonroad" and several is None and not driven.reached:
-        complain(f"{file}: the goal was not reached: the official checker refuses {path}")
+        complain(f"{file}: it is no clean drive to a goal: the official checker refuses {path}")
     return FOUND
 
 

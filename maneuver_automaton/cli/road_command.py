@@ -119,10 +119,6 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     _written(write, out)
     if not settings.quiet:
         _print(scene.name, _drive_facts(drive, before, out))
-    for name in drive.verdict.hit:
-        complain(f"{path}: collision with {name}")
-    if drive.verdict.off_road:
-        complain(f"{path}: off the road: a part of the body was outside the lanelets")
     if not drive.reached:
         complain(f"{path}: {drive.status}: {drive.reason}")
     return FOUND if drive.reached else NO_PLAN
@@ -187,7 +183,7 @@ def _drive_facts(drive: RoadDrive, before: RoadPlanResult | None, out: Path) -> 
     verdict = drive.verdict
     milliseconds, end = 1e3 * drive.solve_s, drive.driven.switching_times[-1]
     facts = {
-        "goal": f"reached at {end:.6g} s" if drive.reached else drive.reason,
+        "goal": f"reached at {end:.6g} s" if drive.reached else f"{drive.status}: {drive.reason}",
         "steps": f"{len(drive.steps)}, {sum(step.replanned for step in drive.steps)} replanned",
         "collisions": str(len(verdict.hit)),
         "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",

@@ -92,11 +92,6 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
         raise not_written(Path(error.filename or out), error) from error
     if not settings.quiet:
         _print_drive(drive, out)
-    for who, one in drive.results.items():
-        for other in one.verdict.hit:
-            complain(f"{path}: {who}: collision with {other}")
-        if one.verdict.off_road:
-            complain(f"{path}: {who}: off the road: a part of the body was outside the lanelets")
     if not drive.reached:
         complain(f"{path}: {drive.status}: {drive.reason}")
     return FOUND if drive.reached else NO_PLAN

@@ -34,6 +34,8 @@ from maneuver_automaton.roads import (
 )
 from maneuver_automaton.roads.library import RoadLibrary
 
+GUARANTEES = {"touched": "no collision", "off_road": "on the road", "undrivable": "drivable"}
+
 
 def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
     """The content of plan.json; without a plan the numbers are null and the lists empty."""
@@ -126,9 +128,6 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
     """The content of closed_loop.json; `before` is the search that was made before the start."""
     spent = np.concatenate([[0.0], np.cumsum([step.applied_cost for step in drive.steps])])
     verdict, driven = drive.verdict, drive.driven
-    broken = [("no collision", name) for name in verdict.hit]
-    if verdict.off_road:
-        broken.append(("on the road", "a part of the body was outside the lanelets"))
     return {
         "schema": SCHEMA,
         "version": package_version(),
@@ -143,11 +142,12 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
         "step_s": drive.planner.tick,
         "steps_bound": None,
         "planned_before_s": None if before is None else before.search_s,
-        "audit": {**_audit(verdict), "pieces": len(drive.steps), "failed": len(broken)},
+        "audit": {**_audit(verdict), "pieces": len(drive.steps), "failed": len(verdict.faults)},
         "min_clearance_m": _number(verdict.clearance_m),
         "collisions": verdict.collisions,
         "broken_guarantees": [
-            {"step": None, "guarantee": what, "reason": reason} for what, reason in broken
+            {"step": None, "guarantee": GUARANTEES[what], "reason": reason}
+            for what, reason in verdict.faults
         ],
         "steps": [
             *(

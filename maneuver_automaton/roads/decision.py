@@ -49,12 +49,12 @@ class RoadDecision:
     @property
     def stops(self) -> bool:
         """Whether it ends at rest."""
-        return bool(self.states[-1, 3] <= AT_REST)
+        return abs(float(self.states[-1, 3])) <= AT_REST
 
     @property
     def stands(self) -> bool:
         """Whether it is to stay at rest, as no motion on is free."""
-        return not self.lasting and not self.reaches and bool(self.states[0, 3] <= AT_REST)
+        return not (self.lasting or self.reaches) and abs(float(self.states[0, 3])) <= AT_REST
 
     def tail(self) -> RoadDecision:
         """The rest of the plan a tick later."""

@@ -16,7 +16,7 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.roads.decision import RoadDecision
+from maneuver_automaton.roads.decision import AT_REST, RoadDecision
 from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.missed import nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner
@@ -57,8 +57,8 @@ class RoadDrive:
     planner: RoadPlanner
     steps: tuple[RoadStep, ...]
     driven: Plan  # all that was driven, in the coordinates and on the clock of the scene
-    reached: bool
-    status: str  # reached | missed | steps_spent
+    reached: bool  # a goal, and the verdict is clean
+    status: str  # reached | touched | off_road | undrivable | missed | steps_spent
     reason: str  # one line; empty if reached
     verdict: RoadVerdict
 
@@ -151,19 +151,23 @@ class Driver:
 
     def drive(self, scene: RoadScene) -> RoadDrive:
         """The drive, judged among the traffic of a scene."""
-        planner, reached = self.planner, self.reached
+        planner, at_goal, driven = self.planner, self.reached, self.driven
         states = np.array([*(step.state for step in self.done), self.state])
-        status, reason = _ending(planner, states, stood=_stood(self.done), reached=reached)
-        reason += ", when the drive was interrupted" if stopped() and not reached else ""
-        driven = self.driven
+        status, reason = _ending(planner, states, stood=_stood(self.done), reached=at_goal)
+        reason += ", when the drive was interrupted" if stopped() and not at_goal else ""
+        verdict = judged(scene, planner.vehicle, driven)
+        if verdict.faults:  # they decide how it ended, wherever it ended
+            status = verdict.faults[0][0]
+            ended = reason or f"a goal was reached at {planner.time_of(self.tick):.6g} s"
+            reason = "; ".join([*(said for _, said in verdict.faults), ended])
         return RoadDrive(
             planner=planner,
             steps=tuple(self.done),
             driven=driven,
-            reached=reached,
+            reached=status == "reached",
             status=status,
             reason=reason,
-            verdict=judged(scene, planner.vehicle, driven),
+            verdict=verdict,
         )
 
 
@@ -192,7 +196,7 @@ def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
     )
     pose = (SE2(state[:3]) @ SE2(course.pose[-1])).pose
     speed, steering = course.reduced_state[-1].tolist()
-    return np.array([*pose, max(speed, 0.0), steering])  # rounding at rest
+    return np.array([*pose, 0.0 if abs(speed) <= AT_REST else speed, steering])
 
 
 def _stood(steps: Sequence[RoadStep]) -> tuple[float, float] | None:

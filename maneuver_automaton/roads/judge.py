@@ -46,9 +46,19 @@ class RoadVerdict:
         return self.edge_m <= too_close(0.0)
 
     @property
+    def faults(self) -> tuple[tuple[str, str], ...]:
+        """Status and words of each: touched | off_road | undrivable, in this order."""
+        found = [("touched", f"collision with {name}") for name in self.hit]
+        if self.off_road:
+            found.append(("off_road", "off the road: a part of the body was outside the lanelets"))
+        if not self.audit.passed:
+            found.append(("undrivable", f"the model cannot drive it: {self.audit.reason}"))
+        return tuple(found)
+
+    @property
     def clean(self) -> bool:
         """Whether no road user was touched, the road not left, and the model obeyed."""
-        return self.audit.passed and not self.collisions and not self.off_road
+        return not self.faults
 
 
 def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:

@@ -215,9 +215,9 @@ class RoadPlanner:
         """
         library, settings = self.library, self.settings
         until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)
-        if until <= tick:
-            return None
         x, y, heading, speed, steering = state.tolist()
+        if until <= tick or speed < 0.0:  # the library knows no motion from backward travel
+            return None
         width = min(settings.narrow, settings.width) if narrow else settings.width
         task = HorizonTask(
             x=x,
@@ -315,8 +315,9 @@ class RoadPlanner:
     def _emergency(self, state: Array, tick: int) -> RoadDecision:
         """Full braking straight on, free or not."""
         braking, speeds = self.vehicle.model.max_acceleration, [float(state[3])]
-        while speeds[-1] > 0.0:
-            speeds.append(max(speeds[-1] - braking * self.tick, 0.0))
+        while speeds[-1]:
+            left = max(abs(speeds[-1]) - braking * self.tick, 0.0)
+            speeds.append(math.copysign(left, speeds[-1]))
         rates = np.diff(speeds) / self.tick
         controls = np.stack([rates, np.zeros_like(rates)], axis=-1).reshape(-1, 2)
         if not len(controls):

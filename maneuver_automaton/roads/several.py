@@ -198,7 +198,7 @@ def _checked(
             for name, one in kept.items()
             if one.plan is not None
         }
-        worst = None
+        worst, said = None, ""
         for name, one in kept.items():
             if one.plan is None:
                 continue
@@ -206,10 +206,10 @@ def _checked(
             past = replace(scenes[name], traffic=(*scenes[name].traffic, *others))
             kept[name] = one = replace(one, verdict=judged(past, vehicle, one.plan))
             if one.verdict is not None and not one.verdict.clean:
-                worst = name
+                worst, said = name, "; ".join(words for _, words in one.verdict.faults)
         if worst is None:
             return kept
-        reason = "its plan fails the judge past the others"
+        reason = f"its plan fails the judge past the others: {said}"
         kept[worst] = replace(kept[worst], plan=None, verdict=None, reason=reason)
 
 

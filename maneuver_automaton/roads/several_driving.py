@@ -33,6 +33,8 @@ from maneuver_automaton.roads.several import (
 )
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
+WORST_FIRST = ("touched", "off_road", "undrivable", "missed", "steps_spent", "reached")
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadFleetDrive:
@@ -57,9 +59,8 @@ class RoadFleetDrive:
 
     @property
     def status(self) -> str:
-        """Of those that did not reach a goal: missed | steps_spent; else reached."""
-        late = [one.status for one in self.results.values() if not one.reached]
-        return "reached" if not late else "missed" if "missed" in late else late[0]
+        """The worst of all: touched, off_road, undrivable, missed, steps_spent, reached."""
+        return min((one.status for one in self.results.values()), key=WORST_FIRST.index)
 
     @property
     def reason(self) -> str:

@@ -122,7 +122,8 @@ def _searched(planner: RoadPlanner) -> RoadPlanResult:
         plan = planner.plan_of(planner.start_state, found.controls[: found.lasting])
         verdict = judged(planner.scene, planner.vehicle, plan)
         if not verdict.clean:
-            reason = "the plan that was found fails the judge"
+            said = "; ".join(words for _, words in verdict.faults)
+            reason = f"the plan that was found fails the judge: {said}"
     none = bool(reason)
     return RoadPlanResult(
         planner=planner,

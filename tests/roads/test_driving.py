@@ -88,11 +88,13 @@ def test_a_car_at_rest_with_no_way_on_stands_and_says_so(tmp_path):
     walls = [parked(3, x=33.6, y=2.0, size=(1.0, 4.0)), parked(4, x=30.0, y=4.6, size=(9.0, 0.5))]
     start = problem(goal=ANY, x=30.0, speed=0.0)
     drive = driven(scene_of(tmp_path, LANES[0], *walls, behind, start))
-    assert drive.reached
+    assert drive.status == "touched"
+    assert drive.reason == "collision with car 8; a goal was reached at 3 s"
     goal = GOAL.replace(interval("orientation", -0.2, 0.2), interval("orientation", 1.0, 1.2))
     start = problem(goal=goal, x=30.0, speed=0.0)
     drive = driven(scene_of(tmp_path, *LANES, *walls, behind, start))
-    assert drive.status == "missed"
+    assert drive.status == "touched"
+    assert drive.reason.startswith("collision with car 8; no goal was reached until 4 s, ")
     stood = [step for step in drive.steps if step.decision.stands]
     assert stood
     assert all(step.control.tolist() == [0.0, 0.0] for step in stood)
@@ -219,6 +221,49 @@ def test_a_moved_scene_has_the_moved_drive(tmp_path):
     difference = moved - there.driven.switching_poses
     difference[:, 2] = np.remainder(difference[:, 2] + np.pi, 2 * np.pi) - np.pi
     assert np.abs(difference).max() < 1e-7
+
+
+FREE = "<goalState>" + interval("time", 15, 40) + "</goalState>"
+
+
+@pytest.mark.parametrize(
+    ("traffic", "start", "status", "said"),
+    [
+        ([car(7, x=31.0, y=2.5, speed=4.0, steps=45)], {}, "touched", "collision with car 7"),
+        (
+            [car(8, x=18.0, y=2.0, speed=9.0, steps=45), parked(3, x=36.0, y=4.0, size=(2, 8))],
+            {"speed": 0.0},
+            "touched",
+            "collision with car 8",
+        ),
+        ([], {"y": 7.8}, "off_road", "off the road: a part of the body was outside the lanelets"),
+        ([], {"speed": -3.0}, "undrivable", "the model cannot drive it: speed is 3 beyond its "),
+        ([], {"speed": 60.0}, "undrivable", "the model cannot drive it: speed is 9.2 beyond its "),
+    ],
+)
+def test_the_judge_decides_how_a_drive_ended(tmp_path, traffic, start, status, said):
+    start = {"x": 30.0, "speed": 8.0} | start
+    drive = driven(scene_of(tmp_path, *LANES, *traffic, problem(goal=FREE, **start)))
+    assert (drive.reached, drive.status) == (False, status)
+    assert drive.reason.startswith(said)
+    assert drive.reason.endswith("; a goal was reached at 1.5 s")
+    speeds = drive.driven.sample().reduced_state[:, 0]
+    assert np.abs(np.diff([step.state[3] for step in drive.steps])).max() <= 0.8 + 1e-9
+    assert speeds[0] == start["speed"]
+
+
+@needs_data
+@pytest.mark.parametrize(
+    ("name", "status"),
+    [
+        ("hit-at-start", "touched"),
+        ("negative-speed-at-start", "undrivable"),
+        ("start-off-road", "off_road"),
+    ],
+)
+def test_files_of_others_end_as_the_judge_says(name, status):
+    scene = ma.load_scenario(DATA / "field" / "roads" / f"{name}.xml").scene
+    assert driven(scene).status == status
 
 
 def test_one_plan(tmp_path):

@@ -193,7 +193,7 @@ def _(result: RoadPlanResult) -> dict[str, Any]:
 def _(drive: RoadDrive) -> dict[str, Any]:
     verdict = drive.verdict
     facts = [
-        ("goal", "reached" if drive.reached else "not reached"),
+        ("goal", drive.status.replace("_", " ")),
         ("duration", f"{drive.driven.duration:.5g} s"),
         ("steps", f"{len(drive.steps)}, {sum(one.replanned for one in drive.steps)} replanned"),
         ("clearance", f"{verdict.clearance_m:.3g} m"),
