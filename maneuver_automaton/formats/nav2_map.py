@@ -47,7 +47,7 @@ class _Header:
     negate: bool
     occupied: float
     free: float
-    raw: bool
+    mode: str  # one of MODES
 
 
 def is_nav2_map(document: Document) -> bool:
@@ -146,7 +146,7 @@ def _header(document: Document) -> _Header:
         raise document.error(("image",), f"got {shown(image)}, need the name of an image file")
     if not (isinstance(origin, list) and len(origin) == 3):
         raise document.error(("origin",), f"got {shown(origin)}, need [x, y, yaw]")
-    if not isinstance(mode, str) or mode not in MODES:
+    if not isinstance(mode, str) or mode.lower() not in MODES:
         raise document.error(("mode",), f"got {shown(mode)}, need one of {', '.join(MODES)}")
     resolution = _number(document, ("resolution",))
     check_cell(resolution, at=f"{document.name}:{document.line_of(('resolution',))}: resolution")
@@ -164,7 +164,7 @@ def _header(document: Document) -> _Header:
         negate=_negate(document),
         occupied=occupied,
         free=free,
-        raw=mode == "raw",
+        mode=mode.lower(),
     )
 
 
@@ -206,7 +206,7 @@ def _from_home(name: str) -> Path:
 
 def _blocked(image: GreyImage, header: _Header, *, unknown: Unknown) -> NDArray[np.bool_]:
     """Blocked cells, the first row at the top."""
-    if header.raw:
+    if header.mode == "raw":
         occupancy: Array = np.round(image.shade * 255.0) / 100.0
         known = occupancy <= 1.0
     else:

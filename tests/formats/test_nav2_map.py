@@ -66,6 +66,13 @@ def test_scale_counts_as_trinary(tmp_path):
     assert load_nav2_map(room(tmp_path, HEADER + "mode: scale\n")).blocked.tolist() == trinary
 
 
+@pytest.mark.parametrize("mode", ["trinary", "scale", "raw"])
+def test_the_case_of_the_mode_does_not_count(tmp_path, mode):
+    plain = load_nav2_map(room(tmp_path, HEADER + f"mode: {mode}\n")).blocked.tolist()
+    for word in (mode.capitalize(), mode.upper(), mode[0] + mode[1:].upper()):
+        assert load_nav2_map(room(tmp_path, HEADER + f"mode: {word}\n")).blocked.tolist() == plain
+
+
 def test_raw_values_are_percent(tmp_path):
     path = room(tmp_path, HEADER + "mode: raw\n", bytes([*b"P5 5 1 255\n", 0, 30, 65, 100, 101]))
     assert load_nav2_map(path).blocked.tolist() == [[False, True, True, True, True]]
