@@ -168,6 +168,7 @@ class PlanTask:
             gap=self.settings.gap,
             watch=self.shown.watch if told else None,
             on_better=self.shown.better if told else None,
+            leave=self.settings.leave,
         )
         return self._answered(result)
 

@@ -193,6 +193,10 @@ def plan(
     style: Style = "screen",
     html: Html = False,
     dask: Dask = None,
+    leave: Annotated[
+        bool,
+        typer.Option("--leave", help="Leave a start in contact first, by the shortest coast."),
+    ] = False,
 ) -> int:
     """Plan the problem of a file, or of every file of a folder.
 
@@ -211,6 +215,7 @@ def plan(
         html=html,
         quiet=quiet,
         gap=gap,
+        leave=leave,
         jobs=1 if file.is_dir() else jobs,
         scheduler=None if file.is_dir() else dask,
         look=LookOptions(title=title, size=size, style=style),

@@ -27,6 +27,8 @@ PICTURES = (
 def plan_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Plan one problem into the folder `out`, print the plan, return the exit code."""
     if road_command.is_road(path):
+        if settings.leave:
+            raise _needs_one(path)
         if settings.scheduler is not None:
             raise _needs_several(path)
         if road_fleets.states_several(path, parts):
@@ -70,6 +72,8 @@ def _task(path: Path, parts: Parts, settings: Settings) -> Task:
         if settings.scheduler is not None:
             raise _needs_several(path)
         return PlanTask.of(found, settings)
+    if settings.leave:
+        raise _needs_one(path)
     check_address(settings.scheduler)
     from maneuver_automaton.cli.fleets import FleetTask
 
@@ -79,6 +83,12 @@ def _task(path: Path, parts: Parts, settings: Settings) -> Task:
 def _needs_several(path: Path) -> InvalidScenario:
     return InvalidScenario(
         f"--dask: {path} is planned in one process, need a folder, or several vehicles"
+    )
+
+
+def _needs_one(path: Path) -> InvalidScenario:
+    return InvalidScenario(
+        f"--leave: is for one vehicle off the road, but {path} is no such; omit it"
     )
 
 

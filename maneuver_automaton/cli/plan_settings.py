@@ -20,6 +20,7 @@ class Settings:
     html: bool = False
     quiet: bool = False
     gap: float | None = None  # share of the cost, None: nothing is proven beside the search
+    leave: bool = False  # a start in contact is left first
     jobs: int = 1  # processes for one fleet
     scheduler: str | None = None  # of Dask, for one fleet
     look: LookOptions = field(default_factory=LookOptions)

@@ -114,7 +114,7 @@ def print_result(name: str, result: PlanResult, *, folder: str, share: bool = Fa
         "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
         "timing": ", ".join(f"{spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
         "counts": ", ".join(f"{spoken(k)} {n}" for k, n in result.counts.items()),
-        "left out": "; ".join(result.notes),
+        "notes": "; ".join(result.notes),
         "written to": folder,
     }
     print_facts(facts)

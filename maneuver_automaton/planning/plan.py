@@ -31,6 +31,7 @@ def plan(
     gap: float | None = None,
     watch: Watch | None = None,
     on_better: Callable[[PlanResult], None] | None = None,
+    leave: bool = False,
 ) -> PlanResult:
     """Cheapest plan found for `problem`, audited by an integration of its own.
 
@@ -49,6 +50,9 @@ def plan(
         Where to look, from another thread, for the cost and the bound meanwhile.
     on_better : callable, optional
         Called with each plan that is better than those before, audited; what it takes counts.
+    leave : bool
+        Whether a start that touches something is left first, by the shortest coast out of it; the
+        `notes` of the result say so. Of a kinematic vehicle in a plane where nothing moves.
 
     Returns
     -------
@@ -70,6 +74,11 @@ def plan(
     >>> result.plan.word, round(result.cost, 4), result.audit.passed
     (('spin', 'ahead', 'spin'), 7.6974, True)
     """
+    if leave:
+        from maneuver_automaton.planning.leaving import plan_leaving
+
+        search = functools.partial(plan, gap=gap, watch=watch)
+        return plan_leaving(problem, search, time_limit=time_limit)
     workspace = workspace_of(problem.obstacles)
     if on_better is not None:
         watch = watch or Watch(gap=-math.inf)

@@ -1,0 +1,261 @@
+"""Plans that begin in contact: the shortest coast out of it first, then a plan as any other.
+
+How deep the body is in an obstacle is how far it would have to be pushed at least: the distance of
+its position from the border of the Minkowski difference of obstacle and body. On its way out it
+gets no deeper into anything that it touched at the start, and touches nothing else.
+"""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import AnyObstacle, OccupancyMap
+from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.surroundings import fastest_point, parts_of, runs_of
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.planning.blocked import where_touched
+from maneuver_automaton.planning.checking import check_plan
+from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.search.inside import outside
+
+STEP, SLACK, LEAST = 0.02, 0.01, 1e-3  # of the body's radius: a sample, what it ends clear by; [m]
+FARTHEST = 12.0  # body radii that a way out is long at most, and what is touched across
+DEEPER = 1e-9  # [m] of rounding
+EVERY = 5  # samples of a first trim after which a second one is tried
+MOST_WAYS, MOST_SECONDS = 4, 24  # ways out from which is planned; trims that may be second
+
+
+def plan_leaving(
+    problem: Problem, plan: Callable[..., PlanResult], *, time_limit: float
+) -> PlanResult:
+    """The plan of a problem whose start touches something, by `plan` from where it is left."""
+    deadline = time.perf_counter() + time_limit
+    held = [
+        k
+        for k, one in enumerate(problem.obstacles)
+        if where_touched(replace(problem, obstacles=(one,)), problem.start, problem.start_time)
+    ]
+    if not held or outside(problem.start, problem.bounds):
+        return plan(problem, time_limit=time_limit)
+    refused = [
+        (problem.moves, "an obstacle moves"),
+        (not problem.automaton.is_kinematic, "the vehicle has inertia, or its library maneuvers"),
+        (problem.start.size > 3, "the vehicle flies"),
+        (bool(problem.parts), "the vehicle carries something"),
+        (problem.horizon.time is not None, "the time is fixed"),
+    ]
+    if any(one for one, _ in refused):
+        why = next(words for one, words in refused if one)
+        return _blocked(problem, f"no way out is looked for where {why}")
+    touched = [problem.obstacles[k] for k in held]
+    rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in held)
+    others = replace(problem, obstacles=rest)
+    contact, none = _Contact(problem, touched), None
+    for way in _ways_out(problem, contact)[:MOST_WAYS]:
+        first = Plan(
+            problem.start, way.trims, durations=way.durations, start_time=problem.start_time
+        )
+        goal = Goal(pose=first.end)
+        alone = replace(others, goals=(goal,), horizon=Horizon(), start_trim=None)
+        if not check_plan(alone, first, goal).passed:
+            continue
+        left = deadline - time.perf_counter()
+        if none is not None and left <= 0.0:
+            break
+        last = plan(_after(problem, first), time_limit=max(left, LEAST))
+        none = none or last
+        whole = _joined(first, last.plan)
+        if last.plan is None or last.goal_index is None or whole is None:
+            continue
+        checked = check_plan(others, whole, problem.goals[last.goal_index])
+        if checked.audit is None or not checked.passed:
+            continue
+        apart = [
+            one for one in (last.clearance_m, checked.audit.min_clearance_m) if one is not None
+        ]
+        names = [one.name or f"obstacle {k}" for k, one in zip(held, touched, strict=True)]
+        note = (
+            f"left the start, which touches {' and '.join(names)} ({contact.depth:.3g} m deep, the "
+            f"margin included), by {way.length:.3g} m of {' - '.join(first.word)} in "
+            f"{first.duration:.3g} s: never deeper, clear of all else; the audit admits this "
+            "contact alone, and clearance counts from there"
+        )
+        return replace(
+            last,
+            problem=problem,
+            plan=whole,
+            cost=problem.cost_of(whole),
+            lower_bound=None,
+            gap=None,
+            bound=None,
+            certificate=None,
+            clearance_m=min(apart, default=None),
+            audit=replace(checked.audit, min_clearance_m=min(apart, default=None)),
+            improvements=(),
+            notes=(*last.notes, note),
+        )
+    if none is None:
+        return _blocked(problem, "no coast of one trim or two leads out, clear of all else")
+    said = none.reason or "no plan from where the contact is left passes the checks"
+    # Nothing is proven of other ways out.
+    kept = none.status in (PlanStatus.GOAL_BLOCKED, PlanStatus.OUT_OF_BUDGET)
+    status = none.status if kept else PlanStatus.NO_PLAN
+    return PlanResult(problem=problem, status=status, reason=said, notes=none.notes)
+
+
+def _blocked(problem: Problem, why: str) -> PlanResult:
+    said = where_touched(problem, problem.start, problem.start_time)
+    reason = f"at the start {said}; {why}"
+    return PlanResult(problem=problem, status=PlanStatus.START_BLOCKED, reason=reason)
+
+
+def _after(problem: Problem, first: Plan) -> Problem:
+    """What is left to plan once the first trims are driven."""
+    horizon = problem.horizon
+    if horizon.max_trims is not None:
+        horizon = replace(horizon, max_trims=max(horizon.max_trims - len(first.trims), 1))
+    if horizon.max_time is not None:
+        left = max(horizon.max_time - first.duration, LEAST)
+        horizon = replace(horizon, max_time=left)
+    begin = first.start_time + first.duration
+    return replace(problem, start=first.end, start_time=begin, start_trim=None, horizon=horizon)
+
+
+def _joined(first: Plan, then: Plan | None) -> Plan | None:
+    """One plan of two that follow each other; equal trims where they meet are one."""
+    if then is None:
+        return None
+    trims, durations = [*first.trims, *then.trims], [*first.durations, *then.durations]
+    k = len(first.trims)
+    if then.trims and trims[k - 1].name == trims[k].name:
+        durations[k - 1] += durations.pop(k)
+        del trims[k]
+    return Plan(first.start, tuple(trims), durations=durations, start_time=first.start_time)
+
+
+class _Way(NamedTuple):
+    """Trims that lead out of a contact."""
+
+    length: float  # [m] that the fastest point of the body goes
+    trims: tuple[Trim, ...]
+    durations: tuple[float, ...]  # [s]
+
+
+class _Contact:
+    """What the body touches at the start of a problem, all seen from there, unturned."""
+
+    def __init__(self, problem: Problem, touched: list[AnyObstacle]) -> None:
+        body = body_of(problem.footprint)
+        self.step = max(STEP * body.reach, LEAST)
+        self.clear = problem.margin + max(SLACK * body.reach, LEAST)
+        self.body = [piece for shape in problem.footprint for piece in convex_pieces(shape)]
+        self.body = self.body or [(np.zeros((1, 2)), 0.0)]
+        self.parts, self.start = parts_of(problem.footprint), problem.start
+        away = SE2(np.array([-problem.start[0], -problem.start[1], 0.0]))
+        self.most = FARTHEST * max(body.reach, self.clear)
+        near = self.most + 2.0 * body.reach + self.clear
+        self.solids = [_solids(one.moved(away), near) for one in touched]
+        corners = [np.concatenate([corners for corners, _ in one]) for one in self.solids]
+        self.most += max(float(np.ptp(one, axis=0).max()) for one in corners)
+        self.depth = problem.margin - float(self.off(self.start).min())
+
+    def off(self, pose: Array) -> Array:
+        """Distance of the body to each obstacle; where they overlap, less the depth [m]."""
+        import shapely
+
+        place = shapely.Point(pose[:2] - self.start[:2])
+        areas = self._areas(float(pose[2]))
+        return np.array(
+            [one.distance(place) or -float(shapely.distance(one.boundary, place)) for one in areas]
+        )
+
+    @functools.lru_cache(maxsize=64)  # noqa: B019, it ends with the query
+    def _areas(self, heading: float) -> list[Any]:
+        """Positions in which the body overlaps each obstacle."""
+        import shapely
+
+        turned = [(SE2(np.array([0.0, 0.0, heading])).act(p), r) for p, r in self.body]
+        return [
+            shapely.union_all(
+                [
+                    shapely.MultiPoint((solid[:, None] - ring).reshape(-1, 2)).convex_hull.buffer(
+                        r + s
+                    )
+                    for solid, s in solids
+                    for ring, r in turned
+                ]
+            )
+            for solids in self.solids
+        ]
+
+    def coast(self, trim: Trim, begin: Array) -> Iterator[tuple[float, Array, bool]]:
+        """Times, poses, and whether it is clear there, as long as it gets no deeper."""
+        speed = self.speed_of(trim)
+        before = self.off(begin)
+        for n in range(1, int(self.most / self.step) if speed > 0.0 else 0):
+            after = n * self.step / speed
+            here = trim.coast(SE2(begin), after).pose
+            off = self.off(here)
+            if after > trim.max_duration or (off < np.minimum(before, self.clear) - DEEPER).any():
+                return
+            yield after, here, bool((off >= self.clear).all())
+            before = off
+
+    def speed_of(self, trim: Trim) -> float:
+        """Speed that no point of the body exceeds [m/s]."""
+        return float(fastest_point(self.parts, trim.body_velocity[None])[0])
+
+
+def _solids(obstacle: AnyObstacle, near: float) -> list[tuple[Array, float]]:
+    """Convex pieces (corners, rounding) of an obstacle; of a map, those `near` the origin [m]."""
+    import shapely
+
+    if not isinstance(obstacle, OccupancyMap):
+        return convex_pieces(obstacle.shape)
+    around = shapely.Point(0.0, 0.0).buffer(near)
+    return [
+        (shapely.get_coordinates(run)[:-1], 0.0)
+        for run in runs_of(obstacle)
+        if run.intersects(around)
+    ]
+
+
+def _ways_out(problem: Problem, contact: _Contact) -> list[_Way]:
+    """Ways out, the shortest first: of one trim, or of two where there is none of one."""
+    trims, ways = problem.automaton.trims, []
+    begun: list[tuple[_Way, Array]] = [(_Way(0.0, (), ()), problem.start)]
+    for _ in range(2):
+        middles = []
+        for way, begin in begun:
+            for trim in trims:
+                for n, (after, pose, clear) in enumerate(contact.coast(trim, begin)):
+                    length = way.length + contact.speed_of(trim) * after
+                    longer = _Way(length, (*way.trims, trim), (*way.durations, after))
+                    if clear and after >= problem.horizon.min_coast:
+                        ways.append(longer)
+                        break
+                    if n % EVERY == 0:
+                        middles.append((longer, pose))
+        if ways:
+            break
+        trims = trims[:: -(-len(trims) // MOST_SECONDS)]
+        begun = middles
+    order = {trim.name: k for k, trim in enumerate(problem.automaton.trims)}
+    rates = dict(zip(order, problem.rates.tolist(), strict=True))
+
+    def rank(way: _Way) -> tuple[float, float, int]:
+        spent = sum(rates[t.name] * d for t, d in zip(way.trims, way.durations, strict=True))
+        return round(way.length, 9), round(spent, 9), order[way.trims[0].name]
+
+    return sorted(ways, key=rank)
