@@ -48,8 +48,8 @@ fleet: {between_m: 0.1, time_limit_s: 1}
 QUICK = ("--no-plot", "--time-limit", "0.5")
 KEYS = [
     "schema", "version", "kind", "name", "status", "reason", "notes", "objective", "cost",
-    "alone_cost", "sum_s", "last_s", "lower_bound", "gap", "clearance_m", "closest", "order", "improvements",
-    "timing_s", "counts", "vehicles",
+    "alone_cost", "sum_s", "last_s", "lower_bound", "gap", "clearance_m", "closest", "order",
+    "improvements", "timing_s", "counts", "vehicles",
 ]  # fmt: skip
 
 

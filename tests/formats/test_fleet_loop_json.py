@@ -25,8 +25,8 @@ from tests.fleet.robots import crossing
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 KEYS = [
     "schema", "version", "kind", "name", "status", "reason", "notes", "reached", "cost",
-    "duration_s", "step_s", "sum_s", "last_s", "clearance_m", "closest", "collisions", "broken_guarantees",
-    "counts", "vehicles", "steps",
+    "duration_s", "step_s", "sum_s", "last_s", "clearance_m", "closest", "collisions",
+    "broken_guarantees", "counts", "vehicles", "steps",
 ]  # fmt: skip
 LOOPS = {
     "calm": {},
