@@ -261,6 +261,18 @@ def _beyond_limits(drive: Drive) -> list[str]:
             size = max([1.0, *(abs(limit) for limit in (low, high) if math.isfinite(limit))])
             if excess > LIMIT_TOLERANCE * size:
                 reasons.append(f"{name} is {excess:.3g} beyond its limits [{low:.6g}, {high:.6g}]")
+    limit = getattr(model, "max_lateral_acceleration", None)
+    if limit is not None:
+        spans, _ = drive.between_samples()
+        twists = drive.twists_at(
+            np.tile(spans.element, 3),
+            np.concatenate([spans.begin, 0.5 * (spans.begin + spans.end), spans.end]),
+        )
+        across = float((np.hypot(twists[:, 0], twists[:, 1]) * np.abs(twists[:, 2])).max())
+        if across - limit > LIMIT_TOLERANCE * max(1.0, limit):
+            reasons.append(
+                f"the lateral acceleration is {across:.6g} m/s^2, beyond {limit:g} m/s^2"
+            )
     return reasons
 
 

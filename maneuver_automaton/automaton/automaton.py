@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -17,6 +18,11 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import picture
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
+from maneuver_automaton.models.lateral import (
+    is_too_sharp,
+    lateral_acceleration,
+    lateral_limit,
+)
 from maneuver_automaton.primitives import Maneuver, Trim, trims_of
 from maneuver_automaton.primitives.bang_bang import Pairs, has_limited_rates
 from maneuver_automaton.primitives.in_world import maneuver_in_world, trim_in_world
@@ -82,6 +88,24 @@ class Automaton:
                 )
         for maneuver in self.maneuvers:
             _check_fit(maneuver, self[maneuver.source], self[maneuver.target])
+        if math.isfinite(lateral_limit(self.model)):
+            self._check_lateral()
+
+    def _check_lateral(self) -> None:
+        """Refuse what exceeds the lateral acceleration of the vehicle."""
+        named = [(f"trim {one.name!r}", one.body_velocity) for one in self.trims]
+        named += [
+            (f"maneuver {one.name!r}", one.course.twists(self.model))
+            for one in self.maneuvers
+            if one.course is not None
+        ]
+        for what, twists in named:
+            if is_too_sharp(self.model, twists).any():
+                raise InvalidAutomaton(
+                    f"{what}: has a lateral acceleration of "
+                    f"{float(lateral_acceleration(twists).max()):.4g} m/s^2, need at most the "
+                    f"vehicle's max_lateral_acceleration {lateral_limit(self.model):g} m/s^2"
+                )
 
     def _repr_png_(self) -> bytes | None:
         return picture(self)
@@ -161,7 +185,8 @@ class Automaton:
         max_lateral_acceleration : float, optional
             Greatest speed times turn rate of a trim [m/s^2]; no limit if None.
         leave_out : bool
-            Whether points without a trim are left out; otherwise they are refused.
+            Whether points without a trim are left out; otherwise they are refused. Those beyond
+            the lateral acceleration of the vehicle itself always are.
 
         Raises
         ------
@@ -182,10 +207,11 @@ class Automaton:
         (9, 46)
         """
         found = trims_of(model, grid, max_lateral_acceleration=max_lateral_acceleration)
-        if found.missing and not (leave_out and found.trims):
-            first, n = found.missing[0], len(found.trims) + len(found.missing)
+        missing = [one for one in found.missing if not (one.sharp and found.trims)]
+        if missing and not (leave_out and found.trims):
+            first, n = missing[0], len(found.trims) + len(found.missing)
             raise InvalidAutomaton(
-                f"grid: {len(found.missing)} of {n} points have no trim, such as "
+                f"grid: {len(missing)} of {n} points have no trim, such as "
                 f"{first.name!r}: {first.reason}"
             )
         if isinstance(in_world(model), OnlyTranslated):
@@ -202,7 +228,8 @@ class Automaton:
     def of_grid(cls, model: Model, axes: Sequence[ArrayLike]) -> Automaton:
         """Automaton with one trim per point of the grid of controls spanned by `axes`.
 
-        Trims are named after their controls: ``"speed 0.5, turn_rate -1"``.
+        Trims are named after their controls: ``"speed 0.5, turn_rate -1"``. Points beyond the
+        lateral acceleration of the vehicle are left out.
 
         Examples
         --------
@@ -216,6 +243,12 @@ class Automaton:
                 f"{', '.join(model.control_names)} of the {model.name}"
             )
         rows = [as_array(f"grid: axis {k}", axis).ravel() + 0.0 for k, axis in enumerate(axes)]
+        points = np.array([*product(*(row.tolist() for row in rows))])
+        if math.isfinite(lateral_limit(model)):
+            for k, row in enumerate(points):
+                _checked_control(model, f"grid point {k}", row)
+            sharp = is_too_sharp(model, model.body_velocity(points[:, :0], points))
+            points = points if sharp.all() else points[~sharp]  # if all are, one is refused by name
         return cls.of_controls(
             model,
             {
@@ -223,7 +256,7 @@ class Automaton:
                     f"{what} {value:.10g}"
                     for what, value in zip(model.control_names, point, strict=True)
                 ): point
-                for point in product(*(row.tolist() for row in rows))
+                for point in points.tolist()
             },
         )
 

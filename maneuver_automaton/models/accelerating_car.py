@@ -38,6 +38,8 @@ class AcceleratingCar:
         Greatest speed [m/s], greatest rate of it up and down [m/s^2].
     min_speed : float, optional
         Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
 
     Examples
     --------
@@ -51,6 +53,7 @@ class AcceleratingCar:
     max_speed: float  # [m/s]
     max_acceleration: float  # [m/s^2]
     min_speed: float | None = None  # [m/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "accelerating_car"
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering")
@@ -64,6 +67,7 @@ class AcceleratingCar:
             max_steering=self.max_steering,
             max_speed=self.max_speed,
             max_acceleration=self.max_acceleration,
+            max_lateral_acceleration=self.max_lateral_acceleration,
         )
         check_steering(self.name, self.max_steering)
         speed_limits(self.name, self.min_speed, self.max_speed)

@@ -30,6 +30,8 @@ class Car:
         Greatest steering angle to either side, less than pi / 2 [rad]; pi / 2 itself if None.
     max_speed : float, optional
         Greatest speed, forward and in reverse [m/s]; no limit if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
 
     Examples
     --------
@@ -43,6 +45,7 @@ class Car:
     wheelbase: float  # [m]
     max_steering: float | None = None  # [rad]
     max_speed: float | None = None  # [m/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "car"
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
@@ -52,7 +55,12 @@ class Car:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.wheelbase) and self.wheelbase > 0.0):
             raise ValueError(f"car: wheelbase must be positive, got {self.wheelbase} m")
-        check_positive(self.name, max_steering=self.max_steering, max_speed=self.max_speed)
+        check_positive(
+            self.name,
+            max_steering=self.max_steering,
+            max_speed=self.max_speed,
+            max_lateral_acceleration=self.max_lateral_acceleration,
+        )
         if self.max_steering is not None:
             check_steering(self.name, self.max_steering)
 

@@ -40,6 +40,8 @@ class CarWithTrailer:
         Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
     max_hitch : float, optional
         Greatest angle at the hitch to either side [rad]; no limit if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
 
     Examples
     --------
@@ -56,6 +58,7 @@ class CarWithTrailer:
     max_speed: float  # [m/s]
     min_speed: float | None = None  # [m/s]
     max_hitch: float | None = None  # [rad]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "car_with_trailer"
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
@@ -70,6 +73,7 @@ class CarWithTrailer:
             max_steering=self.max_steering,
             max_speed=self.max_speed,
             max_hitch=self.max_hitch,
+            max_lateral_acceleration=self.max_lateral_acceleration,
         )
         check_steering(self.name, self.max_steering)
         speed_limits(self.name, self.min_speed, self.max_speed)

@@ -44,6 +44,8 @@ class SecondOrderCar:
         Greatest rate of the steering angle to either side [rad/s].
     min_speed : float, optional
         Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
 
     Examples
     --------
@@ -61,6 +63,7 @@ class SecondOrderCar:
     max_acceleration: float  # [m/s^2]
     max_steering_rate: float  # [rad/s]
     min_speed: float | None = None  # [m/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "second_order_car"
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering_rate")
@@ -75,6 +78,7 @@ class SecondOrderCar:
             max_speed=self.max_speed,
             max_acceleration=self.max_acceleration,
             max_steering_rate=self.max_steering_rate,
+            max_lateral_acceleration=self.max_lateral_acceleration,
         )
         check_steering(self.name, self.max_steering)
         speed_limits(self.name, self.min_speed, self.max_speed)

@@ -56,6 +56,8 @@ class SingleTrack:
         Least speed for which the model is taken to hold, positive, and greatest speed [m/s].
     max_lateral_speed, max_turn_rate : float, optional
         Greatest lateral speed [m/s] and turn rate [rad/s] to either side; no limit if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
 
     Examples
     --------
@@ -78,6 +80,7 @@ class SingleTrack:
     max_speed: float = 50.8  # [m/s]
     max_lateral_speed: float | None = None  # [m/s]
     max_turn_rate: float | None = None  # [rad/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
     name: ClassVar[str] = "single_track"
     group: ClassVar[type[LieGroup]] = SE2
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering_rate")
@@ -101,6 +104,7 @@ class SingleTrack:
             max_speed=self.max_speed,
             max_lateral_speed=self.max_lateral_speed,
             max_turn_rate=self.max_turn_rate,
+            max_lateral_acceleration=self.max_lateral_acceleration,
         )
         check_steering(self.name, self.max_steering)
         speed_limits(self.name, self.min_speed, self.max_speed)

@@ -16,12 +16,14 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.problem import resampled
 from maneuver_automaton.optimal_control.rules import increments
 from maneuver_automaton.optimal_control.solution import SolveStatus
 from maneuver_automaton.optimal_control.transcription import STATUS, SolverSettings, ipopt_options
 
+WITHIN_GRIP = 1e-3  # share of the squared lateral acceleration that is kept between nodes
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
 
 
@@ -173,10 +175,20 @@ def transfer_program(
         + objective.smoothness * casadi.sumsqr(changes)
     )
     defects = casadi.vec(state[:, :-1] + added[:n_z, :] - state[:, 1:])
+    beyond = casadi.SX(0, 1)
+    if math.isfinite(lateral_limit(model)):
+        with numpy_on_symbols(casadi):  # with the control before and after each node
+            twists = [
+                model.velocity(casadi.vertsplit(z), casadi.vertsplit(held))[:3]
+                for z in (state[:, :-1], state[:, 1:])
+            ]
+        most = lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)
+        rows = [(v_x * v_x + v_y * v_y) * turn * turn / most - 1.0 for v_x, v_y, turn in twists]
+        beyond = casadi.vertcat(*map(casadi.vec, rows))
     functions = {
         "x": casadi.vertcat(casadi.vec(state), casadi.vec(control), duration),
         "f": cost,
-        "g": defects,
+        "g": casadi.vertcat(defects, beyond),
         "p": casadi.vec(ends),
     }
     solver = casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
@@ -239,7 +251,7 @@ def solve_transfer(
         p=controls.ravel(),
         lbx=bounds[:, 0],
         ubx=bounds[:, 1],
-        lbg=0.0,
+        lbg=np.where(np.arange(program.solver.size1_out("g")) < count * start.size, 0.0, -np.inf),
         ubg=0.0,
     )
     solve_s = time.perf_counter() - began

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -136,6 +137,18 @@ def _first(program: Program, point: Point, pairs: Pairs) -> Lines:
 def _both(program: Program, point: Point) -> tuple[list[Solid], list[Solid]]:
     """Solids of the body, and of the obstacles while the motion of a point is driven."""
     return program.scene.body, program.pieces(point).solids
+
+
+def held_near(program: Program, point: Point, within: float) -> list[IntArray]:
+    """For each guard of the scene the intervals (k,) in which the body comes nearer than so [m]."""
+    found = []
+    for guard in program.scene.guards:
+        if guard.solids is None:
+            found.append(np.arange(program.n_intervals))
+            continue
+        among = replace(program.scene, pieces=guard.solids, movers=())
+        found.append(np.unique(pairs_near(program._replace(scene=among), point, within).interval))
+    return found
 
 
 def pairs_near(program: Program, point: Point, within: float) -> Pairs:

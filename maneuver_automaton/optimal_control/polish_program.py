@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from maneuver_automaton.optimal_control.movers import Pieces
 from maneuver_automaton.optimal_control.paths import Frames, paths
 from maneuver_automaton.optimal_control.polish_values import (
     Ends,
+    Guard,
     Point,
     PolishSettings,
     Scene,
@@ -33,6 +35,7 @@ from maneuver_automaton.optimal_control.vehicles import moving_frame
 
 POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone
 LEAST_PACE, MOST_PACE = 0.02, 50.0  # of a phase, against the even pace of the guess
+STILL = 1e-9  # [m^2/s^2] that keeps the speed of a vehicle that drifts smooth at rest
 CURVED = 20.0  # times the tightening for reduced states that do not run straight
 
 
@@ -49,6 +52,7 @@ class Program(NamedTuple):
     blocks: tuple[Blocks, ...]
     path: Any  # function of one interval: states, control, step -> x and y of the control points
     paced: bool
+    model: Model
 
     @property
     def size(self) -> int:
@@ -124,7 +128,72 @@ def program_of(
         blocks=tuple(_blocks(problem, model, scene, settings, kinds, gears, count)),
         path=_path(casadi, model, scene),
         paced=paced,
+        model=model,
     )
+
+
+def _every(problem: OptimalControlProblem, count: int) -> IntArray:
+    """Numbers of the variables of each interval (n, count): both states, control, duration."""
+    n_x, n_u = problem.n_states, problem.n_controls
+    states = np.arange((count + 1) * n_x).reshape(count + 1, n_x).T
+    controls = (count + 1) * n_x + np.arange(count * n_u).reshape(count, n_u).T
+    duration = np.full((1, count), (count + 1) * n_x + count * n_u)
+    return np.vstack([states[:, :-1], states[:, 1:], controls, duration])
+
+
+def guard_blocks(program: Program, held: Sequence[IntArray]) -> list[Blocks]:
+    """What keeps the limits of each guard of the scene in the intervals where it is `held`."""
+    every, weight = _every(program.problem, program.n_intervals), program.settings.tightening
+    blocks = []
+    for guard, which in zip(program.scene.guards, held, strict=True):
+        if len(which):
+            limits = guard._replace(solids=None)
+            kind = _guard_kind(program.model, limits, weight, program.paced)
+            share = np.full(len(which), 1.0 / program.n_intervals)
+            blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
+    return blocks
+
+
+@functools.lru_cache(maxsize=16)
+def _guard_kind(model: Model, guard: Guard, tightening: float, paced: bool) -> Kind:
+    """One interval within the limits of a guard; the node where all begins gets no room.
+
+    The control points of the cubics with the same values and rates at both nodes keep them.
+    """
+    casadi = load_casadi()
+    dof, own = model.group.dof, len(model.control_names)
+    n_x = dof + len(model.reduced_names)
+    first, last = casadi.SX.sym("a", n_x), casadi.SX.sym("b", n_x)
+    control = casadi.SX.sym("u", own + int(paced))
+    duration, share, inner = casadi.SX.sym("T"), casadi.SX.sym("share"), casadi.SX.sym("inner")
+    third = duration * share * (control[own] if paced else 1.0) / 3.0
+    at_ends = len(_ends_in_rates(model)) < own  # otherwise the next interval has the last node
+    room, below = CURVED * tightening, []
+    with numpy_on_symbols(casadi):
+        for state, sign, node in ((first, 1.0, inner), (last, -1.0, 1.0)):
+            z, u = state[dof:], control[:own]
+            over = casadi.vertcat(*_over(casadi, model, guard, z, u))
+            rates = casadi.vertcat(*model.dynamics(casadi.vertsplit(z), casadi.vertsplit(u)))
+            slope = casadi.jtimes(over, z, casadi.SX(rates)) if z.numel() else 0.0
+            below.append(over + sign * third * slope + room)
+            if sign > 0.0 or at_ends:
+                below.append(over + node * room)
+    every = casadi.vertcat(first, last, control, duration)
+    return kind_of(casadi, every, casadi.vertcat(share, inner), below=casadi.vertcat(*below))
+
+
+def _over(casadi: Any, model: Model, guard: Guard, z: Any, u: Any) -> list[Any]:
+    """By how much a state and a control exceed each limit of a guard."""
+    v_x, v_y, turn = (
+        casadi.SX(v) for v in model.velocity(casadi.vertsplit(z), casadi.vertsplit(u))[:3]
+    )
+    aside = not v_y.is_zero()
+    speed = casadi.sqrt(v_x * v_x + v_y * v_y + STILL) if aside else v_x
+    over = [] if guard.reverse else [-v_x]
+    for size, most in ((speed, guard.speed), (speed * turn, guard.lateral)):
+        if math.isfinite(most):
+            over += [size - most, -size - most]
+    return over
 
 
 def _blocks(
@@ -136,11 +205,9 @@ def _blocks(
     gears: Array | None,
     count: int,
 ) -> list[Blocks]:
-    n_x, n_u, own = problem.n_states, problem.n_controls, len(model.control_names)
-    states = np.arange((count + 1) * n_x).reshape(count + 1, n_x).T
-    controls = (count + 1) * n_x + np.arange(count * n_u).reshape(count, n_u).T
-    duration = np.full((1, count), (count + 1) * n_x + count * n_u)
-    every = np.vstack([states[:, :-1], states[:, 1:], controls, duration])
+    n_x, own = problem.n_states, len(model.control_names)
+    every = _every(problem, count)
+    begins, controls = every[:n_x], every[2 * n_x : -1]
     share = np.full((1, count), 1.0 / count)
     found = [Blocks(kinds.stage, every, share)]
     if count > 1:
@@ -148,7 +215,7 @@ def _blocks(
                             np.zeros((0, count - 1))))  # fmt: skip
     for a, b, c in scene.walls:
         wall = np.tile(np.array([[a], [b], [c - settings.tightening]]), (1, count))
-        found.append(Blocks(kinds.place, states[:2, 1:-1], wall[:, 1:]))
+        found.append(Blocks(kinds.place, begins[:2, 1:], wall[:, 1:]))
         found.append(Blocks(kinds.swing, every, np.vstack([wall, share])))
     if gears is not None:
         signs = np.asarray(gears, dtype=np.float64)[None]

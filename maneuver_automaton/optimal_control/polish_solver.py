@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import functools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, assembled, kind_of
 from maneuver_automaton.optimal_control.parting import Parting
-from maneuver_automaton.optimal_control.polish_program import Program
+from maneuver_automaton.optimal_control.polish_program import Program, guard_blocks
 from maneuver_automaton.optimal_control.polish_values import Answer, Point, PolishSettings
 from maneuver_automaton.optimal_control.separation import PartPose
 from maneuver_automaton.optimal_control.solution import SolveStatus
@@ -75,6 +75,7 @@ def solver_of(
     program: Program,
     point: Point,
     parting: Parting,
+    held: Sequence[IntArray],
     *,
     fixed: bool,
     price: float,
@@ -88,6 +89,8 @@ def solver_of(
     point : Point
         Near which obstacles are where the motion of it meets them.
     parting : Parting
+    held : sequence of (k,) arrays
+        The intervals that keep the limits of each guard.
     fixed : bool
         Whether the lines stand still.
     price : float
@@ -101,7 +104,8 @@ def solver_of(
     inside = np.tile([0.0, np.inf], (program.n_intervals if elastic else 0, 1))
     bounds = np.vstack([program.bounds, free, inside])
     corners, places = _corners(program, point, parting)
-    blocks = [*program.blocks, *_line_blocks(program, parting, places, fixed, elastic)]
+    blocks = [*program.blocks, *guard_blocks(program, held)]
+    blocks += [*_line_blocks(program, parting, places, fixed, elastic)]
     if elastic:
         numbers = np.arange(len(bounds) - len(inside), len(bounds))[None]
         blocks.append(Blocks(_priced(price), numbers, np.zeros((0, numbers.size))))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -39,14 +40,24 @@ class PolishSettings:
     rounds: int = 8  # solves at most, with lines or margins added after each
 
 
+class Guard(NamedTuple):
+    """Limits of the twist, where any part of the body is in some solids, or everywhere."""
+
+    speed: float = math.inf  # [m/s]
+    lateral: float = math.inf  # [m/s^2] speed times turn rate
+    reverse: bool = True  # whether it may drive backwards
+    solids: tuple[Solid, ...] | None = None  # None: everywhere
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scene:
-    """The body, the obstacles around it, and half-planes for the reference point."""
+    """The body, the obstacles around it, half-planes for the reference point, and limits."""
 
     parts: tuple[BodyPart, ...] = ()
     pieces: tuple[Solid, ...] = ()
     movers: tuple[Mover, ...] = ()
     walls: tuple[tuple[float, float, float], ...] = ()  # (a, b, c): a x + b y <= c
+    guards: tuple[Guard, ...] = ()
 
     @property
     def body(self) -> list[Solid]:

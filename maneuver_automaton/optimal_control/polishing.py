@@ -9,10 +9,10 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Model
-from maneuver_automaton.optimal_control.parting import pairs_near, parted
+from maneuver_automaton.optimal_control.parting import held_near, pairs_near, parted
 from maneuver_automaton.optimal_control.polish_program import Program, program_of
 from maneuver_automaton.optimal_control.polish_solver import (
     WITHIN,
@@ -32,6 +32,7 @@ from maneuver_automaton.optimal_control.polish_values import (
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, resampled
 from maneuver_automaton.optimal_control.solution import SolveStatus
 
+HELD = 0.1  # radii of the body: where it comes nearer to a zone than this, it keeps its limits
 MISSED = 0.02  # radii of the body: pairs that came nearer than this need a line
 TOO_DEEP = 0.2  # radii of the body inside obstacles from where fixed planes lead nowhere
 PRICE = 2.0  # of being inside obstacles, in durations of the guess per radius of the body
@@ -93,6 +94,7 @@ def polish(
     reach = max((part.reach for part in scene.parts), default=0.0) or 0.5 * ahead or 1.0
     near = max(settings.near * reach, ahead)
     apart = parted(program, point, pairs_near(program, point, near))
+    held = held_near(program, point, HELD * reach)
     if fixed_planes and apart.depth(program, point) > TOO_DEEP * reach:
         why = "the guess is too deep inside obstacles for fixed planes"
         return _polished(point, _nothing(why), budget.elapsed - began)
@@ -106,7 +108,9 @@ def polish(
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
         if solver is None:
-            built = solver_of(program, point, apart, fixed=fixed_planes, price=price, budget=budget)
+            built = solver_of(
+                program, point, apart, held, fixed=fixed_planes, price=price, budget=budget
+            )
             if isinstance(built, float):
                 reason = f"no time was left: to build the program would take {built:.2g} s"
                 total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason=reason)
@@ -129,6 +133,12 @@ def polish(
         if trust > near and far > near and apart.lacks(missed):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
             continue
+        if not all(map(_covers, held, held_near(program, found, MISSED * reach))):
+            # it is in a zone where it was not, or for longer
+            wider = held_near(program, found, HELD * reach)
+            point, held = found, list(map(np.union1d, held, wider))
+            solver, begin = None, Begin.NEARBY
+            continue
         if _comes_and_goes(program, point, found):
             point, apart = found, parted(program, found, pairs_near(program, found, near))
             solver, begin = None, Begin.NEARBY
@@ -149,6 +159,11 @@ def polish(
         if apart is not moved:
             solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
     return _polished(best, total, max(budget.elapsed - began, needed))
+
+
+def _covers(held: IntArray, needed: IntArray) -> bool:
+    """Whether intervals hold all those that are needed."""
+    return bool(np.isin(needed, held).all())
 
 
 def _comes_and_goes(program: Program, before: Point, after: Point) -> bool:

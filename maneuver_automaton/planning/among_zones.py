@@ -25,6 +25,7 @@ from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.crossing import crossed_slowly, nearest_goal, polish_slowed
 from maneuver_automaton.planning.incumbents import Incumbents
@@ -67,12 +68,14 @@ def plan_among_zones(
                 found.offer(plan, goal_index)
         if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
             return replace(result, problem=problem)
-        if k == 0 and itself and result.plan is not None and not budget.is_over:
+        if k == 0 and itself and result.plan is not None:
+            polish_slowed(found, problem, result.plan, budget)
+        if k == 0 and itself and result.plan is not None and not (found.plans or budget.is_over):
             part = budget.part(CROSSED_SHARE, at_least=LEAST_TIME)
             crossed = crossed_slowly(problem, result.plan, search, part, workspace)
             if crossed is not None and found.may_check:
                 found.offer(*crossed)
-        elif k > 0 and question is not problem and first.plan is not None:
+        if k > 0 and question is not problem and first.plan is not None:
             polish_slowed(found, question, first.plan, budget)
     assert first is not None
     if found.plans:
@@ -159,6 +162,9 @@ def _limited(model: Model, zone: Zone) -> Model:
     changes: dict[str, Any] = {}
     if zone.max_speed is not None and "max_speed" in known:
         changes["max_speed"] = min(zone.max_speed, model.max_speed)  # type: ignore[attr-defined]
+    most = zone.max_lateral_acceleration
+    if most and "max_lateral_acceleration" in known:
+        changes["max_lateral_acceleration"] = min(most, lateral_limit(model))
     if not zone.reverse and "min_speed" in known:
         changes["min_speed"] = 0.0
     return replace(model, **changes) if changes else model  # type: ignore[type-var]

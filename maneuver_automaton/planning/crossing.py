@@ -155,12 +155,13 @@ def _touched(problem: Problem, plan: Plan, times: Array) -> NDArray[np.bool_]:
 
 
 def polish_slowed(found: Incumbents, question: Problem, known: Plan, budget: Budget) -> None:
-    """Polish a `known` plan, driven as slowly as a question's vehicle is to drive everywhere.
+    """Polish a `known` plan within the zones of a question, and the limits of its vehicle.
 
     The library may have no trim that goes on so slowly; the vehicle can all the same.
     """
     model, free = question.automaton.model, found.problem.automaton.model
-    if model is free or budget.is_over or why_not_polished(question):
+    alike = model is free and not question.zones
+    if alike or budget.is_over or why_not_polished(question):
         return
     guess = guess_of_plan(known)
     dof, limits = known.start.size, model.reduced_limits

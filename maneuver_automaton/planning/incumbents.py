@@ -180,6 +180,8 @@ class Incumbents:
         if checked.broken is not None or checked.audit is None:
             if proven:
                 self._refuse(checked.broken or Condition.AUDIT, checked.reason)
+            if self.problem.zones:  # it may keep to them once it is polished
+                self.misfits.append((plan, goal_index))
             return False
         cost = self.problem.cost_of(plan)
         one = Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)

@@ -21,6 +21,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
+from maneuver_automaton.optimal_control.polish_values import Guard
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.optimal_control.separation import BodyPart
@@ -132,9 +133,9 @@ def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan
     cheapest = sorted(every, key=lambda one: price.of(one[0]))[:1]
     quickest = sorted(every, key=lambda one: one[0].duration)[:1]
     known = [*cheapest, *(one for one in quickest if one not in cheapest)]
-    horizon = found.problem.horizon
-    if not known and (horizon.max_time or horizon.time or horizon.max_trims):
-        # a plan that is late may be made quicker, and one maneuver of too many trims
+    if not known:
+        # one that is late may be made quicker, one maneuver of too many trims, one too fast for a
+        # zone slower
         known = sorted(found.misfits, key=lambda one: one[0].duration)[:1]
     return known
 
@@ -278,6 +279,9 @@ def polish_plans(
     """
     goal = problem.goals[goal_index]
     first, last = problem.first_trim, problem.last_trim(goal)
+    # a zone that does not admit the motion by its name is not entered at all
+    zones = [one for one in problem.zones if one.admits_names((first.name, last.name))]
+    closed = [one.shape for one in problem.zones if one not in zones]
     pose: list[float | None] = goal.pose.tolist()
     if goal.free_heading:
         pose[2] = None
@@ -288,13 +292,21 @@ def polish_plans(
         goal=tuple(pose),
         goal_state=_end_state(problem.automaton, last),
         parts=_body_parts(problem),
-        obstacles=tuple(
-            shape for one in problem.obstacles if not moves(one) for shape in _shapes_of(one)
+        obstacles=(
+            *(shape for one in problem.obstacles if not moves(one) for shape in _shapes_of(one)),
+            *closed,
         ),
         movers=tuple(one for one in problem.obstacles if isinstance(one, Obstacle) and moves(one)),
         start_time=problem.start_time,
         bounds=problem.bounds,
         margin=problem.margin,
+        guards=tuple(
+            (
+                Guard(_limit(one.max_speed), _limit(one.max_lateral_acceleration), one.reverse),
+                one.shape,
+            )
+            for one in zones
+        ),
         durations=admitted_durations(problem),
     )
 
@@ -320,6 +332,10 @@ def polish_plans(
     )
 
 
+def _limit(most: float | None) -> float:
+    return math.inf if most is None else most
+
+
 def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:
     """What does not move, as shapes: the blocked cells of a map are joined to few boxes."""
     if isinstance(obstacle, Obstacle):
@@ -341,7 +357,7 @@ def _end_state(automaton: Automaton, last: Trim) -> tuple[float | None, ...]:
 
 def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:
     own = tuple(piece for shape in problem.footprint for piece in convex_pieces(shape))
-    parts = [BodyPart(solids=own or POINT)] if problem.obstacles else []
+    parts = [BodyPart(solids=own or POINT)] if problem.obstacles or problem.zones else []
     model = problem.automaton.model
     for name, shapes in problem.parts.items():
         solids = tuple(piece for shape in shapes for piece in convex_pieces(shape))

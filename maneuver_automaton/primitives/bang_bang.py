@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import is_too_sharp
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
+from maneuver_automaton.primitives.trajectory import Trajectory
 from maneuver_automaton.primitives.trim import Trim
 
 Pairs = Literal["all", "neighbours"] | Sequence[tuple[int, int]]
@@ -26,7 +28,8 @@ def bang_bang(model: Model, source: Trim, target: Trim, *, late: bool = False) -
 
     It takes the time of the component that needs longest, ``max |z_i' - z_i| / rate_i``; that one
     changes at its greatest rate throughout. The others do so too, and then wait; or, if `late`,
-    wait first: as quick, with another displacement.
+    wait first: as quick, with another displacement. Where that exceeds the lateral acceleration of
+    the vehicle, it brakes before it turns its wheels, or turns them before it speeds up.
 
     Source: the minimum time of integrators with bounded rates; LaValle (2006), *Planning
     Algorithms*, Sec. 14.6.3, bang-bang. The displacement is that of `drive_all`.
@@ -153,7 +156,12 @@ def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> l
             "switches between them without a maneuver"
         )
     control, durations = segments(model, source, target, late=late)
-    courses = drive_all(model, source, control=control, durations=durations)
+    courses = list(drive_all(model, source, control=control, durations=durations))
+    sharp = [k for k, one in enumerate(courses) if is_too_sharp(model, one.twists(model)).any()]
+    if sharp:
+        slow = _one_by_one(model, source[sharp], target[sharp])
+        for k, course in zip(sharp, slow, strict=True):
+            courses[k] = course
     return [
         Maneuver.along(
             course,
@@ -163,6 +171,16 @@ def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> l
         )
         for (a, b), course in zip(pairs, courses, strict=True)
     ]
+
+
+def _one_by_one(model: Model, source: Array, target: Array) -> tuple[Trajectory, ...]:
+    """Motions between reduced states (m, n): the speed changes first where it falls, else last."""
+    k = model.reduced_names.index("speed")
+    falls = np.abs(target[:, k]) <= np.abs(source[:, k])
+    middle = np.where(falls[:, None] == (np.arange(source.shape[1]) == k), target, source)
+    legs = [segments(model, *ends, late=False) for ends in ((source, middle), (middle, target))]
+    control, durations = (np.concatenate(parts, axis=1) for parts in zip(*legs, strict=True))
+    return drive_all(model, source, control=control, durations=durations)
 
 
 def segments(model: Model, source: Array, target: Array, *, late: bool) -> tuple[Array, Array]:

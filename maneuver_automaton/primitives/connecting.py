@@ -8,6 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import is_too_sharp
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
     Transfer,
@@ -182,6 +183,8 @@ def _checked(
     if excess.max() > WITHIN:
         worst = model.reduced_names[int(excess.argmax())]
         return replace(nothing, reason=f"{worst} leaves its limits by {excess.max():.2g} of them")
+    if is_too_sharp(model, course.twists(model)).any():
+        return replace(nothing, reason="it leaves the lateral acceleration of the vehicle")
     maneuver = Maneuver.along(
         course,
         name=f"{source.name} to {target.name}",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
@@ -12,6 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import is_too_sharp, lateral_limit
 from maneuver_automaton.primitives.trim import Trim
 
 TWIST_NAMES = ("speed", "lateral_speed", "turn_rate", "climb")
@@ -30,6 +32,7 @@ class MissingTrim:
 
     name: str
     reason: str  # which limit, and by how much; or what stays out of balance
+    sharp: bool = False  # whether it is beyond the lateral acceleration of the vehicle alone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +70,8 @@ def trims_of(
         velocity: speed [m/s], lateral_speed [m/s], turn_rate [rad/s], climb [m/s]; v_x, v_y, v_z
         [m/s] of a vehicle that translations alone move.
     max_lateral_acceleration : float, optional
-        Greatest speed times turn rate [m/s^2]: a tyre's grip, which is no limit of a state; no
-        limit if None.
+        Greatest speed times turn rate [m/s^2], beside that of the vehicle: a tyre's grip, which is
+        no limit of a state; no limit if None.
 
     Returns
     -------
@@ -190,13 +193,15 @@ def _trim_at(
     twist = _as_asked(model.body_velocity(state, control), balance)
     turn_rate = float(np.abs(twist[2:3]).sum()) if "turn_rate" in _twist_names(model) else 0.0
     lateral = float(np.hypot(twist[0], twist[1]) * turn_rate)
-    if max_lateral_acceleration is not None and lateral > max_lateral_acceleration * (1.0 + SLACK):
-        more = lateral - max_lateral_acceleration
+    most = math.inf if max_lateral_acceleration is None else max_lateral_acceleration
+    sharp = lateral <= most * (1.0 + SLACK)
+    if not sharp or is_too_sharp(model, twist):
+        most = lateral_limit(model) if sharp else most
         reason = (
-            f"the lateral acceleration would be {lateral:.4g} m/s^2, {more:.4g} m/s^2 beyond "
-            f"max_lateral_acceleration {max_lateral_acceleration:.4g} m/s^2"
+            f"the lateral acceleration would be {lateral:.4g} m/s^2, {lateral - most:.4g} m/s^2 "
+            f"beyond max_lateral_acceleration {most:.4g} m/s^2"
         )
-        return MissingTrim(name=name, reason=reason)
+        return MissingTrim(name=name, reason=reason, sharp=sharp)
     return Trim(name=name, body_velocity=twist, control=control, reduced_state=state)
 
 

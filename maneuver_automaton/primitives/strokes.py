@@ -12,6 +12,7 @@ import numpy as np
 from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import pace_within
 from maneuver_automaton.primitives.bang_bang import check_limited_rates
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
@@ -144,9 +145,12 @@ def _swing(model: Model, rest: Trim, length: float, component: str, limit: float
         )
     if abs(length) > LONGEST_STROKE:
         raise ValueError(f"stroke: got {length:g}, need at most {LONGEST_STROKE:g} in size")
+    moving = rest.reduced_state.copy()
+    moving[k] = most
+    pace = min(1.0, pace_within(model, model.body_velocity(moving, rest.control)))
     ramp = ramp_of(
         length,
-        max_speed=float(most) if limit is None else min(float(most), limit),
+        max_speed=float(most) * pace if limit is None else min(float(most) * pace, limit),
         acceleration=float(up),
         deceleration=float(down),
     )

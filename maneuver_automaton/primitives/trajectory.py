@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -30,6 +31,12 @@ class Trajectory:
     control: Array  # (n, n_u)
 
     __repr__ = brief
+
+    def twists(self, model: Model) -> Array:
+        """Body velocities (3, n - 1, dof) at the begin, middle and end of every step."""
+        begin, end, control = self.reduced_state[:-1], self.reduced_state[1:], self.control[:-1]
+        states = np.stack([begin, 0.5 * (begin + end), end])
+        return model.body_velocity(states, np.broadcast_to(control, (3, *control.shape)))
 
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at times (...,) [s]: exact at samples, by constant twists between them.

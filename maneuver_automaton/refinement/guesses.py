@@ -16,6 +16,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.primitives import Trajectory
 
@@ -38,6 +39,7 @@ class Pace:
     angular_acceleration: float = math.inf  # [rad/s^2]
     wheelbase: float = 0.0  # [m] 0: nothing is steered
     steering_rate: float = math.inf  # [rad/s]
+    lateral: float = math.inf  # [m/s^2] speed times turn rate
 
 
 class Timed(NamedTuple):
@@ -101,6 +103,7 @@ def _limits(twists: Array, pace: Pace) -> tuple[Array, Array]:
     most = np.where(twists[:, 0] < 0.0, pace.reverse_speed, pace.speed)
     with np.errstate(divide="ignore"):
         ratio = np.minimum(most / speed, pace.turn_rate / turn)
+        ratio = np.minimum(ratio, np.sqrt(pace.lateral / (speed * turn)))
         growth = np.minimum(pace.acceleration / speed, pace.angular_acceleration / turn)
     return SHARE * ratio, SHARE * growth
 
@@ -252,6 +255,7 @@ def pace_of_car(model: SecondOrderCar) -> Pace:
         acceleration=model.max_acceleration,
         wheelbase=model.wheelbase,
         steering_rate=model.max_steering_rate,
+        lateral=lateral_limit(model),
     )
 
 
@@ -270,7 +274,13 @@ def pace_of_unicycle(model: SecondOrderUnicycle) -> Pace:
 def pace_of_trailer(model: CarWithTrailer) -> Pace:
     """Limits of a car with a trailer along a path."""
     low, high = model.control_limits[0]
-    return Pace(speed=high, reverse_speed=-low, acceleration=math.inf, wheelbase=model.wheelbase)
+    return Pace(
+        speed=high,
+        reverse_speed=-low,
+        acceleration=math.inf,
+        wheelbase=model.wheelbase,
+        lateral=lateral_limit(model),
+    )
 
 
 def _second_order(run: Timed, at: Array, second: Array, limits: Array) -> Guess:

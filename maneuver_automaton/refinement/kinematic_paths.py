@@ -10,6 +10,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import pace_within
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.refinement.stop_and_steer import StopsAndSteers
 
@@ -70,7 +71,7 @@ def extreme_automaton(model: StopsAndSteers) -> Automaton:
     kinematic = model.kinematic
     states = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
     twists = model.body_velocity(states, np.zeros((len(states), len(model.control_names))))
-    moving = [(s, t) for s, t in zip(states, twists, strict=True) if t.any()]
+    moving = [(model.state_along(t, min(1.0, pace_within(model, t))), t) for t in twists if t.any()]
     names = kinematic.control_names
     controls = {
         ", ".join(f"{what} {v:.4g}" for what, v in zip(names, state + 0.0, strict=True)): state

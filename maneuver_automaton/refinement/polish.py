@@ -19,12 +19,14 @@ from maneuver_automaton.collision import Obstacle, Shape
 from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.movers import Mover
 from maneuver_automaton.optimal_control.polish_values import (
     LEAST_DURATION,
     MOST_DURATION,
     Ends,
+    Guard,
     Polished,
     PolishSettings,
     Scene,
@@ -73,6 +75,8 @@ class PolishTask:
         Where the reference point may be.
     margin : float
         Distance to keep from obstacles [m].
+    guards : sequence of (Guard, Shape)
+        Limits of the twist where the body touches a shape.
     durations : (2,) tuple
         Least and greatest duration [s].
     """
@@ -88,6 +92,7 @@ class PolishTask:
     start_time: float = 0.0  # [s]
     bounds: Bounds = field(default_factory=Bounds)
     margin: float = 0.0  # [m]
+    guards: tuple[tuple[Guard, Shape], ...] = ()
     durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
 
     def __post_init__(self) -> None:
@@ -119,7 +124,18 @@ class PolishTask:
             pieces=tuple((corners, by + self.margin) for corners, by in pieces),
             movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
+            guards=(*self._everywhere(), *map(self._seen, self.guards)),
         )
+
+    def _everywhere(self) -> list[Guard]:
+        """The limit of the vehicle itself that is none of one state alone."""
+        most = lateral_limit(self.model)
+        return [Guard(lateral=most)] if math.isfinite(most) else []
+
+    def _seen(self, one: tuple[Guard, Shape]) -> Guard:
+        """A guard with its solids seen from the start."""
+        guard, shape = one
+        return guard._replace(solids=tuple(pieces_seen_from([shape], self.start[:3])))
 
     def _movers_of(self, obstacle: Obstacle) -> Iterator[Mover]:
         """The convex pieces of an obstacle that moves, seen from the start and its time."""

@@ -15,6 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import pace_within
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive
 
@@ -141,7 +142,7 @@ class _Word:
         growth = float(np.min(_ratio(self._rates, np.abs(per_pace))))
         low, high = np.moveaxis(self.model.reduced_limits, -1, 0)
         fastest = float(np.min(_ratio(np.where(per_pace > 0.0, high, -low), np.abs(per_pace))))
-        pace = min(fastest, math.sqrt(length * growth))
+        pace = min(fastest, pace_within(self.model, twist), math.sqrt(length * growth))
         ramp = pace / growth
         moving = self.trim(standing.reduced_state + pace * per_pace)
         control = growth * per_pace

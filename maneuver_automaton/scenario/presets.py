@@ -11,6 +11,7 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.stock import stock_libraries
 from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
+from maneuver_automaton.models.lateral import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.quickest import quickest_maneuvers
 
@@ -44,7 +45,8 @@ def preset_automaton(name: str, model: Model) -> Automaton:
 
     `parking` and `road` are for the second-order unicycle and car. For parking, 0, 20, 50 and
     100 % of the speed both ways, straight, half and full turns, maneuvers between neighbours, and
-    short strokes from every rest. For the road, rest and five speeds ahead, turns as sharp as a
+    short strokes from every rest; what exceeds the lateral acceleration of the car is left out, and
+    kinematic cars turn more slowly. For the road, rest and five speeds ahead, turns as sharp as a
     lateral acceleration of 4 m/s^2 allows, maneuvers between neighbours, early and late. The
     libraries that come with the package have names of their own; see `load_stock_library`.
 
@@ -121,7 +123,9 @@ def _turns(vehicle: Unicycle | Car, speed: float) -> dict[str, tuple[float, floa
         raise ValueError("needs the tightest circle of the car, state vehicle.max_steering_rad")
     else:
         left = vehicle.max_steering
-    return {"left": (speed, left), "straight": (speed, 0.0), "right": (speed, -left)}
+    pace = pace_within(vehicle, vehicle.body_velocity(np.zeros(0), np.array([speed, left])))
+    slow = speed * min(1.0, pace)  # only a car has such a limit: its wheels stay as they are
+    return {"left": (slow, left), "straight": (speed, 0.0), "right": (slow, -left)}
 
 
 def _parking(model: SecondOrderUnicycle | SecondOrderCar) -> Automaton:
@@ -147,7 +151,8 @@ def _road(model: SecondOrderUnicycle | SecondOrderCar) -> Automaton:
     for pace in PACES:
         speed = pace * greatest
         if isinstance(model, SecondOrderCar):
-            most = math.atan2(COMFORTABLE * model.wheelbase, speed * speed)
+            across = min(COMFORTABLE, lateral_limit(model))
+            most = math.atan2(across * model.wheelbase, speed * speed)
         else:
             most = COMFORTABLE / speed if speed > 0.0 else math.inf
         states.append([(speed, share * min(most, sharpest)) for share in SHARPNESS])

@@ -75,7 +75,30 @@ ABOVE_GROUND = (
 )
 
 
-class UnicyclePart(Part):
+STEERED = "state max_steering_rate_rad_s of second_order_car or single_track"
+REFUSED = {  # limits of rates that are no state of any vehicle
+    **dict.fromkeys(
+        ("max_jerk", "max_jerk_m_s3", "max_lateral_jerk_m_s3"),
+        "no such key: no vehicle has its acceleration as a state; state max_acceleration_m_s2",
+    ),
+    **dict.fromkeys(
+        ("max_curvature_rate", "max_curvature_rate_per_m_s", "max_curvature_rate_1_m_s"),
+        f"no such key: the curvature changes as the wheels turn; {STEERED}",
+    ),
+}
+LATERAL = "greatest speed times turn rate; left out: no limit"
+
+
+class Vehicle(Part):
+    """A vehicle that is no car."""
+
+    instead: ClassVar = REFUSED | {
+        "max_lateral_acceleration_m_s2": "no such key, which car, second_order_car, "
+        "car_with_trailer and single_track have; a zone limits it for any vehicle"
+    }
+
+
+class UnicyclePart(Vehicle):
     """A robot that drives ahead and turns on the spot; control [v, omega]."""
 
     model: Literal["unicycle"] = Field(description="unicycle")
@@ -88,15 +111,18 @@ class UnicyclePart(Part):
 class CarPart(Part):
     """A car that rolls without slip, its pose on the rear axle; control [v, steering]."""
 
+    instead: ClassVar = REFUSED
+
     model: Literal["car"] = Field(description="car")
     wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
     max_steering_rad: Sharp | None = Field(None, description="left out: no limit")
     max_speed_m_s: Positive | None = Field(None, description="left out: no limit")
+    max_lateral_acceleration_m_s2: Positive | None = Field(None, description=LATERAL)
     footprint: Footprint | None = Field(None, description="shape of the body")
     footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
-class SecondOrderUnicyclePart(Part):
+class SecondOrderUnicyclePart(Vehicle):
     """A robot with inertia; state [v, omega], control their rates."""
 
     model: Literal["second_order_unicycle"] = Field(description="second_order_unicycle")
@@ -112,6 +138,8 @@ class SecondOrderUnicyclePart(Part):
 class SecondOrderCarPart(Part):
     """A car with inertia, its pose on the rear axle; state [v, steering], control their rates."""
 
+    instead: ClassVar = REFUSED
+
     model: Literal["second_order_car"] = Field(description="second_order_car")
     wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
     max_steering_rad: Sharp = Field(description=SHARP)
@@ -119,12 +147,15 @@ class SecondOrderCarPart(Part):
     max_acceleration_m_s2: Positive = Field(description="a positive number")
     max_steering_rate_rad_s: Positive = Field(description="a positive number")
     min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
+    max_lateral_acceleration_m_s2: Positive | None = Field(None, description=LATERAL)
     footprint: Footprint | None = Field(None, description="shape of the body")
     footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
 class CarWithTrailerPart(Part):
     """A car that pulls a trailer; state [hitch], control [v, steering]."""
+
+    instead: ClassVar = REFUSED
 
     model: Literal["car_with_trailer"] = Field(description="car_with_trailer")
     wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
@@ -133,6 +164,7 @@ class CarWithTrailerPart(Part):
     max_speed_m_s: Positive = Field(description="a positive number")
     min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
     max_hitch_rad: Positive | None = Field(None, description="left out: no limit")
+    max_lateral_acceleration_m_s2: Positive | None = Field(None, description=LATERAL)
     footprint: Footprint | None = Field(None, description="shape of the car")
     footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
     trailer: Footprint | None = Field(
@@ -142,6 +174,8 @@ class CarWithTrailerPart(Part):
 
 class SingleTrackPart(Part):
     """A car on linear tyres; state [v, v aside, turn rate, steering]; left out: a BMW 320i."""
+
+    instead: ClassVar = REFUSED
 
     model: Literal["single_track"] = Field(description="single_track")
     mass_kg: Positive | None = Field(None, description="a positive number")
@@ -158,11 +192,12 @@ class SingleTrackPart(Part):
     max_speed_m_s: Positive | None = Field(None, description="a positive number")
     max_lateral_speed_m_s: Positive | None = Field(None, description="left out: no limit")
     max_turn_rate_rad_s: Positive | None = Field(None, description="left out: no limit")
+    max_lateral_acceleration_m_s2: Positive | None = Field(None, description=LATERAL)
     footprint: Footprint | None = Field(None, description="shape of the body")
     footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
-class HovercraftPart(Part):
+class HovercraftPart(Vehicle):
     """A body on an air cushion; state [v, v aside, turn rate], control [force ahead, torque]."""
 
     model: Literal["hovercraft"] = Field(description="hovercraft")
@@ -181,7 +216,7 @@ class HovercraftPart(Part):
     footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
-class HelicopterPart(Part):
+class HelicopterPart(Vehicle):
     """A small helicopter; state [v, v aside, climb, turn rate, tilt, tilt aside]."""
 
     model: Literal["helicopter"] = Field(description="helicopter")
@@ -202,7 +237,7 @@ class HelicopterPart(Part):
     )
 
 
-class LatticeBodyPart(Part):
+class LatticeBodyPart(Vehicle):
     """A body that moves by lattice primitives alone, of a file of Nav2 or SBPL or of a preset."""
 
     model: Literal["lattice_body"] = Field(description="lattice_body")
@@ -212,7 +247,7 @@ class LatticeBodyPart(Part):
     footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
 
 
-class OmnidirectionalPart(Part):
+class OmnidirectionalPart(Vehicle):
     """A platform that moves ahead, aside and turns at once; control [v, v aside, omega]."""
 
     model: Literal["omnidirectional"] = Field(description="omnidirectional")

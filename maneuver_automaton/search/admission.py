@@ -21,7 +21,4 @@ def admitted_stretches(zone: Zone, maneuver: Maneuver, model: Model) -> NDArray[
     assert course is not None
     if not zone.admits_names([maneuver.source, maneuver.target]):
         return np.zeros(course.time.size - 1, dtype=np.bool_)
-    control = course.control[:-1]
-    begins = model.body_velocity(course.reduced_state[:-1], control)
-    ends = model.body_velocity(course.reduced_state[1:], control)
-    return np.asarray(zone.admits(begins) & zone.admits(ends))
+    return np.asarray(zone.admits(course.twists(model)[::2]).all(axis=0))
