@@ -579,8 +579,13 @@ def test_a_library_in_the_place_of_a_scenario(folder, capsys):
 def test_a_plan_in_the_place_of_a_scenario(folder, capsys):
     run(["plan", "x.yaml", "--no-plot", "--quiet"])
     assert run(["check", "out/plan.json"]) == 2
-    message = f"{Path('out/plan.json')}:1: is a plan, need a scenario\n"
+    message = (
+        f"{Path('out/plan.json')}: is a plan, which does not state its problem; need --with FILE, "
+        "the scenario that it was planned from\n"
+    )
     assert capsys.readouterr().err == message
+    assert run(["plan", "out/plan.json"]) == 2
+    assert capsys.readouterr().err == f"{Path('out/plan.json')}:1: is a plan, need a scenario\n"
 
 
 def test_check_reports_the_symmetry_that_a_boat_in_a_current_has():

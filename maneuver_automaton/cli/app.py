@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -74,6 +77,10 @@ Html = Annotated[
     bool, typer.Option("--html", help="Write a page that plays it: one file, no network.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
+Json = Annotated[
+    bool,
+    typer.Option("--json", help="Print what is written, as JSON; the table goes to stderr."),
+]
 Jobs = Annotated[
     int,
     typer.Option(
@@ -173,6 +180,19 @@ def compile_all(
     return compile_command.run(jobs=jobs)
 
 
+@contextlib.contextmanager
+def _document(written: Path, file: Path, *, asked: bool) -> Iterator[None]:
+    """Where --json is asked for, print a file once it is written, and nothing else to stdout."""
+    if not asked:
+        yield
+        return
+    if file.is_dir():
+        raise InvalidScenario(f"--json: prints the document of one file, and {file} is a folder")
+    with contextlib.redirect_stdout(sys.stderr):
+        yield
+    sys.stdout.write(written.read_text(encoding="utf-8"))
+
+
 @app.command(epilog=ending("plan"))
 @exits
 def plan(
@@ -197,6 +217,7 @@ def plan(
         bool,
         typer.Option("--leave", help="Leave a start in contact first, by the shortest coast."),
     ] = False,
+    as_json: Json = False,
 ) -> int:
     """Plan the problem of a file, or of every file of a folder.
 
@@ -221,11 +242,12 @@ def plan(
         look=LookOptions(title=title, size=size, style=style),
     )
     parts = Parts(beside=with_file, case=case, model=model)
-    if file.is_dir():
-        return plan_command.plan_folder(
-            file, out, settings=settings, parts=parts, jobs=jobs, scheduler=dask
-        )
-    return plan_command.plan_file(file, out, settings=settings, parts=parts)
+    with _document(out / "plan.json", file, asked=as_json):
+        if file.is_dir():
+            return plan_command.plan_folder(
+                file, out, settings=settings, parts=parts, jobs=jobs, scheduler=dask
+            )
+        return plan_command.plan_file(file, out, settings=settings, parts=parts)
 
 
 @app.command(epilog=ending("mpc"))
@@ -268,6 +290,7 @@ def mpc(
     size: Size = None,
     style: Style = "screen",
     html: Html = False,
+    as_json: Json = False,
 ) -> int:
     """Drive a scenario, or every one of a folder, in closed loop: plan, drive a step, plan again.
 
@@ -300,9 +323,11 @@ def mpc(
         look=LookOptions(title=title, size=size, style=style),
     )
     parts = Parts(beside=with_file, case=case, model=model)
-    if file.is_dir():
-        return mpc_command.drive_folder(file, out, settings=settings, parts=parts)
-    return mpc_command.drive_file(file, out, settings=settings, parts=parts)
+    written = out / ("closed_loop.json" if seeds is None else "statistics.json")
+    with _document(written, file, asked=as_json):
+        if file.is_dir():
+            return mpc_command.drive_folder(file, out, settings=settings, parts=parts)
+        return mpc_command.drive_file(file, out, settings=settings, parts=parts)
 
 
 @app.command(epilog=ending("check"))

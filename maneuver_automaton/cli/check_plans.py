@@ -15,6 +15,7 @@ from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.planned import fleet_planned
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import Closest, verify_fleet
+from maneuver_automaton.formats.driven_json import read_closed_loop_document
 from maneuver_automaton.formats.fleet_loop_reading import read_fleet_loop_document
 from maneuver_automaton.formats.plan_json import (
     load_plan,
@@ -45,8 +46,20 @@ def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
     document = read_fleet_document(path)
     if document is not None:
         return _of_fleet(path, document, parts)
+    if read_closed_loop_document(path) is not None:
+        raise InvalidScenario(
+            f"{path}: is a closed loop of one vehicle, which is audited while it is driven; need "
+            "a plan, or a closed loop of several vehicles"
+        )
     if parts.beside is None:
-        return None
+        try:
+            read_plan_document(path)
+        except InvalidScenario:
+            return None  # told by who reads scenarios
+        raise InvalidScenario(
+            f"{path}: is a plan, which does not state its problem; need --with FILE, the scenario "
+            "that it was planned from"
+        )
     plan, stated = load_plan(path), read_plan_document(path)
     scenario = scenario_of(parts.beside, replace(parts, beside=None))
     with announced(), _of_this(path):

@@ -23,7 +23,7 @@ from maneuver_automaton.cli.inputs import (
 )
 from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.pictures import skip_documentation
-from maneuver_automaton.cli.tables import console
+from maneuver_automaton.cli.tables import console, print_written
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.libraries import (
@@ -79,6 +79,7 @@ def convert(source: Path, target: Path, *, parts: Parts) -> int:
             _write_scenario(problem_of(source, parts), source, target)
     except OSError as error:
         raise not_written(Path(error.filename or target), error) from error
+    print_written(target)
     return FOUND
 
 
@@ -89,12 +90,14 @@ def _convert_library(source: Path, target: Path, write: Callable[[Automaton, Pat
     try:
         make_folder(target.parent)
         if read is not None and write_again(read, target):
+            print_written(target)
             return FOUND
         write(automaton, target)
     except InvalidLibrary as error:
         raise InvalidLibrary(f"{target}: {error}") from error
     except OSError as error:
         raise not_written(Path(error.filename or target), error) from error
+    print_written(target)
     if read is not None and read.remark:
         console().print(f"{source}: {read.remark}", soft_wrap=True)
     name = target.name.lower()
@@ -199,6 +202,7 @@ def plot(
     except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
         said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
         raise InvalidScenario(f"{file}: {said}") from error
+    print_written(path)
     return FOUND
 
 

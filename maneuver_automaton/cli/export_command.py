@@ -11,6 +11,7 @@ from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
 from maneuver_automaton.cli.planned import source_of
 from maneuver_automaton.cli.road_command import is_road
+from maneuver_automaton.cli.tables import print_written
 from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 
@@ -68,6 +69,7 @@ def export(
         raise not_written(path, error) from error
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
+    print_written(path)
     if kind == "commonroad" and several is None and not driven.reached:
         complain(f"{file}: it is no clean drive to a goal: the official checker refuses {path}")
     return FOUND

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from maneuver_automaton.cli.guard import complain
 from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario
 
@@ -23,15 +24,23 @@ class Parts:
     model: str | None = None  # MODULE:OBJECT
 
 
-def problem_of(path: Path, parts: Parts | None = None) -> Scenario | FleetScenario:
-    """The problem of a file, or its fleet, completed by `parts`; no drive on roads."""
-    from maneuver_automaton.scenario import RoadScenario, load_scenario
+def problem_of(
+    path: Path, parts: Parts | None = None, *, remark: bool = True
+) -> Scenario | FleetScenario:
+    """The problem of a file, or its fleet, completed by `parts`; no drive on roads.
+
+    What is legal in it, but hardly meant, is remarked on.
+    """
+    from maneuver_automaton.scenario import RoadScenario, load_scenario, remarks_on
 
     parts = parts or Parts()
     own = None if parts.model is None else user_model(parts.model)
     found = load_scenario(path, beside=parts.beside, case=parts.case, model=own)
     if isinstance(found, RoadScenario):
         raise InvalidScenario(f"{path}: is a drive on roads, which only plan and mpc know")
+    for file in (path, parts.beside) if remark else ():
+        for line in [] if file is None else remarks_on(file):
+            complain(line)
     return found
 
 

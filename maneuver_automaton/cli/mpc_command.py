@@ -125,7 +125,7 @@ def _has_loop(path: Path, parts: Parts) -> bool:
     if road_command.is_road(path):
         return True
     try:
-        return problem_of(path, parts).receding_horizon is not None
+        return problem_of(path, parts, remark=False).receding_horizon is not None
     except Exception:  # noqa: BLE001, told when it is driven
         return True
 

@@ -18,6 +18,8 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from maneuver_automaton.automaton import Plan, Primitive
     from maneuver_automaton.models import Model
     from maneuver_automaton.planning import PlanResult
@@ -67,6 +69,11 @@ def table(
     for row in rows:
         made.add_row(*(Text(cell) for cell in row))
     return made
+
+
+def print_written(*paths: Path) -> None:
+    """Say which files were written."""
+    console().print(f"wrote {' and '.join(map(str, paths))}", soft_wrap=True)
 
 
 def print_facts(facts: Mapping[str, str]) -> None:

@@ -4,6 +4,7 @@ from maneuver_automaton.scenario.fleet import FleetScenario as FleetScenario
 from maneuver_automaton.scenario.loading import RoadScenario as RoadScenario
 from maneuver_automaton.scenario.loading import load_roads as load_roads
 from maneuver_automaton.scenario.loading import load_scenario as load_scenario
+from maneuver_automaton.scenario.loading import remarks_on as remarks_on
 from maneuver_automaton.scenario.loading import statements_of as statements_of
 from maneuver_automaton.scenario.scenario import Scenario as Scenario
 from maneuver_automaton.scenario.scenario import scenario_of_text as scenario_of_text

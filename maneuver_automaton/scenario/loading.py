@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,10 +16,10 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.recognition import reader_of, yaml_statements
+from maneuver_automaton.formats.recognition import YAML_ENDINGS, reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
-from maneuver_automaton.formats.yaml_source import Document, parse
+from maneuver_automaton.formats.yaml_source import Document, Where, parse
 from maneuver_automaton.models import Model, SecondOrderCar
 from maneuver_automaton.roads import RoadScene, RoadVehicle
 from maneuver_automaton.scenario.combining import combined
@@ -29,6 +31,8 @@ from maneuver_automaton.scenario.fleet import (
     without_fleet,
 )
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
+
+MANY_TURNS = 2.0 * math.pi + 0.01  # [rad] a full turn, however it was rounded
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -195,6 +199,50 @@ def _told_of_beside() -> Iterator[None]:
         yield
     except InvalidScenario as error:
         raise InvalidScenario(f"--with: {error}") from error
+
+
+def remarks_on(path: Path | str) -> list[str]:
+    """What a scenario file states that is legal, but hardly meant: headings that look like degrees.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in YAML_ENDINGS or reader_of(path) is not None:
+        return []
+    document = parse(read_text(path), name=str(path))
+    if not isinstance(document.value, dict) or "schema" not in document.value:
+        return []
+    return [
+        str(
+            document.error(
+                where,
+                f"{heading:g} rad is more than a full turn and looks like degrees; "
+                f"{heading:g} degrees are {math.radians(heading):.4g} rad",
+            )
+        )
+        for where, heading in _headings(document.value, ())
+        if MANY_TURNS < abs(heading) < math.inf
+    ]
+
+
+def _headings(value: Any, where: Where) -> Iterator[tuple[Where, float]]:
+    """Headings that a part of a file states, and where."""
+    below = value.items() if isinstance(value, dict) else enumerate(value)
+    for key, inner in below:
+        at = (*where, key)
+        if key == "pose" and isinstance(inner, list) and len(inner) > 2:
+            inner, at = inner[2], (*at, 2)
+        elif key == "motion" and isinstance(inner, list) and inner and isinstance(inner[0], list):
+            inner, at = inner[0][-1], (*at, 0, len(inner[0]) - 1)  # later ones may add up turns
+        elif key != "heading_rad":
+            if isinstance(inner, dict | list):
+                yield from _headings(inner, at)
+            continue
+        if isinstance(inner, int | float):
+            yield at, float(inner)
 
 
 def _refuse_parts(path: Path, beside: Path | str | None, case: int | None) -> None:

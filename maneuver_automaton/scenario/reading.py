@@ -16,6 +16,7 @@ File = TypeVar("File", bound=BaseModel)
 OTHER_KINDS: Mapping[str, set[str]] = {  # and what only they have
     "a library of trims": {"format", "trims"},
     "a plan": {"status", "primitives"},
+    "a closed loop": {"status", "step_s", "steps"},
     "plans of a fleet": {"status", "kind", "vehicles"},
     "a build file": {"library", "trims"},
 }

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import math
+import re
 from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Gt, Lt
@@ -291,6 +293,18 @@ PARTS: tuple[type[Part], ...] = (
     OmnidirectionalPart,
 )
 MODELS = tuple(str(part.model_fields["model"].description) for part in PARTS)
+MEANT = {  # what others call them: Nav2, OMPL, CommonRoad, dynobench; letters and digits alone
+    "unicycle": "differential differentialdrive diffdrive diff skidsteer unicycle1 turtlebot",
+    "car": "ackermann bicycle kinematicbicycle carlike tricycle dubins dubinscar reedsshepp "
+    "kinematiccar",
+    "second_order_unicycle": "unicycle2 dynamicunicycle",
+    "second_order_car": "kinematicsingletrack ks dynamiccar car2 ackermannwithinertia",
+    "car_with_trailer": "tractortrailer tractorwithtrailer tractor trailer trucktrailer truck "
+    "semitrailer cartrailer car1",
+    "single_track": "dynamicbicycle dynamicsingletrack st",
+    "helicopter": "drone quadrotor quadcopter multirotor uav",
+    "omnidirectional": "omni omnidrive holonomic mecanum swerve",
+}
 
 
 def _check_model(value: Any, info: ValidationInfo) -> Any:
@@ -307,8 +321,22 @@ def _check_model(value: Any, info: ValidationInfo) -> Any:
     if "model" not in value:
         raise PydanticCustomError("missing_key", "", {"key": "model", "what": what})
     if value["model"] not in MODELS or own is not None:
+        what += "" if own else _hint(value["model"])
         raise PydanticCustomError("at_key", "", {"key": "model", "need": what})
     return value
+
+
+def _hint(model: Any) -> str:
+    """Which model is meant by a name that is none, or how to give one's own."""
+    if not isinstance(model, str):
+        return ""
+    plain = re.sub(r"[^a-z0-9]", "", model.lower())
+    for name, words in MEANT.items():
+        if plain in words.split():
+            return f"; did you mean {name!r}?"
+    near = difflib.get_close_matches(model.lower(), MODELS, n=1)
+    hint = f"; did you mean {near[0]!r}? A" if near else "; a"
+    return f"{hint} vehicle of your own needs --model MODULE:OBJECT"
 
 
 def _model_of(value: Any) -> str:

@@ -19,6 +19,7 @@ MODELS = (
     "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
     "hovercraft, helicopter, lattice_body, omnidirectional"
 )
+OWN = "; a vehicle of your own needs --model MODULE:OBJECT"
 SECOND_ORDER = (
     "{model: second_order_car, wheelbase_m: 2.8, max_steering_rad: 0.75, max_speed_m_s: 2.5, "
     "max_acceleration_m_s2: 1.0, max_steering_rate_rad_s: 0.5}"
@@ -241,7 +242,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "unknown model": (
         vehicle("{model: tank}"),
-        ":3: vehicle.model: got 'tank', need one of " + MODELS,
+        ":3: vehicle.model: got 'tank', need one of " + MODELS + OWN,
     ),
     "no model": (
         vehicle("{}"),
