@@ -5,7 +5,8 @@ occupancy of a pixel is ``1 - shade``, or its shade if `negate`; in the mode raw
 100) in percent. At `occupied_thresh` and above a cell is blocked, at `free_thresh` and below it is
 free. Between, and where an image is transparent or a raw value above 100, nothing is known.
 
-The mode scale counts as trinary: its shades between the thresholds are degrees of not knowing.
+For obstacles the mode scale counts as trinary: shades between the thresholds are degrees of not
+For obstacles the mode scale counts as trinary: shades between the thresholds are not known.
 """
 
 from __future__ import annotations
@@ -14,21 +15,23 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
 from maneuver_automaton._limits import MOST_HEADING
-from maneuver_automaton.collision import OccupancyMap
+from maneuver_automaton.collision import OccupancyMap, Polygon
+from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import bounds_around, check_cell
 from maneuver_automaton.formats.grey_image import GreyImage, read_grey_image
 from maneuver_automaton.formats.statement import MapFile, Statement, Unknown
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse, shown
+from maneuver_automaton.groups import SE2
 
 MODES = ("trinary", "scale", "raw")
 YES_OR_NO = {"yes": True, "on": True, "no": False, "off": False}  # words of YAML 1.1
@@ -68,10 +71,7 @@ def load_nav2_map(path: Path, *, unknown: Unknown = "blocked") -> OccupancyMap:
     InvalidScenario
         If the file or its image cannot be used: file, line, field, value, what would be right.
     """
-    text = read_text(path, what="a map")
-    if text.strip() and not _A_KEY.search(text):  # what another file holds is not for a message
-        raise InvalidScenario(f"{path}: is no map, need YAML with the keys {', '.join(REQUIRED)}")
-    return map_of_document(parse(text, name=str(path), what="a map"), path, unknown=unknown)
+    return map_of_document(_document(path), path, unknown=unknown)
 
 
 def map_of_document(
@@ -79,14 +79,68 @@ def map_of_document(
 ) -> OccupancyMap:
     """The map of a YAML file that was read before; see `load_nav2_map`."""
     header = _header(document)
-    try:
-        image = read_grey_image(path.parent / _from_home(header.image))
-    except InvalidScenario as error:
-        raise document.error(("image",), str(error)) from error
-    cells = _blocked(image, header, unknown=unknown)
+    cells = _blocked(_image(document, path, header), header, unknown=unknown)
     return OccupancyMap(
         cells[::-1], resolution=header.resolution, origin=header.origin, name=path.name
     )
+
+
+class Mask(NamedTuple):
+    """Values that a map states of its cells, as map_server gives them to a costmap filter."""
+
+    values: IntArray  # (rows, columns), the first row the lowest: 0 to 100, -1 if unknown
+    resolution: float  # [m]
+    origin: tuple[float, ...]  # [m, m, rad] of the lower left corner
+
+    def regions(self) -> list[tuple[int, Polygon]]:
+        """Connected cells of one value above 0, each with the polygon that is their union.
+
+        Examples
+        --------
+        >>> mask = Mask(np.array([[0, 7, 7], [9, 0, 7]]), 0.5, (0.0, 0.0, 0.0))
+        >>> [(value, len(polygon.corners)) for value, polygon in mask.regions()]
+        [(7, 6), (9, 4)]
+        """
+        import shapely
+
+        found = []
+        for value in np.unique(self.values[self.values > 0]).tolist():
+            cells = OccupancyMap(self.values == value, resolution=1.0)
+            for part in shapely.get_parts(shapely.union_all(runs_of(cells))):
+                rings = [part.exterior, *part.interiors]  # in cells: whole numbers, exactly
+                corners = [
+                    SE2(np.array(self.origin)).act(
+                        self.resolution * shapely.get_coordinates(shapely.simplify(ring, 0.0))[:-1]
+                    )
+                    for ring in rings
+                ]
+                found.append((int(value), Polygon(corners[0], corners[1:])))
+        return found
+
+
+def load_nav2_mask(path: Path) -> Mask:
+    """The mask of a costmap filter, such as limits of speed.
+
+    Raises
+    ------
+    InvalidScenario
+        As `load_nav2_map`.
+    """
+    document = _document(path)
+    header = _header(document)
+    image = _image(document, path, header)
+    occupancy = _occupancy(image, header)
+    known = occupancy <= 1.0 if header.mode == "raw" else image.opaque
+    if header.mode == "raw":
+        share = occupancy
+    else:
+        between = max(header.occupied - header.free, np.finfo(np.float64).tiny)
+        share = np.clip((occupancy - header.free) / between, 0.0, 1.0)
+        share = np.where(occupancy >= header.occupied, 1.0, share)
+        if header.mode == "trinary":
+            known = known & ((share == 0.0) | (share == 1.0))
+    values = np.where(known, np.rint(100.0 * share), -1.0).astype(np.int64)
+    return Mask(values[::-1], header.resolution, header.origin)
 
 
 def read_nav2_map(path: Path, document: Document) -> tuple[Statement, ...]:
@@ -130,6 +184,20 @@ def save_nav2_map(cells: OccupancyMap, path: Path) -> None:
         f'image: "{name}"\nmode: trinary\nresolution: {float(cells.resolution)!r}\n'
         f"origin: [{origin}]\nnegate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.25\n",
     )
+
+
+def _document(path: Path) -> Document:
+    text = read_text(path, what="a map")
+    if text.strip() and not _A_KEY.search(text):  # what another file holds is not for a message
+        raise InvalidScenario(f"{path}: is no map, need YAML with the keys {', '.join(REQUIRED)}")
+    return parse(text, name=str(path), what="a map")
+
+
+def _image(document: Document, path: Path, header: _Header) -> GreyImage:
+    try:
+        return read_grey_image(path.parent / _from_home(header.image))
+    except InvalidScenario as error:
+        raise document.error(("image",), str(error)) from error
 
 
 def _header(document: Document) -> _Header:
@@ -204,14 +272,17 @@ def _from_home(name: str) -> Path:
         return Path(name)
 
 
+def _occupancy(image: GreyImage, header: _Header) -> Array:
+    """Shares of occupancy, the first row at the top; raw values above 100 are more than 1."""
+    if header.mode == "raw":
+        return np.asarray(np.round(image.shade * 255.0) / 100.0)
+    return image.shade if header.negate else 1.0 - image.shade
+
+
 def _blocked(image: GreyImage, header: _Header, *, unknown: Unknown) -> NDArray[np.bool_]:
     """Blocked cells, the first row at the top."""
-    if header.mode == "raw":
-        occupancy: Array = np.round(image.shade * 255.0) / 100.0
-        known = occupancy <= 1.0
-    else:
-        occupancy = image.shade if header.negate else 1.0 - image.shade
-        known = image.opaque
+    occupancy = _occupancy(image, header)
+    known = occupancy <= 1.0 if header.mode == "raw" else image.opaque
     blocked = occupancy >= header.occupied
     if unknown == "blocked":
         blocked |= occupancy > header.free

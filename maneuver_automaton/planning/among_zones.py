@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass, replace
-from itertools import product
+from itertools import chain, islice, product
 from typing import Any
 
 import numpy as np
@@ -102,11 +102,9 @@ def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
 
 def _questions(problem: Problem) -> Iterator[Problem]:
     """Problems without zones whose plans keep to all of them: through all, around all, mixed."""
-    choices = sorted(
-        product((True, False), repeat=len(problem.zones)),
-        key=lambda through: (len(set(through)), not through[0]),
-    )
-    for through in choices[:MOST_QUESTIONS]:
+    count = len(problem.zones)
+    mixed = (one for one in product((True, False), repeat=count) if 0 < sum(one) < count)
+    for through in islice(chain(((True,) * count, (False,) * count), mixed), MOST_QUESTIONS):
         entered = tuple(zone for zone, enter in zip(problem.zones, through, strict=True) if enter)
         avoided = tuple(
             Obstacle(zone.shape, name=zone.words)

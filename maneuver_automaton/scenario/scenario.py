@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -128,7 +129,15 @@ def scenario_of_document(
     built = time.perf_counter()
     return Scenario(
         name=(path.stem if path else document.name) if file.name is None else file.name,
-        problem=_problem(document, file, automaton, bodies=bodies, obstacles=obstacles, once=once),
+        problem=_problem(
+            document,
+            file,
+            automaton,
+            bodies=bodies,
+            obstacles=obstacles,
+            folder=folder,
+            once=once,
+        ),
         time_limit_s=file.search.time_limit_s,
         receding_horizon=file.receding_horizon,
         maps=maps,
@@ -197,6 +206,7 @@ def _problem(
     *,
     bodies: _Bodies,
     obstacles: tuple[AnyObstacle, ...],
+    folder: Path,
     once: _Once,
 ) -> Problem:
     goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
@@ -216,7 +226,11 @@ def _problem(
     cost = once.of(
         ("vehicle", "automaton", "cost"), lambda: cost_of(document, file.cost, automaton)
     )
-    zones = once.of(("zones",), lambda: zones_of(document, file.zones))
+    speeds = [math.hypot(*trim.body_velocity[:2]) for trim in automaton.trims]
+    zones = once.of(
+        ("vehicle", "automaton", "zones"),
+        lambda: zones_of(document, file.zones, folder, fastest=max(speeds)),
+    )
     horizon = _horizon(document, file.horizon)
     with at(document, ()):
         return Problem(

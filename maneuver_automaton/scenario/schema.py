@@ -386,10 +386,37 @@ class RecedingHorizonPart(Part):
     )
 
 
+class MaskLimit(Part):
+    """The greatest speed where a mask has a value v from 1 to 100: base + multiplier * v."""
+
+    base: Number = Field(description="of the speed")
+    multiplier: Number = Field(description="of the value of the mask")
+    unit: Annotated[Literal["percent", "m_s"], Need("percent or m_s")] = Field(
+        "percent", description="percent of the fastest trim, or m_s [m/s]"
+    )
+
+
 class ZonePart(Part):
     """A part of the plane in which not every motion is admitted."""
 
-    polygon_m: Polygon = Field(description="corners [x, y]")
+    one_of: ClassVar = ("polygon_m", "map")
+    goes_with: ClassVar = {
+        "holes_m": ("polygon_m",),
+        "speed_limit": ("map",),
+        "max_speed_m_s": ("polygon_m",),
+        "reverse": ("polygon_m",),
+        "max_lateral_acceleration_m_s2": ("polygon_m",),
+        "trims": ("polygon_m",),
+    }
+
+    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
+    holes_m: Annotated[tuple[Polygon, ...], Several("a list of polygons", at_least=0)] = Field(
+        (), description="polygons inside polygon_m that are not in the zone"
+    )
+    map: Name | None = Field(
+        None, description="mask of a speed filter (YAML), relative to this file"
+    )
+    speed_limit: MaskLimit | None = Field(None, description="{base, multiplier, unit} of the mask")
     max_speed_m_s: NotNegative | None = Field(None, description="greatest speed in it")
     reverse: bool = Field(True, description="false: forwards only")
     max_lateral_acceleration_m_s2: NotNegative | None = Field(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +22,14 @@ from maneuver_automaton.collision import (
 )
 from maneuver_automaton.collision.motion import STANDS
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.nav2_map import load_nav2_map
+from maneuver_automaton.formats.nav2_map import load_nav2_map, load_nav2_mask
 from maneuver_automaton.formats.polygons import simple_polygon
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.formats.yaml_source import Document, Where
 from maneuver_automaton.scenario import schema, vehicle_parts
 from maneuver_automaton.scenario.vehicle_parts import Footprint
+
+MOST_REGIONS = 64  # of one value in a mask: each is a zone with a distance field of its own
 
 
 def footprint_of(document: Document, part: Footprint | None, *, key: str) -> tuple[Shape, ...]:
@@ -67,17 +69,23 @@ def obstacles_of(
     return tuple(obstacles), tuple(maps)
 
 
-def zones_of(document: Document, parts: Sequence[schema.ZonePart]) -> tuple[Zone, ...]:
-    """Zones of a file.
+def zones_of(
+    document: Document, parts: Sequence[schema.ZonePart], folder: Path, *, fastest: float
+) -> tuple[Zone, ...]:
+    """Zones of a file; paths are relative to `folder`, and the `fastest` trim is 100 % [m/s].
 
     Raises
     ------
     InvalidScenario
-        If a polygon crosses itself, or a zone forbids nothing.
+        If a polygon crosses itself, a zone forbids nothing, or a mask is missing or malformed.
     """
-    zones = []
+    zones: list[Zone] = []
     for k, part in enumerate(parts):
-        shape = _polygon(document, part.polygon_m, (), ("zones", k, "polygon_m"))
+        if part.map is not None:
+            zones += _zones_of_mask(document, part, k, folder / part.map, fastest)
+            continue
+        assert part.polygon_m is not None
+        shape = _polygon(document, part.polygon_m, part.holes_m, ("zones", k, "polygon_m"))
         try:
             zones.append(
                 Zone(
@@ -94,13 +102,46 @@ def zones_of(document: Document, parts: Sequence[schema.ZonePart]) -> tuple[Zone
     return tuple(zones)
 
 
+def _zones_of_mask(
+    document: Document, part: schema.ZonePart, k: int, path: Path, fastest: float
+) -> Iterator[Zone]:
+    """A zone for each region of one value of a speed mask, read as Nav2's speed filter does.
+
+    Source: nav2_costmap_2d, `SpeedFilter`: 0 is no limit, nor is a speed that is not above 0, or of
+    more than 100 %.
+    """
+    limit = part.speed_limit
+    if limit is None:
+        raise document.error(("zones", k), "map: needs speed_limit: {base, multiplier, unit}")
+    try:
+        mask = load_nav2_mask(path)
+    except InvalidScenario as error:
+        raise document.error(("zones", k, "map"), str(error)) from error
+    if unknown := int((mask.values < 0).sum()):
+        raise document.error(
+            ("zones", k, "map"), f"{path}: {unknown} cells are unknown, need a value in every cell"
+        )
+    found = mask.regions()
+    if len(found) > MOST_REGIONS:
+        raise document.error(
+            ("zones", k, "map"),
+            f"{path}: has {len(found)} regions of one value, need at most {MOST_REGIONS}",
+        )
+    percent = limit.unit == "percent"
+    for value, polygon in found:
+        speed = limit.base + limit.multiplier * value
+        if speed > 0.0 and not (percent and speed > 100.0):
+            speed *= fastest / 100.0 if percent else 1.0
+            yield Zone(shape=polygon, max_speed=speed, name=f"zone {k + 1}, value {value}")
+
+
 def stated_zone(zone: Zone) -> dict[str, Any]:
     """A zone in the words of a scenario file.
 
     Raises
     ------
     ValueError
-        If its shape has no corners, or holes.
+        If its shape has no corners.
 
     Examples
     --------
@@ -108,9 +149,11 @@ def stated_zone(zone: Zone) -> dict[str, Any]:
     {'polygon_m': [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 'max_speed_m_s': 0.5}
     """
     shape = zone.shape
-    if isinstance(shape, Disc) or (isinstance(shape, Polygon) and shape.holes):
-        raise ValueError("zones: a scenario file states a zone by a polygon without holes")
+    if isinstance(shape, Disc):
+        raise ValueError("zones: a scenario file states a zone by a polygon, not by a disc")
     entry: dict[str, Any] = {"polygon_m": shape.corners.tolist()}
+    if isinstance(shape, Polygon) and shape.holes:
+        entry["holes_m"] = [ring.tolist() for ring in shape.holes]
     if zone.max_speed is not None:
         entry["max_speed_m_s"] = float(zone.max_speed)
     if not zone.reverse:
