@@ -22,7 +22,7 @@ FRAMES_PER_SECOND = 15
 MOST_FRAMES = 150  # longer motions are shown faster
 PAUSE_S = 1.0  # on the last picture
 PALETTE, MOST_SAMPLES = 128, 16  # colours, and pictures that they are taken from
-NEARLY_WHITE = 248  # of 255, in each channel
+NEARLY_WHITE = 247  # of 255, in each channel: Pillow looks 252 up in place of white, by distance
 ENDINGS = (".gif", ".mp4")
 
 

@@ -7,6 +7,7 @@ from PIL import Image
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.animation import _film, save_plan_animation
+from maneuver_automaton.plotting.film import _with_white
 from maneuver_automaton.primitives import Trim
 from tests.plotting.cases import parking_plan, slalom_problem
 
@@ -68,3 +69,12 @@ def test_an_empty_plan_is_one_frame(tmp_path):
 def test_other_endings_are_refused(tmp_path):
     with pytest.raises(ValueError, match=r"got the file name plan\.mp4, need one ending in \.gif"):
         save_plan_animation(Plan([0.0, 0.0, 0.0], (), durations=[]), tmp_path / "plan.mp4")
+
+
+def test_what_is_nearly_white_is_not_taken_for_white():
+    # Pillow looks a colour up in steps of four: 252 stands for white, and 247 is as near to it
+    paper = Image.new("RGB", (1, 1), "white")
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(_with_white([255, 255, 255, 247, 251, 252, 0, 0, 0] + [0] * 759))
+    seen = paper.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB")
+    assert seen.getpixel((0, 0)) == (255, 255, 255)
