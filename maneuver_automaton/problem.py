@@ -89,13 +89,20 @@ class Goal:
         return distance, 0.0 if self.free_heading else turn
 
 
+class Unstated(float):
+    """A number that nobody has stated."""
+
+
+UNSTATED = Unstated(0.0)
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Horizon:
     """How long a plan lasts and how many trims it may have."""
 
     time: float | None = None  # [s] exactly this long; None: free
     max_trims: int | None = None  # rest included; None: no limit
-    min_coast: float = 0.0  # [s] of every trim but rest
+    min_coast: float = UNSTATED  # [s] of every trim but rest; unstated: 0.02 where hardly dearer
     max_time: float | None = None  # [s] at most, with a free final time
     stay: bool = False  # at the goal for ever, where nothing may pass later, with a free final time
 

@@ -13,12 +13,13 @@ from maneuver_automaton.audit import Audit, TerminalError, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.checking import Condition, check_plan
+from maneuver_automaton.planning.checking import Condition, TooLate, check_plan, what_is_hit
 from maneuver_automaton.planning.result import Alternative, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
-from maneuver_automaton.refinement.fitting import fitted_plans, padded
+from maneuver_automaton.refinement.fitting import fitted_plans, padded, with_lasting_coasts
+from maneuver_automaton.search.inside import stays_inside
 
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
 LATE = 8  # plans that may be refused once the time is over, before no other is checked
@@ -35,6 +36,7 @@ class Accepted:
     goal_index: int
     cost: float
     audit: Audit
+    offered: float  # its cost before short trims were left out
 
     @property
     def rank(self) -> tuple[float, int]:
@@ -133,7 +135,11 @@ class Incumbents:
         none_fits, goal = True, self.problem.goals[goal_index]
         for fitted in fitted_plans(self.problem, plan, goal, budget=self.budget):
             none_fits = False
-            if self._keep(fitted, goal_index, proven=proven):
+            lasting = self._with_lasting_coasts(fitted, goal)
+            cost = self.problem.cost_of(fitted)
+            if lasting is not fitted and self._keep(lasting, goal_index, proven=False, cost=cost):
+                return True
+            if self._keep(fitted, goal_index, proven=proven, cost=cost):
                 return True
         if none_fits and self.budget.left_to_check == 0.0:
             self.unchecked += 1
@@ -151,7 +157,7 @@ class Incumbents:
         late = 0
         for one in candidates:
             known = [
-                other.plan for other in self.plans if other.cost <= one.cost + _slack(one.cost)
+                other.plan for other in self.plans if other.offered <= one.cost + _slack(one.cost)
             ]
             if len(known) > self.alternatives or not self.may_check:
                 return
@@ -166,8 +172,27 @@ class Incumbents:
         """Whether no other plan is checked after so many that were late."""
         return late >= LATE or self.budget.left_to_check == 0.0
 
-    def _keep(self, plan: Plan, goal_index: int, *, proven: bool) -> bool:
-        """Keep a plan if it passes the checks; of one motion only the cheapest plan stays."""
+    def _with_lasting_coasts(self, plan: Plan, goal: Goal) -> Plan:
+        """The plan without very short trims, if there is time to check it, and once more if not."""
+        if self.budget.left_to_check < 2.0 * self.longest_check:
+            return plan
+
+        def is_free(one: Plan) -> bool:
+            inside = stays_inside(one, self.problem.bounds)
+            return inside and not what_is_hit(
+                self.problem, one, goal, self.workspace, budget=self.budget
+            )
+
+        try:
+            return with_lasting_coasts(self.problem, plan, goal, is_free=is_free)
+        except TooLate:
+            return plan
+
+    def _keep(self, plan: Plan, goal_index: int, *, proven: bool, cost: float) -> bool:
+        """Keep a plan if it passes the checks; of one motion only the cheapest plan stays.
+
+        It was offered at a `cost`.
+        """
         begin = self.budget.elapsed
         goal = self.problem.goals[goal_index]
         checked = check_plan(self.problem, plan, goal, self.workspace, budget=self.budget)
@@ -183,8 +208,10 @@ class Incumbents:
             if self.problem.zones:  # it may keep to them once it is polished
                 self.misfits.append((plan, goal_index))
             return False
-        cost = self.problem.cost_of(plan)
-        one = Accepted(plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit)
+        offered, cost = cost, self.problem.cost_of(plan)
+        one = Accepted(
+            plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit, offered=offered
+        )
         same = [other for other in self.plans if same_motion(plan, other.plan, self.likeness)]
         if not any(other.rank <= one.rank for other in same):
             others = [other for other in self.plans if other not in same]
@@ -249,7 +276,7 @@ class Incumbents:
             ),
             timing_s=self._timing(first if searched is None else searched) | {"first_plan": first},
             counts=dict(self.counts),
-            improvements=tuple(self.improvements),
+            improvements=tuple((at, max(cost, best.cost)) for at, cost in self.improvements),
             nodes=nodes,
         )
 

@@ -8,20 +8,27 @@ the new times are collision-free is to be checked by whoever asked.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words.closing import EndConditions, closest_times
+from maneuver_automaton.words.conjugation import conjugated
 
 CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least coasting time
 RESTARTS = 2
+NEAR = 2  # trims on either side of a short one
+SHORT = 0.02  # [s] that a trim lasts, unless the horizon says otherwise ...
+DEARER = 1e-3  # ... or the plan would become dearer by more than this share of its cost
+CLOSED = 1e-12  # [m, rad, s] that an exact end may miss
 
 
 def fitted_plans(
@@ -64,6 +71,87 @@ def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:
     longest = np.array([trim.max_duration for trim in plan.trims])
     again = _solved(problem, plan, goal, np.zeros(len(longest)), longest)
     return None if again is None or problem.cost_of(again) >= problem.cost_of(plan) else again
+
+
+def with_lasting_coasts(
+    problem: Problem, plan: Plan, goal: Goal, *, is_free: Callable[[Plan], bool]
+) -> Plan:
+    """The plan without trims of less than 20 ms, as far as that is free and hardly dearer.
+
+    Such a trim is left out, or lasts so long; others change as little as they can: all of them,
+    those near it, after it, or before it, whatever is free. Where the horizon states a least time,
+    be it zero, the plan stays as it is.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Unicycle
+    >>> controls = {"ahead": (1.0, 0.0), "slower": (0.9, 0.0)}
+    >>> robot = Automaton.of_controls(Unicycle(), controls)
+    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0])
+    >>> plan = Plan([0, 0, 0], robot.trims, durations=[1.9991, 0.001])
+    >>> with_lasting_coasts(problem, plan, problem.goals[0], is_free=bool).durations.tolist()
+    [2.0]
+    """
+    if not isinstance(problem.horizon.min_coast, Unstated):
+        return plan
+    most, failed = problem.cost_of(plan) * (1.0 + DEARER), 0
+    while failed < len(short := _short(plan)):
+        away = np.arange(plan.durations.size) - short[failed]
+        times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))
+        changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)
+        for some, of_these, least in itertools.product(times, changing, (0.0, SHORT)):
+            other = _with_times(problem, plan, goal, some, of_these, least)
+            if (
+                other is not None
+                and len(_short(other)) < len(short)
+                and problem.cost_of(other) <= most
+                and not broken_condition(problem, other)
+                and is_free(other)
+            ):
+                plan, failed = other, -1
+                break
+        failed += 1
+    return plan
+
+
+def _short(plan: Plan) -> list[int]:
+    """Trims of a plan that move for less than 20 ms and could last longer, the shortest first."""
+    longest = np.array([0.0 if trim.is_rest else trim.max_duration for trim in plan.trims])
+    times = plan.durations
+    short = (times > 0.0) & (times < np.minimum(SHORT, longest) * (1.0 - 1e-9))
+    return sorted(np.flatnonzero(short).tolist(), key=lambda k: float(times[k]))
+
+
+def _with_times(
+    problem: Problem, plan: Plan, goal: Goal, times: Array, free: NDArray[np.bool_], least: float
+) -> Plan | None:
+    """The word of a plan with times near some, those that are free at least so long, as it ends."""
+    group = problem.automaton.model.group
+    exact = not (goal.free_heading or goal.tolerance_m or goal.tolerance_rad)
+    twists = np.array([trim.body_velocity for trim in plan.trims])
+    held = group.exp(np.where(free, 0.0, times)[:, None] * twists)  # as displacements
+    steps = np.vstack([_displacements(plan), np.zeros(plan.start.size)])
+    twists, product = conjugated(twists * free[:, None], (held @ group(steps)).pose)
+    fixed = problem.horizon.time is not None
+    conditions = EndConditions(
+        start=plan.start,
+        twists=twists,
+        goal=goal.pose if exact else plan.end,
+        product=product,
+        rows=free[None].astype(float) if fixed else None,
+        targets=np.array([plan.durations.sum() - times[~free].sum()] if fixed else []),
+    )
+    changed, missing = closest_times(conditions, times, at_least=least)
+    times = np.where(free, changed, times)
+    return without_nothing(replace(plan, durations=times)) if missing < CLOSED else None
+
+
+def _displacements(plan: Plan) -> Array:
+    """Displacement (n - 1, dof) after each trim but the last; zero for a switch."""
+    steps = np.zeros((len(plan.trims) - 1, plan.start.size))
+    for k, one in enumerate(plan.maneuvers):
+        steps[k] = 0.0 if one is None else one.displacement
+    return steps
 
 
 def padded(problem: Problem, plan: Plan) -> Plan:
@@ -131,10 +219,8 @@ def _coasting_limits(problem: Problem, plan: Plan) -> Iterator[tuple[Array, Arra
 
 def _solved(problem: Problem, plan: Plan, goal: Goal, least: Array, longest: Array) -> Plan | None:
     """The word of a plan with the best times within limits, as long as the horizon asks for."""
-    group, dof = problem.automaton.model.group, plan.start.size
+    group = problem.automaton.model.group
     lasting = sum(one.duration for one in plan.maneuvers if one)
-    steps = [np.zeros(dof) if one is None else one.displacement for one in plan.maneuvers]
-    steps = steps or [np.zeros(dof)] * (len(plan.trims) - 1)
     horizon = problem.horizon
     totals = [horizon.time]
     if horizon.max_time is not None:
@@ -148,7 +234,7 @@ def _solved(problem: Problem, plan: Plan, goal: Goal, least: Array, longest: Arr
             np.array([trim.body_velocity for trim in plan.trims]),
             rates,
             (group(plan.start).inverse() @ group(goal.pose)).pose,
-            displacements=np.array(steps).reshape(-1, dof),
+            displacements=_displacements(plan),
             total=left,
             free_heading=goal.free_heading,
             least=least,

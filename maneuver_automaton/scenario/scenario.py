@@ -15,7 +15,7 @@ from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
 from maneuver_automaton.models import Model
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import UNSTATED, Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.places import at
 from maneuver_automaton.scenario.prices import cost_of
@@ -294,7 +294,7 @@ def _horizon(document: Document, part: HorizonPart) -> Horizon:
         return Horizon(
             time=None if part.time_s == "free" else part.time_s,
             max_trims=part.max_trims,
-            min_coast=part.min_coast_s,
+            min_coast=UNSTATED if part.min_coast_s is None else part.min_coast_s,
             max_time=part.max_time_s,
             stay=part.stay,
         )

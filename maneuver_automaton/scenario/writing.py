@@ -15,7 +15,7 @@ from maneuver_automaton._files import relative
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import WEIGHTS, Cost, StageCost
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings, Unstated
 from maneuver_automaton.scenario.fleet import FleetScenario
 from maneuver_automaton.scenario.fleet_schema import FleetFile
 from maneuver_automaton.scenario.scenario import Scenario
@@ -257,8 +257,12 @@ def _cost(cost: StageCost) -> dict[str, Any]:
 
 
 def _horizon(horizon: Horizon) -> dict[str, Any]:
-    entry = _given(time_s=horizon.time, max_trims=horizon.max_trims, max_time_s=horizon.max_time)
-    entry |= {"min_coast_s": horizon.min_coast} if horizon.min_coast else {}
+    entry = _given(
+        time_s=horizon.time,
+        max_trims=horizon.max_trims,
+        min_coast_s=None if isinstance(horizon.min_coast, Unstated) else horizon.min_coast,
+        max_time_s=horizon.max_time,
+    )
     return entry | ({"stay": True} if horizon.stay else {})
 
 

@@ -81,13 +81,14 @@ def test_a_trim_lasts_no_longer_than_it_may():
 def test_a_greatest_time_is_searched_for(max_time):
     # with no limit the cheapest plan takes 12.3 s; less time costs more effort
     free = Problem(GRID, [0, 0, 0], [0, 3, 0], cost=Cost(effort=1.0))
-    limited = replace(free, horizon=Horizon(max_time=max_time))
+    limited = replace(free, horizon=Horizon(max_time=max_time, min_coast=0.0))
     result = plan(limited, time_limit=LIMIT, alternatives=2)
     assert result.status is PlanStatus.FOUND
     assert result.plan.duration == pytest.approx(max_time, abs=1e-9)  # the limit binds
     assert all(one.plan.duration <= max_time + 1e-9 for one in result.alternatives)
     assert result.certificate > -1e-9  # with the price of time
-    fixed = plan(replace(free, horizon=Horizon(time=max_time)), time_limit=LIMIT)
+    exactly = Horizon(time=max_time, min_coast=0.0)
+    fixed = plan(replace(free, horizon=exactly), time_limit=LIMIT)
     assert result.cost == pytest.approx(fixed.cost, rel=1e-9)  # rest is free here
     longer = plan(replace(free, horizon=Horizon(max_time=1.1 * max_time)), time_limit=LIMIT)
     assert longer.cost < result.cost
