@@ -12,6 +12,7 @@ from maneuver_automaton._interrupts import stopped
 
 COUNTED = 0.7  # share of the time left that a stage of counted work takes at most: others follow
 LATE_SHARE, LATE = 0.08, 0.006  # of the time, and [s], by which checks of an answer may be late
+FIRST_LATE = 0.1  # [s] the same where there is nothing else to return
 MOMENT, SHARE = 4e-3, 0.25  # [s], and of the time left, between two looks at the clock
 
 
@@ -70,6 +71,7 @@ class Budget:
     clock: Callable[[], float] = time.monotonic  # seconds from some moment on
     watch: Watch | None = None  # once its gap is closed, no time is left
     worked: float = -math.inf  # [s] processor time of this process at the begin; -inf: no matter
+    late: float = LATE  # [s] by which checks may be late, besides a share of the time
 
     @classmethod
     def from_now(
@@ -138,7 +140,7 @@ class Budget:
 
         What other programs have delayed is not late yet: the processor time of this one counts.
         """
-        late = self.seconds + LATE_SHARE * self.seconds + LATE
+        late = self.seconds + LATE_SHARE * self.seconds + self.late
         spent = self.elapsed
         if spent >= late:
             spent = min(spent, time.process_time() - self.worked)

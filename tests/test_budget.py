@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import pytest
 
-from maneuver_automaton.budget import LATE, LATE_SHARE, MOMENT, Budget, EvenPace, Pace
+from maneuver_automaton.budget import FIRST_LATE, LATE, LATE_SHARE, MOMENT, Budget, EvenPace, Pace
 
 DAY = 86400.0  # [s] no test takes as long
 
@@ -65,6 +66,7 @@ def test_what_was_found_may_be_checked_a_moment_longer():
     assert budget.left_to_check == pytest.approx(8.0 * (1.0 + LATE_SHARE) + LATE)
     now = 18.0 + 8.0 * LATE_SHARE + LATE
     assert budget.left_to_check == 0.0
+    assert replace(budget, late=FIRST_LATE).left_to_check == pytest.approx(FIRST_LATE - LATE)
     delayed = Budget(began=10.0, deadline=18.0, clock=lambda: now, worked=time.process_time())
     assert delayed.left_to_check > 8.0
 

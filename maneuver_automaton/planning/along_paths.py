@@ -75,7 +75,7 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
     moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
     """
     problem, goal = found.problem, found.problem.goals[goal_index]
-    if found.budget.left_to_check < STOPPING_S:
+    if found.for_checks.left_to_check < STOPPING_S:
         return
     plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
@@ -98,7 +98,7 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
         durations[0] += wait
         later = replace(plan, durations=durations)
         try:
-            hit = what_is_hit(problem, later, goal, found.workspace, budget=found.budget)
+            hit = what_is_hit(problem, later, goal, found.workspace, budget=found.for_checks)
         except TooLate:
             return
         if not hit:

@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
-from maneuver_automaton.budget import Budget
+from maneuver_automaton.budget import FIRST_LATE, Budget
 from maneuver_automaton.planning.checking import Condition, TooLate, check_plan, what_is_hit
 from maneuver_automaton.planning.result import Alternative, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
@@ -95,6 +95,11 @@ class Incumbents:
         return self.budget.before(LONGER * (self.longest_check - CHECK_S))
 
     @property
+    def for_checks(self) -> Budget:
+        """The budget of a check: that of a first plan comes after the time, if need be."""
+        return self.budget if self.plans else replace(self.budget, late=FIRST_LATE)
+
+    @property
     def may_check(self) -> bool:
         """Whether there is time to check one more plan; always where there is none yet."""
         return not self.plans or self.budget.left_to_check >= self.longest_check
@@ -133,7 +138,7 @@ class Incumbents:
         Whether one passed them; what was not `proven` free may hit something without a word.
         """
         none_fits, goal = True, self.problem.goals[goal_index]
-        for fitted in fitted_plans(self.problem, plan, goal, budget=self.budget):
+        for fitted in fitted_plans(self.problem, plan, goal, budget=self.for_checks):
             none_fits = False
             lasting = self._with_lasting_coasts(fitted, goal)
             cost = self.problem.cost_of(fitted)
@@ -141,7 +146,7 @@ class Incumbents:
                 return True
             if self._keep(fitted, goal_index, proven=proven, cost=cost):
                 return True
-        if none_fits and self.budget.left_to_check == 0.0:
+        if none_fits and self.for_checks.left_to_check == 0.0:
             self.unchecked += 1
         elif none_fits and proven:
             self._refuse(Condition.WORD, broken_condition(self.problem, padded(self.problem, plan)))
@@ -170,7 +175,7 @@ class Incumbents:
 
     def _is_late(self, late: int) -> bool:
         """Whether no other plan is checked after so many that were late."""
-        return late >= LATE or self.budget.left_to_check == 0.0
+        return late >= LATE or self.for_checks.left_to_check == 0.0
 
     def _with_lasting_coasts(self, plan: Plan, goal: Goal) -> Plan:
         """The plan without very short trims, if there is time to check it, and once more if not."""
@@ -195,7 +200,7 @@ class Incumbents:
         """
         begin = self.budget.elapsed
         goal = self.problem.goals[goal_index]
-        checked = check_plan(self.problem, plan, goal, self.workspace, budget=self.budget)
+        checked = check_plan(self.problem, plan, goal, self.workspace, budget=self.for_checks)
         took = self.budget.elapsed - begin
         self.checking += took
         self.longest_check = max(self.longest_check, took)

@@ -56,6 +56,10 @@ def test_a_plan_that_was_found_in_time_is_checked_and_returned() -> None:
     assert looks_after(TASKS["among obstacles"], 400, 0, 1.02)[1] is PlanStatus.FOUND
 
 
+def test_a_first_plan_is_checked_a_while_after_the_deadline() -> None:
+    assert looks_after(TASKS["among obstacles"], 20, 0, 1.1)[1] is PlanStatus.FOUND
+
+
 def test_a_plan_is_not_returned_late_for_its_checks() -> None:
     assert looks_after(TASKS["among obstacles"], 20, 0, 1.5)[1] is PlanStatus.OUT_OF_BUDGET
 
