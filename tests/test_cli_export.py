@@ -56,10 +56,13 @@ def lines(path):
 def test_a_plan_is_written_beside_its_file(plan):
     assert run(["export", str(plan), "--to", "csv", "--step", "0.5"]) == 0
     header, rows = lines(plan.with_suffix(".csv"))
-    named = ["control_speed", "control_turn_rate", "primitive"]
-    assert (header[-3:], len(rows)) == (named, 17)  # of 8 s
+    named = ["control_speed", "control_turn_rate", "arc_length_m", "curvature_1_m", "primitive"]
+    assert (header[-5:], len(rows)) == (named, 17)  # of 8 s
+    assert run(["export", str(plan), "--to", "csv", "--rate", "4"]) == 0
+    assert len(lines(plan.with_suffix(".csv"))[1]) == 33
     assert run(["export", str(plan), "--to", "csv", "--with", str(PARKING)]) == 0
-    assert lines(plan.with_suffix(".csv"))[0][-3:] == named
+    named.insert(4, "lateral_acceleration_m_s2")
+    assert lines(plan.with_suffix(".csv"))[0][-6:] == named
     assert run(["export", str(plan), "--to", "geojson"]) == 0
     (path,) = features(plan.with_suffix(".geojson"), "path")
     np.testing.assert_allclose(path["coordinates"][0], [0.0, 1.0], atol=1e-9)
@@ -72,7 +75,7 @@ def test_controls_that_a_file_does_not_name_are_counted(plan, tmp_path, vehicle)
     document["vehicle"] = vehicle
     (tmp_path / "plan.json").write_text(json.dumps(document))
     assert run(["export", str(tmp_path / "plan.json"), "--to", "csv"]) == 0
-    assert lines(tmp_path / "plan.csv")[0][-3:] == ["control_0", "control_1", "primitive"]
+    assert lines(tmp_path / "plan.csv")[0][-5:-3] == ["control_0", "control_1"]
 
 
 def test_a_loop_is_written_with_its_scenario(loop, tmp_path, capsys):

@@ -70,13 +70,13 @@ def plan_arrays(plan: Plan, *, step: float | None, model: Model | None) -> PlanA
     samples = plan.sample()
     if step is not None:
         times = step_times(plan.start_time, plan.duration, step)
-        samples = _at_times(plan, samples, times)
+        samples = _at_times(plan, samples, times, model)
     return _arrays(plan, samples, model)
 
 
 def arrays_at(plan: Plan, times: Array, *, model: Model | None) -> PlanArrays:
     """As `Plan.as_arrays`, at times (n,) that rise [s]."""
-    return _arrays(plan, _at_times(plan, plan.sample(), times), model)
+    return _arrays(plan, _at_times(plan, plan.sample(), times, model), model)
 
 
 def joined(parts: Sequence[PlanArrays]) -> PlanArrays:
@@ -123,20 +123,29 @@ def step_times(start: float, duration: float, step: float) -> Array:
     return np.append(start + step * np.arange(count), start + duration)
 
 
-def _at_times(plan: Plan, samples: Trajectory, times: Array) -> Trajectory:
-    """The plan at other times: poses exact, reduced states linear between samples."""
+def _at_times(plan: Plan, samples: Trajectory, times: Array, model: Model | None) -> Trajectory:
+    """The plan at other times: poses exact, reduced states cubic between samples.
+
+    The cubic has the rates that the model's equations give at both samples; without a model it is
+    a straight line.
+    """
     last = samples.time.size - 1
     k = np.clip(np.searchsorted(samples.time, times, side="right") - 1, 0, max(last - 1, 0))
     ahead = np.minimum(k + 1, last)
     span = samples.time[ahead] - samples.time[k]
     share = np.where(span > 0.0, (times - samples.time[k]) / np.where(span > 0.0, span, 1.0), 0.0)
-    before, change = samples.reduced_state[k], samples.reduced_state[ahead]
-    return Trajectory(
-        time=times,
-        pose=plan.pose_at(times),
-        reduced_state=before + share[:, None] * (change - before),
-        control=samples.control[k],
+    before, after, control = (
+        samples.reduced_state[k],
+        samples.reduced_state[ahead],
+        samples.control[k],
     )
+    change, share, span = after - before, share[:, None], span[:, None]
+    state = before + share * change
+    if model is not None and before.shape[1]:
+        early = span * model.reduced_dynamics(before, control) - change
+        late = span * model.reduced_dynamics(after, control) - change
+        state += share * (1.0 - share) * ((1.0 - share) * early - share * late)
+    return Trajectory(time=times, pose=plan.pose_at(times), reduced_state=state, control=control)
 
 
 def _twists(plan: Plan, samples: Trajectory, index: IntArray, model: Model | None) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -544,6 +545,10 @@ def export(
         float | None,
         typer.Option("--step", metavar="S", help="Time between rows [s] (csv, rerun, ros2)."),
     ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option("--rate", metavar="HZ", help="Rows per second, instead of --step."),
+    ] = None,
 ) -> int:
     """Write a plan.json, or a closed_loop.json, for another program.
 
@@ -555,6 +560,10 @@ def export(
     from maneuver_automaton.cli.inputs import Parts
 
     parts = Parts(beside=with_file, case=case, model=model)
+    if rate is not None:
+        if step is not None or not 0.0 < rate < math.inf:
+            raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
+        step = 1.0 / rate
     return export_command.export(file, to, out, parts=parts, step=step)
 
 

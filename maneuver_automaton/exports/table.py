@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.exports.driven import driven_of
+from maneuver_automaton.exports.kinematics import kinematics
 from maneuver_automaton.models import Model
 
 if TYPE_CHECKING:
@@ -23,6 +24,10 @@ def save_csv(
     model: Model | None = None,
 ) -> None:
     """Write a plan, a closed loop or a drive as CSV: a line of names, then one line an instant.
+
+    Before the last column of `Plan.as_arrays`, the primitive, stand those of the path: arc length,
+    curvature, steering angle, and, where the model is known, accelerations and jerk, as far as the
+    vehicle has them.
 
     Parameters
     ----------
@@ -50,9 +55,14 @@ def save_csv(
     >>> folder = getfixture("tmp_path")
     >>> save_csv(Plan([0, 0, 0], (ahead,), durations=[2.0]), folder / "plan.csv", step=1.0)
     >>> print((folder / "plan.csv").read_text().splitlines()[2])
-    1.0,1.0,0.0,0.0,1.0,0.0,0.0,1.0,ahead
+    1.0,1.0,0.0,0.0,1.0,0.0,0.0,1.0,1.0,0.0,ahead
     """
-    columns = driven_of(value, model=model).rows(step=step).columns()
+    driven = driven_of(value, model=model)
+    samples = driven.rows()
+    rows = samples if step is None else driven.rows(step=step)
+    columns = rows.columns()
+    primitive = columns.pop("primitive")  # stays the last one
+    columns |= {**kinematics(rows, samples, driven.model), "primitive": primitive}
     text = io.StringIO()
     lines = csv.writer(text, lineterminator="\n")
     lines.writerow(columns)

@@ -68,7 +68,9 @@ def test_csv_reads_back_to_the_last_bit(tmp_path):
     assert header == [
         "time_s", "x_m", "y_m", "heading_rad", "v_x_m_s", "v_y_m_s", "turn_rate_rad_s",
         *(f"state_{name}" for name in CAR.reduced_names),
-        *(f"control_{name}" for name in CAR.control_names), "primitive",
+        *(f"control_{name}" for name in CAR.control_names), "arc_length_m", "curvature_1_m",
+        "steering_rad", "acceleration_m_s2", "lateral_acceleration_m_s2", "jerk_m_s3",
+        "lateral_jerk_m_s3", "primitive",
     ]  # fmt: skip
     rows = PLAN.as_arrays(step=0.5, model=CAR)
     numbers = np.array([[float(cell) for cell in line[:-1]] for line in lines])
@@ -84,7 +86,10 @@ def test_a_result_brings_its_model_to_the_csv(tmp_path):
         (tmp_path / "plan.csv")
         .read_text()
         .splitlines()[0]
-        .endswith(",control_speed,control_turn_rate,primitive")
+        .endswith(
+            ",control_speed,control_turn_rate,arc_length_m,curvature_1_m,"
+            "lateral_acceleration_m_s2,primitive"
+        )
     )
     blocked = ma.plan(ma.Problem(robot, [0, 0, 0], [1, 0, 0], obstacles=ma.Disc(0.2)))
     with pytest.raises(ValueError, match="the result has no plan to write: at the start "):
