@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         RoadVehicle,
     )
 
-COLUMNS = ["vehicle", "status", "cost", "arrival [s]", "clearance [m]", "to the edge [m]"]
+COLUMNS = ["vehicle", "status", "cost", "arrival [s]", "clearance [m]", "edge [m]"]
 
 
 def states_several(path: Path, parts: Parts) -> bool:

@@ -5,7 +5,6 @@ occupancy of a pixel is ``1 - shade``, or its shade if `negate`; in the mode raw
 100) in percent. At `occupied_thresh` and above a cell is blocked, at `free_thresh` and below it is
 free. Between, and where an image is transparent or a raw value above 100, nothing is known.
 
-For obstacles the mode scale counts as trinary: shades between the thresholds are degrees of not
 For obstacles the mode scale counts as trinary: shades between the thresholds are not known.
 """
 
