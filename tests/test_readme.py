@@ -1,6 +1,8 @@
 """README.md and the pages in docs/: their Python and commands run, their tables know every key.
 
-Notebooks are executed while the site is built; here their links alone are looked at.
+What a page says that its code prints is compared; so are the numbers of docs/paper.md, and the
+tables of the reference, which ``python docs/measure.py`` writes. Notebooks are executed while the
+site is built; here their links and outputs are looked at.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ import json
 import re
 import shlex
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +28,10 @@ from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
+sys.path.insert(0, str(DOCS))
+
+import measure  # noqa: E402
+
 PAGES = (
     ROOT / "README.md",
     ROOT / "CONTRIBUTING.md",
@@ -43,7 +50,8 @@ def text_of(page: Path) -> str:
 
 
 TEXTS = {page: text_of(page) for page in PAGES}
-TEXT = "\n".join(TEXTS.values())
+EXPLAINED = [text for page, text in TEXTS.items() if page.parent.name != "reference"]
+TEXT = "\n".join(EXPLAINED)
 LONG = {  # pages whose code, and words in commands that, take seconds
     "best_so_far",
     "exact_pose",
@@ -65,15 +73,16 @@ def blocks(language: str, text: str = TEXT) -> list[str]:
 
 
 def code_of_pages() -> list[Any]:
-    """Every block of Python, named by its page and first line."""
+    """Every block of Python and its output, if one is shown; named by its page and first line."""
     return [
         pytest.param(
-            code,
-            id=f"{page.stem}: {first_words(code)}",
-            marks=[pytest.mark.slow] if page.stem in LONG or takes_long(code) else [],
+            match["code"],
+            match["output"],
+            id=f"{page.stem}: {first_words(match['code'])}",
+            marks=[pytest.mark.slow] if page.stem in LONG or takes_long(match["code"]) else [],
         )
         for page, text in TEXTS.items()
-        for code in blocks("python", text)
+        for match in measure.CODE.finditer(text)
     ]
 
 
@@ -96,11 +105,45 @@ def clone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("code", code_of_pages())
-def test_python_runs(clone, code):
+@pytest.mark.parametrize(("code", "output"), code_of_pages())
+def test_python_runs_and_prints_what_is_shown(clone, capsys, code, output):
     if "distributed" in code:
         pytest.importorskip("distributed")
     exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
+    now = capsys.readouterr().out
+    assert output is None or not measure.printed.differs(output, now), now
+
+
+@pytest.mark.parametrize("command", dict.fromkeys(measure.ROW.findall(TEXTS[DOCS / "paper.md"])))
+def test_the_numbers_beside_those_of_the_paper_are_those_of_the_commands(clone, command):
+    row = "| " + " | ".join(
+        cell if k not in (1, 2) else f"`{cell}`" for k, cell in enumerate(command)
+    )
+    assert measure.with_numbers(f"{row} |") == f"{row} |"
+
+
+@pytest.mark.parametrize("page", measure.TABLES)
+def test_the_tables_are_generated_from_the_package_as_it_is(page):
+    # `python docs/measure.py tables` writes them
+    assert (DOCS / page).read_text(encoding="utf-8") == measure.with_table(page)
+
+
+@pytest.mark.parametrize(
+    ("said", "now", "other"),
+    [
+        ("cost 7.60 m", "cost 7.60  m", False),
+        ("cost 7.60 m", "cost 7.61 m", False),
+        ("cost 7.60 m", "cost 7.62 m", True),
+        ("3 plans", "4 plans", True),
+        ("[0.541 1.944]", "[0.542 1.944]", False),
+        ("cost 7.60", "price 7.60", True),
+        ("at most 2e-15 m", "at most 3e-15 m", False),
+        ("at most 2e-15 m", "at most 2e-12 m", True),
+        ("(measured on 2 cores of X)\n0.12 s", "0.35 s", False),
+    ],
+)
+def test_outputs_are_compared_to_their_printed_digits(said, now, other):
+    assert measure.printed.differs(said, now) == other
 
 
 def test_the_first_plan_is_short_and_prints_what_it_says(clone, capsys):
@@ -210,6 +253,7 @@ def in_navigation(part: Any) -> set[str]:
 def test_every_page_is_in_the_navigation():
     text = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     pages = {page.relative_to(DOCS).with_suffix(".md") for page in PAGES if DOCS in page.parents}
+    pages |= {Path(measure.reference.page_of(title)) for title in measure.reference.topics()}
     outside = {"README.md", "CONTRIBUTING.md", "CHANGELOG.md"}
     assert in_navigation(yaml.safe_load(text)["nav"]) == outside | {one.as_posix() for one in pages}
 
@@ -220,19 +264,22 @@ def test_the_readme_is_short_and_leads_to_every_page_of_the_first_level():
         assert f"](docs/{page.name})" in TEXTS[ROOT / "README.md"]
 
 
-def test_notebooks_are_kept_without_outputs():
-    for page in DOCS.rglob("*.ipynb"):
-        for cell in json.loads(page.read_text(encoding="utf-8"))["cells"]:
-            assert not cell.get("outputs")
-            assert cell.get("execution_count") is None
+@pytest.mark.parametrize("page", sorted(DOCS.rglob("*.ipynb")), ids=lambda page: page.stem)
+def test_notebooks_are_kept_with_outputs_but_players(page):
+    text = page.read_text(encoding="utf-8")
+    cells = [cell for cell in json.loads(text)["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["execution_count"] == number for number, cell in enumerate(cells, 1))
+    assert sum(bool(cell["outputs"]) for cell in cells) >= 2
+    assert "<iframe" not in text
+    assert len(text) < 300_000
 
 
 def test_every_picture_is_small_and_shown():
     for picture in [*(ROOT / "scenarios" / "pictures").iterdir(), *DOCS.glob("pictures/*.png")]:
-        assert picture.stat().st_size < 120_000
+        assert picture.stat().st_size < (1_500_000 if picture.suffix == ".gif" else 120_000)
         assert picture.name in TEXT
 
 
 def test_every_scenario_is_in_the_gallery():
     drawn = {picture.stem for picture in DOCS.glob("pictures/gallery/*.png")}
-    assert drawn == {scenario.stem for scenario in (ROOT / "scenarios").glob("*.yaml")}
+    assert drawn == {scenario.stem for scenario in measure.gallery.scenarios()}

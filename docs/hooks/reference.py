@@ -1,4 +1,8 @@
-"""The reference: keys from the schema of scenario files, names and options from the package."""
+"""The reference: keys from the schema of scenario files, names and options from the package.
+
+The tables of keys, options and names are kept in their pages: ``python docs/measure.py tables``
+writes them. The site has a page of docstrings beside for every topic of the public names.
+"""
 
 from __future__ import annotations
 
@@ -11,47 +15,72 @@ import maneuver_automaton as ma
 from maneuver_automaton.cli.app import app
 from maneuver_automaton.scenario import json_schema
 
-ROOMS = {  # by the first part of where a name is at home
-    "planning": "Planning",
-    "problem": "Problems",
-    "costs": "Costs",
-    "automaton": "Libraries and plans",
-    "primitives": "Trims and maneuvers",
-    "models": "Vehicles",
-    "collision": "Bodies and obstacles",
-    "groups": "Groups of motions",
-    "receding_horizon": "Closed loop",
-    "roads": "Roads",
-    "scenario": "Files",
-    "formats": "Files",
-    "exports": "To other programs",
+TOPICS = {  # rooms of the package
+    "Planning": ("planning",),
+    "Problems and costs": ("problem", "costs"),
+    "Vehicles": ("models",),
+    "Libraries and plans": ("automaton", "primitives", "groups", "design"),
+    "Bodies and obstacles": ("collision",),
+    "Closed loop": ("receding_horizon",),
+    "Several vehicles": ("fleet",),
+    "Roads": ("roads",),
+    "Files and other programs": ("scenario", "formats", "exports"),
 }
+PICTURES = "Pictures"
+NAMES = "reference/python.md"
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """The text of a page, with what is generated where it is asked for."""
-    for place, written in (
-        ("<!-- names -->", names),
-        ("<!-- keys -->", keys),
-        ("<!-- options -->", options),
-    ):
-        if place in markdown:
-            markdown = markdown.replace(place, written())
+def on_files(files: Any, *, config: Any) -> Any:
+    """The files of the site, with a page of docstrings for every topic."""
+    from mkdocs.structure.files import File
+
+    for title, values in topics().items():
+        text = "\n\n".join([f"# {title}", *(f"::: {path_of(one)}" for one in values.values())])
+        files.append(File.generated(config, page_of(title), content=text))
+    return files
+
+
+def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
+    """The text of a page; in the site, the names of the reference lead to their docstrings."""
+    if page.file.src_uri != NAMES:
+        return markdown
+    for title, values in topics().items():
+        there = page_of(title).removeprefix("reference/")
+        markdown = markdown.replace(f"## {title}\n", f"## [{title}]({there})\n")
+        for name, value in values.items():
+            linked = f"| [`{name}`]({there}#{path_of(value)}) |"
+            markdown = markdown.replace(f"| `{name}` |", linked)
     return markdown
 
 
-def names() -> str:
-    """A section for every room, with the docstrings of its public names."""
-    sections: dict[str, list[str]] = {title: [] for title in ROOMS.values()}
+def topics() -> dict[str, dict[str, Any]]:
+    """The public names of every topic, and what they are."""
+    found: dict[str, dict[str, Any]] = {title: {} for title in TOPICS}
+    at_home = {room: title for title, rooms in TOPICS.items() for room in rooms}
     for name in sorted(set(ma.__all__) - {"plotting"}, key=str.lower):
         value = getattr(ma, name)
-        room = value.__module__.split(".")[1]
-        title = ROOMS.get(room, room.replace("_", " ").capitalize())
-        sections.setdefault(title, []).append(path_of(value))
-    sections["Pictures"] = [path_of(getattr(ma.plotting, name)) for name in drawing()]
+        found[at_home[value.__module__.split(".")[1]]][name] = value
+    found[PICTURES] = {f"plotting.{name}": getattr(ma.plotting, name) for name in drawing()}
+    return found
+
+
+def page_of(title: str) -> str:
+    """The page of a topic, by its name in the site."""
+    return f"reference/python/{title.lower().replace(' ', '_')}.md"
+
+
+def names() -> str:
+    """A table for every topic, with the first sentence of each docstring."""
     return "\n\n".join(
-        "\n\n".join([f"## {title}", *entries]) for title, entries in sections.items() if entries
+        f"## {title}\n\n| name | |\n| --- | --- |\n"
+        + "\n".join(f"| `{name}` | {first_sentence(value)} |" for name, value in values.items())
+        for title, values in topics().items()
     )
+
+
+def first_sentence(value: Any) -> str:
+    """What a name is, for a cell of a table."""
+    return cell((value.__doc__ or "").strip().split("\n\n")[0].replace("``", "`"))
 
 
 def drawing() -> list[str]:
@@ -60,8 +89,8 @@ def drawing() -> list[str]:
 
 
 def path_of(value: Any) -> str:
-    """What mkdocstrings replaces by the docstring of a value."""
-    return f"::: {value.__module__}.{value.__qualname__}"
+    """Where a value is at home."""
+    return f"{value.__module__}.{value.__qualname__}"
 
 
 def keys() -> str:

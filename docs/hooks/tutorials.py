@@ -1,53 +1,108 @@
 """Notebooks become pages: each is executed while the site is built, two at a time.
 
-An error in a cell ends the build. What a cell prints and draws is shown below it.
+An error in a cell ends the build, and so does a cell that prints another thing than its file says,
+unless it has the tag `measured`. What a cell prints and draws is shown below it. Nothing is
+written into the repository; ``python docs/measure.py notebooks`` keeps the outputs.
 """
 
 from __future__ import annotations
 
 import base64
 import html
+import logging
 import posixpath
 import re
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import nbclient
-import nbformat
-from mkdocs.structure.files import File
+import printed
 
+ROOT = Path(__file__).parents[2]
+LOG = logging.getLogger("mkdocs.hooks.tutorials")
 SECONDS = 300  # [s] of one cell, compilation included
 PLAYER = re.compile(r'<iframe srcdoc="(?P<page>[^"]*)"')  # a page of its own in the site
+PLAYED = "a page that plays it: it is shown where the cell runs, and in the site"  # kept instead
+_executed: dict[str, Any] = {}  # by text: a site that is served is built again and again
 
 
 def on_files(files: Any, *, config: Any) -> Any:
     """The files of the site, with a page beside every notebook."""
+    from mkdocs.exceptions import PluginError
+    from mkdocs.structure.files import File
+
     notebooks = [file for file in files if file.src_uri.endswith(".ipynb")]
+    LOG.info("executing %d notebooks, two at a time: this takes some minutes", len(notebooks))
     with ThreadPoolExecutor(2) as pool:
-        texts = pool.map(
-            lambda file: executed(Path(file.abs_src_path).read_text("utf-8")), notebooks
-        )
-        for file, notebook in zip(notebooks, texts, strict=True):
+        made = pool.map(lambda file: _timed(Path(file.abs_src_path)), notebooks)
+        for file, notebook in zip(notebooks, made, strict=True):
+            kept = Path(file.abs_src_path).read_text("utf-8")
+            if wrong := list(differences(kept, notebook)):
+                how = f"`python docs/measure.py notebooks {Path(file.src_uri).stem}` writes it"
+                raise PluginError("\n".join([*(f"{file.src_uri}: {one}" for one in wrong), how]))
             for name, content in page_of(notebook, file.src_uri).items():
                 files.append(File.generated(config, name, content=content))
     return files
 
 
-@cache
+def _timed(path: Path) -> Any:
+    """An executed notebook, and a line that says so."""
+    began = time.perf_counter()
+    notebook = executed(path.read_text("utf-8"))
+    LOG.info("executed %s in %.1f s", path.name, time.perf_counter() - began)
+    return notebook
+
+
 def executed(text: str) -> Any:
-    """A notebook with its outputs."""
+    """A notebook with its outputs, executed in a folder beside a copy of the scenarios."""
+    import nbclient
+    import nbformat
+
+    if text in _executed:
+        return _executed[text]
     notebook = nbformat.reads(text, as_version=4)
-    folder = str(Path(__file__).parents[1] / "tutorials")
-    client = nbclient.NotebookClient(
-        notebook,
-        timeout=SECONDS,
-        kernel_name="python3",
-        extra_arguments=["--IPKernelApp.log_level=ERROR"],
-        resources={"metadata": {"path": folder}},
-    )
-    return client.execute()
+    metadata = dict(notebook.metadata)
+    with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(ROOT / "scenarios", Path(folder) / "scenarios")
+        place = Path(folder) / "docs" / "tutorials"
+        place.mkdir(parents=True)
+        client = nbclient.NotebookClient(
+            notebook,
+            timeout=SECONDS,
+            kernel_name="python3",
+            record_timing=False,
+            extra_arguments=["--IPKernelApp.log_level=ERROR"],
+            resources={"metadata": {"path": str(place)}},
+        )
+        client.execute()
+    notebook.metadata.clear()
+    notebook.metadata.update(metadata)
+    _executed[text] = notebook
+    return notebook
+
+
+def differences(kept: str, notebook: Any) -> Iterator[str]:
+    """A line for every cell that prints another thing than its file says."""
+    import nbformat
+
+    for before, now in zip(nbformat.reads(kept, as_version=4).cells, notebook.cells, strict=True):
+        if now.cell_type == "code" and "measured" not in now.metadata.get("tags", ()):
+            said, says = ("".join(map(_words_of, cell.outputs)).strip() for cell in (before, now))
+            if printed.differs(said, says):
+                yield f"{now.id} says {said!r}, and prints {says!r}"
+
+
+def _words_of(output: Any) -> str:
+    """What an output says in words: no picture, no player, no name of an object."""
+    data = output.get("data", {})
+    text = str(output.get("text") or data.get("text/plain", ""))
+    if "image/png" in data or PLAYER.match(str(data.get("text/html", ""))):
+        return ""
+    return "" if text == PLAYED or text.startswith("<") else text
 
 
 def page_of(notebook: Any, uri: str) -> dict[str, str | bytes]:

@@ -172,7 +172,9 @@ def cache_clear() -> int:
 def compile_all(
     jobs: Annotated[
         int | None,
-        typer.Option("--jobs", min=1, metavar="N", help="Processes; as many as cores by default."),
+        typer.Option(
+            "--jobs", min=1, metavar="N", help="Processes; by default one a core, 2 GB each."
+        ),
     ] = None,
 ) -> int:
     """Compile all kernels now; an installation that is not editable brings them."""

@@ -13,6 +13,7 @@ from maneuver_automaton.scenario import load_scenario
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.yaml"))
+FLEETS = sorted((ROOT / "scenarios").glob("fleets/*.yaml"))
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda path: path.stem)
@@ -24,3 +25,16 @@ def test_every_scenario_has_a_picture_and_a_plan(scenario):
     assert document["name"] == there.name
     assert document["automaton_hash"] == automaton_hash(there.problem.automaton)
     assert document["status"] in ("found", "reached", "steps_spent")
+
+
+@pytest.mark.parametrize("scenario", FLEETS, ids=lambda path: path.stem)
+def test_every_scenario_of_several_vehicles_has_a_picture_and_a_plan(scenario):
+    assert (ROOT / "docs" / "pictures" / "gallery" / f"{scenario.stem}.png").is_file()
+    kept = ROOT / "docs" / "plans" / f"{scenario.stem}.json.gz"
+    document = json.loads(gzip.decompress(kept.read_bytes()))
+    fleet = load_scenario(scenario).fleet
+    assert document["name"] == load_scenario(scenario).name
+    assert document["status"] in ("found", "reached", "steps_spent")
+    for name, problem in zip(fleet.names, fleet.problems, strict=True):
+        stated = document["vehicles"][name]["automaton_hash"]
+        assert stated == automaton_hash(problem.automaton)
