@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -61,8 +61,8 @@ def plan_leaving(
     touched = [problem.obstacles[k] for k in held]
     rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in held)
     others = replace(problem, obstacles=rest)
-    contact, none = _Contact(problem, touched), None
-    for way in _ways_out(problem, contact)[:MOST_WAYS]:
+    contact, none, planned = _Contact(problem, touched), None, 0
+    for way in _ways_out(problem, contact):
         first = Plan(
             problem.start, way.trims, durations=way.durations, start_time=problem.start_time
         )
@@ -71,9 +71,9 @@ def plan_leaving(
         if not check_plan(alone, first, goal).passed:
             continue
         left = deadline - time.perf_counter()
-        if none is not None and left <= 0.0:
+        if none is not None and (left <= 0.0 or planned == MOST_WAYS):
             break
-        last = plan(_after(problem, first), time_limit=max(left, LEAST))
+        last, planned = plan(_after(problem, first), time_limit=max(left, LEAST)), planned + 1
         none = none or last
         whole = _joined(first, last.plan)
         if last.plan is None or last.goal_index is None or whole is None:
@@ -231,31 +231,31 @@ def _solids(obstacle: AnyObstacle, near: float) -> list[tuple[Array, float]]:
     ]
 
 
-def _ways_out(problem: Problem, contact: _Contact) -> list[_Way]:
-    """Ways out, the shortest first: of one trim, or of two where there is none of one."""
-    trims, ways = problem.automaton.trims, []
+def _ways_out(problem: Problem, contact: _Contact) -> Iterator[_Way]:
+    """Ways out of one trim, the shortest first, then those of two."""
+    trims: Sequence[Trim] = problem.automaton.trims
     begun: list[tuple[_Way, Array]] = [(_Way(0.0, (), ()), problem.start)]
     for _ in range(2):
+        best: dict[tuple[str, ...], _Way] = {}
         middles = []
         for way, begin in begun:
             for trim in trims:
                 for n, (after, pose, clear) in enumerate(contact.coast(trim, begin)):
                     length = way.length + contact.speed_of(trim) * after
                     longer = _Way(length, (*way.trims, trim), (*way.durations, after))
-                    if clear and after >= problem.horizon.min_coast:
-                        ways.append(longer)
+                    if after < problem.horizon.min_coast:
+                        continue
+                    if clear:
+                        word = tuple(one.name for one in longer.trims)
+                        best[word] = min(best.get(word, longer), longer, key=lambda one: one.length)
                         break
                     if n % EVERY == 0:
                         middles.append((longer, pose))
-        if ways:
-            break
-        trims = trims[:: -(-len(trims) // MOST_SECONDS)]
-        begun = middles
-    order = {trim.name: k for k, trim in enumerate(problem.automaton.trims)}
-    rates = dict(zip(order, problem.rates.tolist(), strict=True))
-
-    def rank(way: _Way) -> tuple[float, float, int]:
-        spent = sum(rates[t.name] * d for t, d in zip(way.trims, way.durations, strict=True))
-        return round(way.length, 9), round(spent, 9), order[way.trims[0].name]
-
-    return sorted(ways, key=rank)
+        yield from sorted(
+            best.values(),
+            key=lambda one: (
+                round(one.length, 9),
+                round(problem.cost_of_trims(one.trims, np.array(one.durations)), 9),
+            ),
+        )
+        trims, begun = trims[:: -(-len(trims) // MOST_SECONDS)], middles

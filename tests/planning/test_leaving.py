@@ -92,6 +92,19 @@ def test_two_trims_where_one_does_not_do():
     assert (np.diff(areas, axis=0) <= 1e-9).all()
 
 
+def test_two_trims_where_the_shortest_coast_hits_another():
+    """Behind it stands a post a hand away: it turns out of the beam at its side, if not back."""
+    beam = Obstacle(ma.Box([2.0, 0.1], [1.2, 0.28]), name="beam")
+    behind = Obstacle(ma.Box([0.1, 0.1], [-0.3, 0.0]), name="behind")
+    problem = problem_of(beam, behind, start=(0.2, 0.0, 0.0), goal=(3.0, -2.0, 0.0))
+    result = ma.plan(problem, leave=True)
+    assert result.status is PlanStatus.FOUND
+    poses = result.plan.pose_at(np.linspace(0.0, result.plan.duration, 3000))
+    areas, distances = overlaps(problem, poses)
+    assert distances[:, 1].min() > 0.0
+    assert areas[-1].max() == 0.0
+
+
 def test_a_free_start_is_planned_as_ever():
     problem = problem_of(POST, start=(-1.0, 0.0, 0.0))
     one, other = ma.plan(problem), ma.plan(problem, leave=True)
