@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from maneuver_automaton.cli.inputs import (
     target,
 )
 from maneuver_automaton.cli.looks import LookOptions
-from maneuver_automaton.cli.progress import progress_bar
+from maneuver_automaton.cli.progress import Advance, progress_bar, waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 
@@ -45,7 +46,8 @@ def build(file: Path, out: Path, *, settings: Settings) -> int:
     path = target(out, "library.json")
     if is_build_file(file):
         return _build_maneuvers(file, path, settings)
-    automaton = automaton_of(file)
+    with waiting("making the library", quiet=settings.quiet):
+        automaton = automaton_of(file)
     make_folder(path.parent)
     try:
         save_library(automaton, path)
@@ -59,14 +61,22 @@ def _build_maneuvers(file: Path, path: Path, settings: Settings) -> int:
     """Trims of a build file and their maneuvers, with a bar; trims and pairs without are listed."""
     from maneuver_automaton.scenario import build_file
 
-    asked = build_file.load_build_file(file)
+    with waiting("finding the trims", quiet=settings.quiet):
+        asked = build_file.load_build_file(file)
+        pairs = asked.pairs()
     make_folder(path.parent)
     done = 0
-    with progress_bar("maneuvers", len(asked.pairs()), quiet=settings.quiet) as advance:
+    shown: contextlib.AbstractContextManager[Advance | None] = (
+        progress_bar("maneuvers", len(pairs), quiet=settings.quiet)
+        if pairs
+        else waiting("joining the trims", quiet=settings.quiet)
+    )
+    with shown as advance:
 
         def count(n: int, _total: int) -> None:
             nonlocal done
-            advance(n - done)
+            if advance is not None:
+                advance(n - done)
             done = n
 
         try:
@@ -127,8 +137,11 @@ def show(file: Path, *, coverage: bool = False, model_text: str | None = None) -
     out.print(f"  {model.name}, {_count(automaton)}")
     for line in report_lines(validate(automaton)):
         out.print(f"  {line}", soft_wrap=True)
-    for line in coverage_lines(automaton) if coverage else []:
-        out.print(f"  {line}", soft_wrap=True)
+    if coverage:
+        with waiting("sampling what it covers", quiet=False):
+            lines = coverage_lines(automaton)
+        for line in lines:
+            out.print(f"  {line}", soft_wrap=True)
     out.print(f"  hash {automaton_hash(automaton)}", soft_wrap=True)
     return FOUND
 

@@ -10,6 +10,7 @@ from maneuver_automaton._arrays import vector_text
 from maneuver_automaton.automaton.library import automaton_hash, save_library
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import automaton_of, make_folder, not_written, target
+from maneuver_automaton.cli.progress import waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.errors import InvalidScenario
 
@@ -31,7 +32,8 @@ def design(
     from maneuver_automaton.scenario.design_file import design_of_file
 
     make_folder(path.parent)
-    designed = design_of_file(file, instead=instead)
+    with waiting("choosing trims, and proving their factor", quiet=quiet):
+        designed = design_of_file(file, instead=instead)
     _save(designed.automaton, path)
     if not quiet:
         _print(path, designed)
@@ -58,7 +60,8 @@ def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bo
     library = automaton_of(file)
     make_folder(path.parent)
     try:
-        done = disperse_library(library, most=int(instead["most"]))
+        with waiting("choosing maneuvers", quiet=quiet):
+            done = disperse_library(library, most=int(instead["most"]))
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
     _save(done.automaton, path)
