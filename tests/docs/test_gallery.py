@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.planning import plan
 from maneuver_automaton.scenario import load_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -38,3 +39,12 @@ def test_every_scenario_of_several_vehicles_has_a_picture_and_a_plan(scenario):
     for name, problem in zip(fleet.names, fleet.problems, strict=True):
         stated = document["vehicles"][name]["automaton_hash"]
         assert stated == automaton_hash(problem.automaton)
+
+
+@pytest.mark.parametrize("name", ["example10_shifted", "parking", "parking_min_time"])
+def test_where_no_clock_decides_the_kept_plan_is_that_of_the_scenario(name):
+    kept = ROOT / "docs" / "plans" / f"{name}.json.gz"
+    stated = json.loads(gzip.decompress(kept.read_bytes()))
+    result = plan(load_scenario(ROOT / "scenarios" / f"{name}.yaml").problem)
+    assert stated["cost"] == pytest.approx(result.cost, rel=1e-9)
+    assert [one["name"] for one in stated["primitives"]] == list(result.plan.word)
