@@ -22,7 +22,7 @@ def on_files(files: Any, *, config: Any) -> Any:
     from mkdocs.structure.files import File
 
     for kept in sorted(PLANS.glob("*.json.gz")):
-        page = player_page(kept)
+        page = player_of_value(value_of(kept), kept.name.split(".")[0])
         files.append(File.generated(config, player_of(kept.name.split(".")[0]), content=page))
     return files
 
@@ -73,28 +73,33 @@ def player_of(stem: str) -> str:
     return f"players/{stem}.html"
 
 
-def player_page(kept: Path) -> str:
-    """The page that plays a kept plan or closed loop in its scenario."""
+def scenario_of(stem: str) -> Path:
+    """The file of a scenario by its stem, of one vehicle or of several."""
+    return next(path for path in scenarios() if path.stem == stem)
+
+
+def player_of_value(value: Any, stem: str) -> str:
+    """The page that plays a plan or closed loop."""
+    return str(value.player(title=entry(scenario_of(stem)).title).html)
+
+
+def value_of(kept: Path) -> Any:
+    """A kept plan or closed loop in its scenario."""
     from maneuver_automaton.formats.driven_json import load_closed_loop
     from maneuver_automaton.formats.fleet_json import load_fleet
     from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
     from maneuver_automaton.formats.result_json import load_result
     from maneuver_automaton.scenario import load_scenario
 
-    stem = kept.name.split(".")[0]
-    path = next(path for path in scenarios() if path.stem == stem)
+    path = scenario_of(kept.name.split(".")[0])
     scenario: Any = load_scenario(path)
     fleet, loop = path.parent.name == "fleets", entry(path).command == "mpc"
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "plan.json"
         file.write_bytes(gzip.decompress(kept.read_bytes()))
-        read: Any
         if fleet:
-            read = load_fleet_loop if loop else load_fleet
-        else:
-            read = load_closed_loop if loop else load_result
-        played = read(file, scenario.fleet if fleet else scenario.problem)
-        return str(played.player(title=scenario.name).html)
+            return (load_fleet_loop if loop else load_fleet)(file, scenario.fleet)
+        return (load_closed_loop if loop else load_result)(file, scenario.problem)
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
