@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 ROOT = Path(__file__).parents[2]
 PLANS = ROOT / "docs" / "plans"
+BACK = "../gallery.html"  # as seen from a player
 PLACE = re.compile(r"<!-- scenarios -->\n.*?<!-- end -->", flags=re.DOTALL)
 
 
@@ -79,8 +80,11 @@ def scenario_of(stem: str) -> Path:
 
 
 def player_of_value(value: Any, stem: str) -> str:
-    """The page that plays a plan or closed loop."""
-    return str(value.player(title=entry(scenario_of(stem)).title).html)
+    """The page that plays a plan or closed loop, and leads back to the gallery."""
+    from maneuver_automaton.plotting import Player
+
+    content = value.player(title=entry(scenario_of(stem)).title).content
+    return Player({**content, "back": {"href": BACK, "text": "Gallery"}}).html
 
 
 def value_of(kept: Path) -> Any:
@@ -115,7 +119,7 @@ def card(scenario: Path) -> str:
         f"<div markdown>\n"
         f"**{one.title}**\n\n"
         f'<a href="{player_of(scenario.stem)}" title="play it">'
-        f'<img alt="{scenario.stem}" src="{one.picture}"></a>\n\n'
+        f'<img alt="{scenario.stem}" src="pictures/thumbnails/{scenario.stem}.png"></a>\n\n'
         f"{one.about}\n\n"
         f'<a href="{player_of(scenario.stem)}">play</a> · '
         f'<a href="{one.picture}">picture</a> · '

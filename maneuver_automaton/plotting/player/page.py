@@ -21,6 +21,8 @@ FRAME_HEIGHT = 720  # [px] in a notebook
 class Player:
     """A plan to play: one HTML page, drawn by the browser from the numbers in it.
 
+    A content with ``back: {href, text}`` has a link to the page that leads here.
+
     Examples
     --------
     >>> page = Player({"title": "A plan & its <name>"}).html
@@ -28,7 +30,7 @@ class Player:
     (True, False)
     """
 
-    content: Mapping[str, Any] = field(repr=False)  # what `content_of` makes of a plan
+    content: Mapping[str, Any] = field(repr=False)  # what `content_of` makes of a plan, and `back`
 
     @property
     def html(self) -> str:

@@ -38,6 +38,10 @@ function element(kind, className, text = "") {
 
 function buildHead() {
   find("title").textContent = data.title;
+  if (data.back) { // to the page that leads here
+    const { href, text } = data.back;
+    Object.assign(find("back"), { href, textContent: `← ${text}`, hidden: false });
+  }
   for (const [name, value] of data.facts) {
     const pair = element("div");
     pair.append(element("dt", "", name), element("dd", "", value));
