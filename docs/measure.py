@@ -9,7 +9,7 @@ the numbers of a table whose rows have a command of ``maneuver-automaton`` and w
 file that it writes. Only what has an output below it gets one; outputs that begin with
 "(measured on" depend on the clock or the machine.
 ``notebooks``: their outputs, but players (extra docs).
-``gallery``: each scenario by its own command: picture, plan, and for the README its film.
+``gallery``: each scenario by its own command: pictures, plan, and for the README its film.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ sys.path.insert(0, str(ROOT / "docs" / "hooks"))
 import gallery  # noqa: E402
 import printed  # noqa: E402
 import reference  # noqa: E402
+import thumbnails  # noqa: E402
 
 from maneuver_automaton.cli import run  # noqa: E402
 
@@ -195,6 +196,7 @@ def draw_scenario(scenario: Path) -> None:
     PLANS.mkdir(exist_ok=True)
     kept = PLANS / f"{scenario.stem}.json.gz"
     kept.write_bytes(gzip.compress(shortened(made.with_suffix(".json")), mtime=0))
+    thumbnails.main([scenario.stem])
     shutil.rmtree("out", ignore_errors=True)
 
 
