@@ -7,11 +7,11 @@ gets no deeper into anything that it touched at the start, and touches nothing e
 
 from __future__ import annotations
 
-import functools
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,11 +29,11 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.inside import outside
 
-STEP, SLACK, LEAST = 0.02, 0.01, 1e-3  # of the body's radius: a sample, what it ends clear by; [m]
-FARTHEST = 12.0  # body radii that a way out is long at most, and what is touched across
-DEEPER = 1e-9  # [m] of rounding
+STEP, SLACK, LEAST = 0.04, 0.01, 1e-3  # of the body's radius: a sample, what it ends clear by; [m]
+FARTHEST = 12.0  # body radii that a coast out is long at most
+DEEPER, TURNS = 1e-9, 1e-9  # [m] of rounding; [rad/s] that are straight on
 EVERY = 5  # samples of a first trim after which a second one is tried
-MOST_WAYS, MOST_SECONDS = 4, 24  # ways out from which is planned; trims that may be second
+MOST_WAYS, MOST_MIDDLES, MOST_SECONDS = 4, 60, 12  # planned from; first coasts; trims after them
 
 
 def plan_leaving(
@@ -62,7 +62,7 @@ def plan_leaving(
     rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in held)
     others = replace(problem, obstacles=rest)
     contact, none, planned = _Contact(problem, touched), None, 0
-    for way in _ways_out(problem, contact):
+    for way in _ways_out(problem, contact, deadline):
         first = Plan(
             problem.start, way.trims, durations=way.durations, start_time=problem.start_time
         )
@@ -156,58 +156,60 @@ class _Contact:
     """What the body touches at the start of a problem, all seen from there, unturned."""
 
     def __init__(self, problem: Problem, touched: list[AnyObstacle]) -> None:
-        body = body_of(problem.footprint)
-        self.step = max(STEP * body.reach, LEAST)
-        self.clear = problem.margin + max(SLACK * body.reach, LEAST)
+        self.reach = body_of(problem.footprint).reach
+        self.step = max(STEP * self.reach, LEAST)
+        self.clear = problem.margin + max(SLACK * self.reach, LEAST)
+        self.parts, self.start = parts_of(problem.footprint), problem.start
         self.body = [piece for shape in problem.footprint for piece in convex_pieces(shape)]
         self.body = self.body or [(np.zeros((1, 2)), 0.0)]
-        self.parts, self.start = parts_of(problem.footprint), problem.start
         away = SE2(np.array([-problem.start[0], -problem.start[1], 0.0]))
-        self.most = FARTHEST * max(body.reach, self.clear)
-        near = self.most + 2.0 * body.reach + self.clear
-        self.solids = [_solids(one.moved(away), near) for one in touched]
-        corners = [np.concatenate([corners for corners, _ in one]) for one in self.solids]
-        self.most += max(float(np.ptp(one, axis=0).max()) for one in corners)
-        self.depth = problem.margin - float(self.off(self.start).min())
-
-    def off(self, pose: Array) -> Array:
-        """Distance of the body to each obstacle; where they overlap, less the depth [m]."""
-        import shapely
-
-        place = shapely.Point(pose[:2] - self.start[:2])
-        areas = self._areas(float(pose[2]))
-        return np.array(
-            [one.distance(place) or -float(shapely.distance(one.boundary, place)) for one in areas]
-        )
-
-    @functools.lru_cache(maxsize=64)  # noqa: B019, it ends with the query
-    def _areas(self, heading: float) -> list[Any]:
-        """Positions in which the body overlaps each obstacle."""
-        import shapely
-
-        turned = [(SE2(np.array([0.0, 0.0, heading])).act(p), r) for p, r in self.body]
-        return [
-            shapely.union_all(
-                [
-                    shapely.MultiPoint((solid[:, None] - ring).reshape(-1, 2)).convex_hull.buffer(
-                        r + s
-                    )
-                    for solid, s in solids
-                    for ring, r in turned
-                ]
-            )
-            for solids in self.solids
+        self.solids = [_solids(one.moved(away)) for one in touched]
+        self.boxes = [
+            np.array([[*(ring.min(axis=0) - r), *(ring.max(axis=0) + r)] for ring, r in pieces])
+            for pieces in self.solids
         ]
+        self.within = FARTHEST * max(self.reach, self.clear)
+        self.depth = problem.margin - float(self.off(self.start, within=self.within).min())
+
+    def off(self, pose: Array, *, within: float) -> Array:
+        """Distance of the body to each obstacle; where they overlap, less the depth [m].
+
+        What is further away, or deeper, than `within` [m] is so at least.
+        """
+        import shapely
+
+        place = pose[:2] - self.start[:2]
+        near = within + max(float(np.hypot(*one.middle)) + one.reach for one in self.parts)
+        turned = SE2(np.array([0.0, 0.0, pose[2]]))
+        found = []
+        for pieces, boxes in zip(self.solids, self.boxes, strict=True):
+            gaps = np.maximum(np.maximum(boxes[:, :2] - place, place - boxes[:, 2:]), 0.0)
+            area = shapely.union_all(
+                [
+                    shapely.MultiPoint(
+                        (pieces[k][0][:, None] - turned.act(ring)).reshape(-1, 2)
+                    ).convex_hull.buffer(r + pieces[k][1])
+                    for k in np.flatnonzero(np.hypot(*gaps.T) <= near).tolist()
+                    for ring, r in self.body
+                ]
+            )  # where the body overlaps
+            point = shapely.Point(place)
+            aside = within if area.is_empty else area.distance(point)
+            found.append(aside or -float(shapely.distance(area.boundary, point)))
+        return np.clip(found, -within, within)
 
     def coast(self, trim: Trim, begin: Array) -> Iterator[tuple[float, Array, bool]]:
         """Times, poses, and whether it is clear there, as long as it gets no deeper."""
-        speed = self.speed_of(trim)
-        before = self.off(begin)
-        for n in range(1, int(self.most / self.step) if speed > 0.0 else 0):
+        speed, turn = self.speed_of(trim), abs(float(trim.body_velocity[2]))
+        if not speed > 0.0:
+            return
+        lasting = min(trim.max_duration, self.within / speed, math.tau / max(turn, TURNS))
+        before = self.off(begin, within=self.within)
+        for n in range(1, int(lasting * speed / self.step) + 1):
             after = n * self.step / speed
             here = trim.coast(SE2(begin), after).pose
-            off = self.off(here)
-            if after > trim.max_duration or (off < np.minimum(before, self.clear) - DEEPER).any():
+            off = self.off(here, within=max(-float(before.min()), self.clear) + self.step)
+            if (off < np.minimum(before, self.clear) - DEEPER).any():
                 return
             yield after, here, bool((off >= self.clear).all())
             before = off
@@ -217,21 +219,16 @@ class _Contact:
         return float(fastest_point(self.parts, trim.body_velocity[None])[0])
 
 
-def _solids(obstacle: AnyObstacle, near: float) -> list[tuple[Array, float]]:
-    """Convex pieces (corners, rounding) of an obstacle; of a map, those `near` the origin [m]."""
+def _solids(obstacle: AnyObstacle) -> list[tuple[Array, float]]:
+    """Convex pieces (corners, rounding) of an obstacle; of a map, its runs of cells."""
     import shapely
 
-    if not isinstance(obstacle, OccupancyMap):
-        return convex_pieces(obstacle.shape)
-    around = shapely.Point(0.0, 0.0).buffer(near)
-    return [
-        (shapely.get_coordinates(run)[:-1], 0.0)
-        for run in runs_of(obstacle)
-        if run.intersects(around)
-    ]
+    if isinstance(obstacle, OccupancyMap):
+        return [(shapely.get_coordinates(run)[:-1], 0.0) for run in runs_of(obstacle)]
+    return convex_pieces(obstacle.shape)
 
 
-def _ways_out(problem: Problem, contact: _Contact) -> Iterator[_Way]:
+def _ways_out(problem: Problem, contact: _Contact, deadline: float) -> Iterator[_Way]:
     """Ways out of one trim, the shortest first, then those of two."""
     trims: Sequence[Trim] = problem.automaton.trims
     begun: list[tuple[_Way, Array]] = [(_Way(0.0, (), ()), problem.start)]
@@ -239,6 +236,8 @@ def _ways_out(problem: Problem, contact: _Contact) -> Iterator[_Way]:
         best: dict[tuple[str, ...], _Way] = {}
         middles = []
         for way, begin in begun:
+            if way.trims and time.perf_counter() > deadline:
+                break
             for trim in trims:
                 for n, (after, pose, clear) in enumerate(contact.coast(trim, begin)):
                     length = way.length + contact.speed_of(trim) * after
@@ -258,4 +257,5 @@ def _ways_out(problem: Problem, contact: _Contact) -> Iterator[_Way]:
                 round(problem.cost_of_trims(one.trims, np.array(one.durations)), 9),
             ),
         )
-        trims, begun = trims[:: -(-len(trims) // MOST_SECONDS)], middles
+        trims = trims[:: -(-len(trims) // MOST_SECONDS)]
+        begun = middles[:: max(-(-len(middles) // MOST_MIDDLES), 1)]
