@@ -62,7 +62,7 @@ def plan_leaving(
     rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in held)
     others = replace(problem, obstacles=rest)
     contact, none, planned = _Contact(problem, touched), None, 0
-    for way in _ways_out(problem, contact, deadline):
+    for way in _ways_out(problem, contact, deadline - 0.5 * time_limit):
         first = Plan(
             problem.start, way.trims, durations=way.durations, start_time=problem.start_time
         )
