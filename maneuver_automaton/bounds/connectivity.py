@@ -27,7 +27,7 @@ from maneuver_automaton.problem import Bounds
 from maneuver_automaton.search.lattice_window import window_of
 
 HEADINGS = 8  # of the roots of the tree
-MOST_ROOTS = 48  # along a side
+MOST_ROOTS = 4096  # in the plane: a long corridor has as small ones as a room
 FINEST = 2e-4  # [m] smallest side of a box ...
 FINEST_SHARE = 1e-8  # ... or this share of the scene: places are counted by 32 bits
 PRICE = 0.85  # power of its side that a box costs: large ones are split before many small ones
@@ -184,7 +184,8 @@ def _grid(scene: PoseScene, poses: Array, bounds: Bounds, price: float) -> Grid:
     turn = 2.0 * math.pi / turns
     box, _, _ = window_of(bounds, scene.world, poses, radius=around)
     extent = float((box[2:] - box[:2]).max())
-    size = max(turn * arm if scene.turns else around, extent / MOST_ROOTS)
+    area = float(np.prod(box[2:] - box[:2]))
+    size = max(turn * arm if scene.turns else around, math.sqrt(area / MOST_ROOTS))
     box[:2] -= 0.0 if bounds.x is not None and bounds.y is not None else size
     box[2:] += 0.0 if bounds.x is not None and bounds.y is not None else size
     columns, rows = np.maximum(np.ceil((box[2:] - box[:2]) / size), 1.0).astype(int).tolist()

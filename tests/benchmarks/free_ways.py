@@ -44,7 +44,8 @@ from tests.matrix.vehicles import VEHICLES, Vehicle
 
 TOGETHER = 10  # scenes of one vehicle and one body
 BOUNDED = 7  # one of so many scenes is asked for a lower bound
-SAMPLES = 200  # poses along a word
+TOLD = 50  # scenes between two lines of progress
+SAMPLES = 120  # poses along a word
 MOST_BOXES = 3_000  # of a proof
 BLOCKING = ("unreachable", "start_blocked", "goal_blocked")
 
@@ -273,7 +274,9 @@ def _samples(
         steps = np.hypot(*np.diff(poses[:, :2], axis=0).T)
         between = max(between, float((steps + arm * np.abs(np.diff(poses[:, 2]))).max()))
         size = max(size, arm)
-        bodies.append([shapely.transform(own, _placed(pose)) for pose in poses])
+        corners = SE2(poses[:, None, :3]).act(shapely.get_coordinates(own))
+        copies = np.repeat(np.array([own]), len(poses))
+        bodies.append(shapely.set_coordinates(copies, np.asarray(corners).reshape(-1, 2)))
     whole = shapely.union_all(np.array(bodies), axis=0)
     return _Swept(
         times=times,
@@ -293,10 +296,6 @@ def _outline(shape: Shape) -> Any:
             shape.radius / math.cos(math.pi / 64), quad_segs=16
         )
     return shapely.Polygon(shape.corners, getattr(shape, "holes", ()))
-
-
-def _placed(pose: np.ndarray) -> Any:
-    return lambda points: np.asarray(SE2(pose[:3]).act(points))
 
 
 def _obstacles(
@@ -533,6 +532,8 @@ def main() -> None:
         counts["wrong" if said else "right"] += 1
         for one in said:
             print(f"{k} {scene.vehicle} {scene.body}: {one}", flush=True)
+        if (k + 1) % TOLD == 0:
+            print(f"{dict(counts)} up to {k}", flush=True)
     spent = time.process_time() - began
     print(f"{dict(counts)}, {1e3 * spent / max(chosen.scenes, 1):.0f} ms each")
 

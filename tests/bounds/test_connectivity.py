@@ -125,3 +125,19 @@ def test_a_point_and_a_disc_have_no_headings():
         assert (separation(problem) is not None) is is_separated
     inside = dataclasses.replace(problem, bounds=Bounds(x=(-4.9, 4.9)))
     assert separation(inside) is not None
+
+
+def test_a_long_corridor_has_as_small_boxes_as_a_short_one():
+    """Too narrow to turn round in by 18 cm; the work grows as the corridor does."""
+
+    def closed(length):
+        width = math.hypot(2.0, 1.4) - 0.18
+        walls = [(-1, -1, length + 1, 0), (-1, width, length + 1, width + 1)]
+        walls += [(-1, 0, 0, width), (length, 0, length + 1, width)]
+        obstacles = [Box([c - a, d - b], [0.5 * (a + c), 0.5 * (b + d)]) for a, b, c, d in walls]
+        ends = [[3.0, 0.5 * width, 0.0], [length - 3.0, 0.5 * width, math.pi]]
+        return Problem(CAR, *ends, obstacles=obstacles, footprint=Box([2.0, 1.4]))
+
+    short, long = (connected(closed(length), most_boxes=300_000) for length in (20.0, 100.0))
+    assert short.answer is long.answer is Connection.SEPARATED
+    assert long.boxes < 6 * short.boxes
