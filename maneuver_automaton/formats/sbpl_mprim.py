@@ -45,6 +45,7 @@ MULTIPLIER, PRIMITIVE_RADIUS, POSES = (
     "intermediateposes:",
 )
 FARTHEST_CELLS = 50  # from the first pose, besides three times the way to the end
+UNEVEN = 1.5  # times the longest other step, that the first may be where the first pose is left out
 IN_CELL, IN_BIN = 0.5, 0.5  # of a cell and of a step between headings: how far off an end may be
 
 
@@ -56,7 +57,7 @@ class MprimPrimitive:
     start: int  # index of the first heading
     end: tuple[int, int, int]  # columns and rows gained, last heading modulo their number
     cost_multiplier: int
-    poses: Array  # (n, 3) from (0, 0, first heading) [m, m, rad]
+    poses: Array  # (n, 3) from (0, 0, first heading), which may be left out [m, m, rad]
     turning_radius: float | None = None  # [m], 0 if straight; stated with listed headings only
 
     def __post_init__(self) -> None:
@@ -315,7 +316,7 @@ def _primitive(
         words.key(PRIMITIVE_RADIUS)
         own = words.finite(PRIMITIVE_RADIUS)
     words.key(POSES)
-    count = words.whole(POSES, least=2)
+    count = words.whole(POSES, least=1)
     poses: list[list[float]] = []
     first = words.line
     for k in range(count):
@@ -344,22 +345,31 @@ def _heading(words: _Words, what: str, headings: Array) -> int:
 def _check_ends(
     words: _Words, made: MprimPrimitive, resolution: float, headings: Array, first: int
 ) -> None:
-    """The first pose is the origin at the first heading, the last in its cell and bin."""
-    bins = 2.0 * np.pi if headings.size == 1 else float(_narrowest(headings))
+    """The last pose is in its cell and bin, the first at the origin or a step from it."""
     column, row, last = made.end
-    meant = np.array([[0.0, 0.0, headings[made.start]], [0.0, 0.0, headings[last % headings.size]]])
-    meant[1, :2] = resolution * column, resolution * row
-    for pose, need, line in (
-        (made.poses[0], meant[0], first),
-        (made.poses[-1], meant[1], words.line),
-    ):
-        off = np.abs(pose - need)
-        off[2] = abs(float(wrapped(off[2])))
-        if not (off[:2].max() <= IN_CELL * resolution and off[2] <= IN_BIN * bins):
-            raise InvalidScenario(
-                f"{words.path}:{line}: got the pose ({pose[0]:g}, {pose[1]:g}, {pose[2]:g}), need "
-                f"it in the cell and at the heading of ({need[0]:g}, {need[1]:g}, {need[2]:g})"
-            )
+    meant = np.array([resolution * column, resolution * row, headings[last % headings.size]])
+    begin = np.array([0.0, 0.0, headings[made.start]])
+    pose, need, line = made.poses[-1], meant, words.line
+    if _is_at(pose, need, resolution, headings):
+        steps = np.abs(np.diff(np.vstack([begin, made.poses]), axis=0))
+        steps[:, 2] = np.abs(wrapped(steps[:, 2]))
+        sizes = np.column_stack([np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]])
+        longest = sizes[1:].max(axis=0, initial=0.0) if len(sizes) > 1 else sizes[0]
+        cell = (IN_CELL * resolution, IN_BIN * _narrowest(headings))
+        if (sizes[0] <= np.maximum(UNEVEN * longest, cell)).all():
+            return
+        pose, need, line = made.poses[0], begin, first
+    raise InvalidScenario(
+        f"{words.path}:{line}: got the pose ({pose[0]:g}, {pose[1]:g}, {pose[2]:g}), need it in "
+        f"the cell and at the heading of ({need[0]:g}, {need[1]:g}, {need[2]:g})"
+    )
+
+
+def _is_at(pose: Array, node: Array, resolution: float, headings: Array) -> bool:
+    """Whether a pose is in the cell and bin of a node."""
+    off = np.abs(pose - node)
+    turn = abs(float(wrapped(off[2])))
+    return bool(off[:2].max() <= IN_CELL * resolution and turn <= IN_BIN * _narrowest(headings))
 
 
 def _check_between(words: _Words, made: MprimPrimitive, resolution: float) -> None:
@@ -376,15 +386,22 @@ def _check_between(words: _Words, made: MprimPrimitive, resolution: float) -> No
 
 
 def _narrowest(headings: Array) -> float:
+    """Least step between headings [rad], a full turn where there is one alone."""
     return float(np.diff(np.append(headings, headings[0] + 2.0 * np.pi)).min())
 
 
 def _meant(file: MprimFile, one: MprimPrimitive) -> Move:
-    """A primitive whose first and last poses are what their cells and headings say."""
+    """A primitive whose first and last poses are what their cells and headings say.
+
+    A first pose in another cell, or at another heading, than that of the origin is the second.
+    """
     column, row, last = one.end
     last %= file.headings.size
     begin, end = float(file.headings[one.start]), float(file.headings[last])
-    poses = continuous(one.poses, last_heading=end)
+    origin = np.array([0.0, 0.0, begin])
+    stated = len(one.poses) > 1 and _is_at(one.poses[0], origin, file.resolution, file.headings)
+    poses = one.poses if stated else np.vstack([origin, one.poses])
+    poses = continuous(poses, last_heading=end)
     poses[:, 2] -= _turns(poses[0, 2] - begin)
     poses[0] = 0.0, 0.0, begin
     poses[-1] = file.resolution * column, file.resolution * row, end + _turns(poses[-1, 2] - end)

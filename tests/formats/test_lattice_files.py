@@ -37,6 +37,20 @@ from maneuver_automaton.primitives.resimulation import maneuver_defect
 from maneuver_automaton.problem import Problem
 from tests.formats.outside import DATA, message_of, needs_data
 
+FOUR_POSES = """\
+resolution_m: 0.1
+numberofangles: 1
+totalnumberofprimitives: 1
+primID: 0
+startangle_c: 0
+endpose_c: 3 0 0
+additionalactioncostmult: 1
+intermediateposes: 4
+0 0 0
+0.1 0 0
+0.2 0 0
+0.3 0 0
+"""
 MPRIM = """\
 resolution_m: 0.5
 numberofangles: 4
@@ -229,6 +243,32 @@ def test_a_plan_keeps_away_from_costly_primitives(tmp_path, costly):
 def test_what_is_wrong_with_an_mprim(tmp_path, old, new, message):
     assert MPRIM.count(old) == 1
     assert message_of(read_mprim, tmp_path / "a.mprim", MPRIM.replace(old, new)) == message
+
+
+def test_a_first_pose_may_be_left_out(tmp_path):
+    """SBPL compares the last pose alone; what is left out is the origin."""
+    whole = read_mprim(write(tmp_path, "a.mprim", FOUR_POSES))
+    short = FOUR_POSES.replace("poses: 4\n0 0 0\n", "poses: 3\n")
+    without = read_mprim(write(tmp_path, "b.mprim", short))
+    assert [len(file.primitives[0].poses) for file in (whole, without)] == [4, 3]
+    one, other = (automaton_of_mprim(file).maneuvers[0] for file in (whole, without))
+    np.testing.assert_array_equal(one.course.pose, other.course.pose)
+    np.testing.assert_array_equal(one.course.time, other.course.time)
+
+
+def test_more_than_the_first_pose_may_not_be_left_out(tmp_path):
+    text = FOUR_POSES.replace("poses: 4\n0 0 0\n0.1 0 0\n", "poses: 2\n")
+    said = message_of(read_mprim, tmp_path / "a.mprim", text)
+    assert (
+        said == ":9: got the pose (0.2, 0, 0), need it in the cell and at the heading of (0, 0, 0)"
+    )
+
+
+@needs_data
+def test_a_file_whose_first_pose_is_left_out_is_read():
+    (maneuver,) = automaton_of_mprim(read_mprim(DATA / "field/small.mprim")).maneuvers
+    np.testing.assert_allclose(maneuver.course.pose[:, 0], [0.0, 0.1, 0.2, 0.3], atol=1e-12)
+    assert maneuver.duration == pytest.approx(0.3)
 
 
 def test_numbers_of_primitives_differ(tmp_path):
