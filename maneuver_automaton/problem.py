@@ -156,6 +156,7 @@ class SearchSettings:
     cell: float | None = None  # [m] of the lattice, scaled to the vehicle if None
     headings: int | None = None  # of the lattice, 72 if None
     weight: float | None = None  # of the cost to go in the first pass, 2 if None
+    backwards: bool = False  # from the goals, on a lattice of cells and headings
     show_nodes: bool = False  # hand over what the first plan's search expanded
     improve: bool = True  # a plan that was found; otherwise the first that passes is returned
     polish: bool = True  # plans with inertia, beyond what the library has
@@ -445,7 +446,7 @@ class Problem:
             return self.cost_of_trims(plan.trims, plan.durations)
         coasting = float(self.rates_of(plan) @ plan.durations)
         maneuvers = sum(self.maneuver_cost(one) for one in plan.maneuvers if one)
-        driven = [self._velocities(one) for one in plan.primitives]
+        driven = [self.velocities_along(one) for one in plan.primitives]
         return coasting + maneuvers + self.cost.switching(np.concatenate(driven))
 
     def cost_of_trims(self, trims: Sequence[Trim], durations: Array) -> float:
@@ -478,7 +479,7 @@ class Problem:
         ]
         return maneuver.cost_multiplier * float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
 
-    def _velocities(self, primitive: Primitive) -> Array:
+    def velocities_along(self, primitive: Primitive) -> Array:
         """Body velocities (n, dof) of a primitive, one for every stretch in one direction."""
         if isinstance(primitive, Trim):
             return primitive.body_velocity[None]

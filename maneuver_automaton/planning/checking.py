@@ -95,7 +95,7 @@ def check_plan(
             obstacles=problem.obstacles,
             body_height=problem.body_height,
             margin=problem.margin,
-            states=_end_states(problem, goal),
+            states=_end_states(problem, plan, goal),
             zones=problem.zones,
             around=workspace.surroundings,
             ask=lambda: _ask(budget),
@@ -313,11 +313,15 @@ def _rows_within_reach(
     return [slice(first, last) for first, last in runs.reshape(-1, 2).tolist() if last - first > 1]
 
 
-def _end_states(problem: Problem, goal: Goal) -> tuple[Array, Array] | None:
-    """Reduced states in which a vehicle with inertia begins and ends."""
+def _end_states(problem: Problem, plan: Plan, goal: Goal) -> tuple[Array, Array] | None:
+    """Reduced states in which a vehicle with inertia begins and ends.
+
+    On a lattice the last one is the heading at which the plan ends, within the goal's tolerance.
+    """
     if problem.automaton.is_kinematic:
         return None
-    return problem.first_trim.reduced_state, problem.last_trim(goal).reduced_state
+    last = problem.last_trim(replace(goal, pose=plan.end))
+    return problem.first_trim.reduced_state, last.reduced_state
 
 
 def _origin(goal: Goal) -> tuple[float, float]:

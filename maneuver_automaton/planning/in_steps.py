@@ -134,8 +134,8 @@ def _why_none(
     if found.why_refused:
         return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
     near = ""
-    if first and math.isfinite(first.nearest):
-        near = f"; the nearest node is {first.nearest:.3g} m off"
+    if first and math.isfinite(first.nearest[0]):
+        near = "; the nearest node is {:.3g} m and {:.3g} rad off".format(*first.nearest)
     if first and first.exhausted:
         return PlanStatus.NO_PLAN, f"none at any resolution tried, which proves nothing{near}"
     spent = f"{found.counts['expansions']} expansions" if lattice else "the expansions allowed"

@@ -55,8 +55,12 @@ def climbs_among_obstacles(problem: Problem) -> bool:
 
 
 def has_tolerance(problem: Problem) -> bool:
-    """Whether a plan may end beside a goal."""
-    return any(goal.tolerance_m > 0.0 or goal.tolerance_rad > 0.0 for goal in problem.goals)
+    """Whether a plan may end beside a goal; on a lattice also whether at any heading."""
+    turns = problem.automaton.lattice is not None
+    return any(
+        goal.tolerance_m > 0.0 or goal.tolerance_rad > 0.0 or (turns and goal.free_heading)
+        for goal in problem.goals
+    )
 
 
 def rests_at_both_ends(problem: Problem) -> bool:

@@ -6,7 +6,7 @@ import math
 
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.lattice_goals import EXACT, nearest_on_lattice
+from maneuver_automaton.search.lattice_goals import nearest_on_lattice
 
 
 def goals_off_lattice(problem: Problem) -> PlanResult | None:
@@ -37,23 +37,19 @@ def why_off_lattice(problem: Problem, goal: Goal) -> str:
     >>> library = Automaton(LatticeBody(resolution=0.5), (east,), (ahead,))
     >>> problem = Problem(library, [0, 0, 0], [1.1, 0, 0])
     >>> why_off_lattice(problem, problem.goals[0])
-    'the goal is 0.1 m beside the lattice of 0.5 m that begins at the start: its next cell is \
-at (1, 0) m'
+    'the goal is beside the lattice of 0.5 m that begins at the start: the nearest node, (1, 0) m \
+at 0 rad, is 0.1 m and 0 rad off'
     """
     near = nearest_on_lattice(problem, goal)
     if near is None or near.is_near(goal):
         return ""
     x, y, heading = (near.pose + 0.0).tolist()
-    if near.turn > goal.tolerance_rad + EXACT:
-        facing = math.remainder(heading, 2.0 * math.pi)
-        return (
-            f"the heading of the goal is {near.turn:.6g} rad beside the headings of the lattice "
-            f"that begins at the start: that of {problem.last_trim(goal).name!r} is {facing:.10g} "
-            "rad"
-        )
     cell = problem.automaton.model.resolution  # type: ignore[attr-defined]
+    allowed = ""
+    if goal.tolerance_m or goal.tolerance_rad:
+        allowed = f"; its tolerance is {goal.tolerance_m:.6g} m and {goal.tolerance_rad:.6g} rad"
     return (
-        f"the goal is {near.distance:.6g} m beside the lattice of {cell:g} m "
-        "that begins at the start: "
-        f"its next cell is at ({x:.10g}, {y:.10g}) m"
+        f"the goal is beside the lattice of {cell:g} m that begins at the start: the nearest node, "
+        f"({x:.10g}, {y:.10g}) m at {math.remainder(heading, 2.0 * math.pi):.10g} rad, is "
+        f"{near.distance:.6g} m and {near.turn:.6g} rad off{allowed}"
     )

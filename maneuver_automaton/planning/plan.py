@@ -164,6 +164,12 @@ def plan_within(
     problem: Problem, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
     """The answer to a problem within a budget, the checks included; kernels are loaded already."""
+    if problem.automaton.lattice is not None and problem.search.method in ("auto", "lattice"):
+        from maneuver_automaton.planning.on_state_lattice import plan_on_state_lattice
+
+        known = plan_on_state_lattice(problem, budget, workspace, alternatives=alternatives)
+        if known is not None:
+            return with_proof(known, budget)
     if has_tolerance(problem):
         from maneuver_automaton.planning.within_tolerance import plan_within_tolerance
 
@@ -258,6 +264,11 @@ def _load_all(problem: Problem, workspace: Workspace) -> None:
         from maneuver_automaton.planning.checking import load_checking
 
         load_checking()  # what is imported in the first check would make it late
+    if problem.automaton.lattice is not None and problem.search.method in ("auto", "lattice"):
+        from maneuver_automaton.planning.on_state_lattice import load_state_lattice
+
+        if load_state_lattice(problem, workspace):
+            return
     in_space = problem.start.size > 3 and guarded
     if has_inertia(problem) or uses_lattice(problem) or in_space:
         from maneuver_automaton.planning.steps import load_steps

@@ -35,9 +35,10 @@ class PlanStatus(enum.Enum):
 class LowerBound:
     """No plan of a problem costs less than `value`.
 
-    What proves it is its `kind`: ``exhaustive`` a search of all words, ``cells`` a function on
-    cells of poses, ``incumbent`` that no cheaper plan is left, ``disc`` the path of the inscribed
-    disc, and formulas: ``distance``, ``turn``, ``effort``, ``time``.
+    What proves it is its `kind`: ``exhaustive`` a search of all words or of all nodes of a lattice
+    of primitives, ``open`` the most promising node that such a search has left, ``cells`` a
+    function on cells of poses, ``incumbent`` that no cheaper plan is left, ``disc`` the path of the
+    inscribed disc, and formulas: ``distance``, ``turn``, ``effort``, ``time``.
     """
 
     value: float

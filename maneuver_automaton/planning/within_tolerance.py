@@ -26,12 +26,14 @@ from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, P
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
+from maneuver_automaton.search.lattice_goals import nodes_within
 from maneuver_automaton.search.limits import why_impossible
 
 INSIDE = 1e-6  # share of a tolerance by which poses that are aimed at stay within it
 AROUND = 4  # directions in which poses at a distance lie, the first towards the start
 DENSE = 16  # the same where the goal itself is blocked
 RINGS = (1.0, 0.5)  # shares of the tolerance at which these lie
+MOST_NODES = 32  # of a lattice that are aimed at for each goal
 MOST_AIMS = 12  # poses that are aimed at where the goal itself is blocked
 SHARES = (1.0, 0.5, 0.25)  # of the tolerance that an end may use, until it is free
 LATER = (0.45, 0.8)  # shares of the time left for the first question, and for the second of three
@@ -74,8 +76,13 @@ def _questions(problem: Problem) -> Iterator[Problem]:
     """The goals themselves where a plan may end there, the poses nearest to the start, all others.
 
     Each has its share of the time and of the expansions: many aims at once would take from the
-    searches that improve one plan what they need, and cost more than the exact goal alone.
+    searches that improve one plan what they need, and cost more than the exact goal alone. On a
+    lattice plans end at its nodes alone: those nearest to each goal are asked for.
     """
+    if problem.automaton.lattice is not None:
+        nodes = tuple(node for goal in problem.goals for node in aims_within(problem, goal))
+        yield replace(problem, goals=nodes or problem.goals)
+        return
     aims = list(_aims(problem))
     exact, beside = tuple(aims[: len(problem.goals)]), tuple(aims[len(problem.goals) :])
     near, others = beside[:1], beside[1:]
@@ -108,7 +115,12 @@ def _aims(problem: Problem) -> Iterator[Goal]:
 
 
 def aims_within(problem: Problem, goal: Goal) -> Iterator[Goal]:
-    """Poses within the tolerance of a goal that is blocked itself, aimed at exactly."""
+    """Poses within the tolerance of a goal that is blocked itself, aimed at exactly.
+
+    On a lattice they are its nodes, since plans end nowhere else.
+    """
+    if problem.automaton.lattice is not None:
+        return iter(nodes_within(problem, goal)[:MOST_NODES])
     few = _poses_within(goal, problem.start, AROUND, RINGS[:1])
     many = _poses_within(goal, problem.start, DENSE, RINGS)
     return _exactly(problem, goal, itertools.chain(few, many))

@@ -281,6 +281,7 @@ def _search(part: SearchPart) -> SearchSettings:
         cell=part.cell_m,
         headings=part.headings,
         weight=part.weight,
+        backwards=part.backwards,
         show_nodes=part.show_nodes,
         improve=part.improve,
         polish=part.polish,

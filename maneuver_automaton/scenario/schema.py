@@ -318,6 +318,9 @@ class SearchPart(Part):
         Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a finite number of at least 1")]
         | None
     ) = Field(None, description="lattice: weight of the cost to go")
+    backwards: bool = Field(
+        False, description="lattice_body: search from the goals; false: from the start"
+    )
     show_nodes: bool = Field(False, description="lattice: draw what the first plan's search tried")
     improve: bool = Field(
         True, description="look for better plans once there is one; false: return the first"

@@ -275,6 +275,7 @@ def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
             cell_m=search.cell,
             headings=search.headings,
             weight=search.weight,
+            backwards=search.backwards or None,
             show_nodes=search.show_nodes or None,
             improve=None if search.improve else False,
             polish=None if search.polish else False,

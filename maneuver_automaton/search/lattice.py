@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -14,6 +15,7 @@ from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import DistanceGrid, distance_grid
+from maneuver_automaton.search.lattice_memory import SearchArrays
 from maneuver_automaton.search.lattice_pass import Pass, give_back, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_schedules import (
@@ -37,7 +39,7 @@ class FirstPlan:
     queries: int  # collision queries
     exhausted: bool  # every resolution was tried to its end
     enclosed: str  # why no plan can exist, if the plane alone proves it
-    nearest: float  # [m] least distance to the goal that was reached
+    nearest: tuple[float, float]  # [m, rad] of the pose that came nearest to a goal from it
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of the expanded nodes, if asked for
 
 
@@ -109,12 +111,14 @@ def first_plan(
         queries=sum(one.queries for one in passes),
         exhausted=word is None and not alive and not left_out,
         enclosed=proof,
-        nearest=min(ahead, default=math.inf),
-        nodes=_expanded(query, passes) if query.settings.show_nodes else None,
+        nearest=min(ahead, default=(math.inf, math.inf)),
+        nodes=expanded(query, [one.arrays for one in passes])
+        if query.settings.show_nodes
+        else None,
     )
     for search in passes:
         if begun is None or search is not turns[0].begun:  # whose arrays are those of the bench
-            give_back(search)
+            give_back(search.query, search.arrays)
     return found
 
 
@@ -236,14 +240,14 @@ def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     return ""
 
 
-def _expanded(query: LatticeQuery, passes: list[Pass]) -> Array:
+def expanded(query: LatticeQuery, searches: Iterable[SearchArrays]) -> Array:
     """Poses (n, 4) of the nodes that were expanded, in the problem's frame, and their costs."""
     rows = []
-    for one in passes:
-        n = int(one.arrays.state[layout.N_NODES])
-        closed = one.arrays.links[:n, layout.CLOSED] == 1
+    for one in searches:
+        n = int(one.state[layout.N_NODES])
+        closed = (one.links[:n, layout.CLOSED] == 1) & np.isfinite(one.nodes[:n, layout.COST])
         shown = [layout.X, layout.Y, layout.HEADING, layout.COST]
-        rows.append(one.arrays.nodes[:n][closed][:, shown])
+        rows.append(one.nodes[:n][closed][:, shown])
     nodes = np.concatenate(rows)
     turned = SE2(np.array([0.0, 0.0, query.world.frame[2]])) @ SE2(nodes[:, :3])
     poses = turned.pose.copy()

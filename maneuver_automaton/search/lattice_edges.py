@@ -27,9 +27,6 @@ from maneuver_automaton.search.part_motion import (
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.transitions import SWITCH, transitions_of
 
-OF_A_LATTICE = 0.7  # of its resolution: a cell's diagonal is shorter than the step between poses
-TURN = 4.0  # length scales that a full turn is taken for, whose radius the speed decides
-
 
 def edges_of(library: Library) -> EdgeArrays:
     """The maneuvers, sorted by the class they lead out of, then as the automaton lists them."""
@@ -50,11 +47,17 @@ def edges_of(library: Library) -> EdgeArrays:
 
 
 def motion_along(
-    library: Library, parts: Sequence[Part], edges: EdgeArrays, *, timed: bool
+    library: Library,
+    parts: Sequence[Part],
+    edges: EdgeArrays,
+    *,
+    timed: bool,
+    close: float = CLOSE,
 ) -> tuple[MotionArrays, IntArray]:
     """Pieces of every part, then of the pose alone, along every edge; samples of the parts.
 
-    `timed`: obstacles move, so that it matters when the vehicle is where.
+    `timed`: obstacles move, so that it matters when the vehicle is where. Pieces follow the course
+    to within so many half widths of the body as `close` says.
     """
     if not edges.maneuver.size:
         return no_edges()[1], np.zeros((0, 2), dtype=np.int64)
@@ -62,7 +65,7 @@ def motion_along(
     trim_twists = library.arrays.twists[: library.arrays.n_trims]
     twists = [carried_twists(trim_twists, part.trim_poses) for part in parts]
     own = carried_twists(automaton.body_velocities, np.zeros((len(automaton), 3)))
-    close = CLOSE * min(b.half_width or 0.05 * max(b.reach, 1.0) for b in bodies)
+    close *= min(b.half_width or 0.05 * max(b.reach, 1.0) for b in bodies)
     sources, targets = edges.source, edges.target
     chosen = [automaton.maneuvers[k] for k in edges.maneuver]
     climbs = automaton.body_velocities[:, 3:].sum(axis=1)
@@ -83,6 +86,7 @@ def motion_along(
             reach=0.0 if body is None else body_reach(body),
             close=close,
             timed=timed,
+            stepwise=automaton.lattice is not None,
         )
         if body is not None:
             sizes = np.array([len(times) for _, times in courses], dtype=np.int64)

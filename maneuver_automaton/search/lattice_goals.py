@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import OnLattice
@@ -59,15 +61,39 @@ def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
     return LatticePose(pose, distance, 0.0 if goal.free_heading else abs(turn))
 
 
-def aim_of(problem: Problem, goal: Goal) -> Array:
-    """The pose at which a search aims: the goal's, or the one of the lattice within its tolerance.
+def at_headings(problem: Problem, goal: Goal) -> list[Goal]:
+    """The goal at each heading of the lattice within its tolerance, all of them where any will do.
 
-    A goal on the lattice keeps its own digits.
+    The lattice lies under the start.
     """
-    near = nearest_on_lattice(problem, goal)
-    if near is None or not near.is_near(goal) or max(near.distance, near.turn) <= EXACT:
-        return goal.pose
-    return near.pose
+    model, automaton = problem.automaton.lattice, problem.automaton
+    assert model is not None
+    begun = problem.start[2] - model.heading(problem.first_trim.reduced_state)
+    found = []
+    for trim in automaton.trims:
+        heading = float(begun + model.heading(trim.reduced_state))
+        off = abs(math.remainder(heading - float(goal.pose[2]), 2.0 * math.pi))
+        admitted = goal.free_heading or off <= goal.tolerance_rad + EXACT
+        if admitted and trim.is_rest and goal.trim in (None, trim.name):
+            found.append(Goal(pose=np.append(goal.pose[:2], heading), trim=trim.name))
+    return found
+
+
+def nodes_within(problem: Problem, goal: Goal) -> list[Goal]:
+    """The nodes of the lattice within a goal's tolerance as goals, the nearest ones first."""
+    model = problem.automaton.lattice
+    assert model is not None
+    headings, nearest = at_headings(problem, goal), nearest_on_lattice(problem, goal)
+    if nearest is None or not headings:
+        return []
+    turn = float(problem.start[2]) - model.heading(problem.first_trim.reduced_state)
+    most = math.ceil(goal.tolerance_m / model.resolution) + 1
+    steps = np.stack(np.meshgrid(*[np.arange(-most, most + 1.0)] * 2), axis=-1).reshape(-1, 2)
+    places = nearest.pose[:2] + np.asarray(SE2(_facing(turn)).act(steps * model.resolution))
+    off = np.hypot(*(places - goal.pose[:2]).T)
+    slack = EXACT * (1.0 + float(np.abs(goal.pose[:2]).max()))
+    order = [k for k in np.argsort(off, kind="stable") if off[k] <= goal.tolerance_m + slack]
+    return [replace(one, pose=np.append(places[k], one.pose[2])) for k in order for one in headings]
 
 
 def poses_aimed_at(problem: Problem, goal: Goal) -> Array:
@@ -77,7 +103,7 @@ def poses_aimed_at(problem: Problem, goal: Goal) -> Array:
     to leave it free is no loss. Others come in from where they start.
     """
     if not goal.free_heading:
-        return np.array(aim_of(problem, goal))[None]
+        return np.array(goal.pose)[None]
     ahead = goal.pose[:2] - problem.start[:2]
     first = float(np.arctan2(ahead[1], ahead[0])) if ahead.any() else float(problem.start[2])
     first = float(goal.pose[2]) if problem.automaton.is_kinematic else first
@@ -86,6 +112,7 @@ def poses_aimed_at(problem: Problem, goal: Goal) -> Array:
     return poses
 
 
+@kept_by_first
 def _stays_on_grid(automaton: Automaton, model: OnLattice) -> bool:
     """Whether every trim stands still, and every maneuver ends in the middle of a cell."""
     if automaton.body_velocities.any():

@@ -40,7 +40,7 @@ from maneuver_automaton.search.lattice_trims import (
     trims_at_will,
     trims_of,
 )
-from maneuver_automaton.search.part_motion import Part, posed_parts
+from maneuver_automaton.search.part_motion import CLOSE, Part, posed_parts
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 OF_A_LATTICE = 0.7  # of its resolution: a cell's diagonal is shorter than the step between poses
@@ -132,13 +132,16 @@ def _library(
 
 
 def library_of_trims(
-    priced: PricedTrims, parts: tuple[Part, ...], *, waits: bool
+    priced: PricedTrims, parts: tuple[Part, ...], *, waits: bool, close: float = CLOSE
 ) -> LatticeLibrary:
-    """Trims and the maneuvers between them; `waits`: obstacles move, and rest is an edge."""
+    """Trims and the maneuvers between them; `waits`: obstacles move, and rest is an edge.
+
+    Courses are followed as closely as `motion_along` says.
+    """
     library, arrays = priced.library, priced.library.arrays
     twists, rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     edges = edges_of(library)
-    motion, spans = motion_along(library, parts, edges, timed=waits)
+    motion, spans = motion_along(library, parts, edges, timed=waits, close=close)
     radius = length_scale(twists, body_of(parts[0].shapes), wide=priced.wide)
     speed = np.hypot(twists[:, 0], twists[:, 1])
     lengths = np.array([path_length(library.automaton, k) for k in edges.maneuver])

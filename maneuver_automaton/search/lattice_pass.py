@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
@@ -37,6 +38,7 @@ LONGER = 1.6  # times a least coasting time, for the longer of two coasts
 NO_EDGE = layout.COASTED
 MOST_SPARE = 4  # searches of one library whose arrays are kept
 LARGEST_SPARE = 1 << 15  # nodes of such a search, some 5 MB
+SAME_PLACE = 1e-6  # [m] by which poses at one place differ
 LEAST = 1e-5  # share of the cost that a better word has to save
 
 
@@ -85,14 +87,20 @@ class Pass:
         return self.may_expand and self.expansions < self.resolution.most
 
     @property
-    def nearest(self) -> float:
-        """Distance [m] from the nearest place that was reached to where the search leads."""
-        places = self.arrays.nodes[: int(self.arrays.state[layout.N_NODES]), :2]
-        least = math.inf
-        for aim in self.task.aims:
-            if len(places):
-                least = min(least, float(np.hypot(*(places - aim[:2]).T).min()))
-        return least
+    def nearest(self) -> tuple[float, float]:
+        """Distance [m] and turn [rad] from the nearest pose that was reached to an aim.
+
+        Of poses at one place the one whose heading is nearest; 0 where any heading will do.
+        """
+        poses = self.arrays.nodes[: int(self.arrays.state[layout.N_NODES]), :3]
+        best = (math.inf, math.inf)
+        for aim, free in zip(self.task.aims, self.task.aim_free, strict=True):
+            if len(poses):
+                off = np.hypot(*(poses[:, :2] - aim[:2]).T)
+                near = off <= off.min() + SAME_PLACE
+                turns = np.zeros(1) if free else np.abs(wrapped(poses[near, 2] - aim[2]))
+                best = min(best, (float(off.min()), float(turns.min())))
+        return best
 
     def run(self, n: int, upper_bound: float, *, budget: Budget = UNLIMITED) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
@@ -157,11 +165,11 @@ def pass_of(
     return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
 
 
-def give_back(one: Pass) -> None:
+def give_back(query: LatticeQuery, arrays: SearchArrays) -> None:
     """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
-    spare = one.query.prepared.once(spare_searches, one.query.library)
-    if len(spare) < MOST_SPARE and len(one.arrays.nodes) <= LARGEST_SPARE:
-        spare.append(one.arrays)
+    spare = query.prepared.once(spare_searches, query.library)
+    if len(spare) < MOST_SPARE and len(arrays.nodes) <= LARGEST_SPARE:
+        spare.append(arrays)
 
 
 def first_steps(library: LatticeArrays, task: Task) -> int:

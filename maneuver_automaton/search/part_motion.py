@@ -166,6 +166,7 @@ def pieces_of(
     reach: float,
     close: float,
     timed: bool,
+    stepwise: bool = False,
 ) -> Pieces:
     """Cut courses of a part into pieces that one twist each follows closely.
 
@@ -184,6 +185,8 @@ def pieces_of(
         Deviation [m] that a piece may have beside that between two samples.
     timed : bool
         Whether it matters when the part is where, not only where it comes along.
+    stepwise : bool
+        Whether one twist leads from each sample to the next, so that nothing is unknown between.
     """
     if not courses:
         none, nowhere = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
@@ -193,7 +196,8 @@ def pieces_of(
     times = np.concatenate([times for _, times in courses])
     sizes = np.array([len(times) for _, times in courses])
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    between = _between(poses, times, first, sizes, ends, reach, timed=timed)
+    if not stepwise:
+        between = _between(poses, times, first, sizes, ends, reach, timed=timed)
     length = np.zeros(len(poses))
     length[1:] = np.linalg.norm(_moves(poses[:-1], poses[1:]) * [1.0, 1.0, reach], axis=1)
     length = np.cumsum(length)
@@ -205,7 +209,10 @@ def pieces_of(
         kept = ~split
         begins.append(begin[kept])
         finals.append(end[kept])
-        errors.append(off[kept] + _greatest(between, begin[kept], end[kept]))
+        # Two twists whose ends are so far apart are no farther apart between them, but for a share
+        # of that: the second `off` stands for it.
+        more = off[kept] if stepwise else _greatest(between, begin[kept], end[kept])
+        errors.append(off[kept] + more)
         middle = (begin[split] + end[split]) // 2
         begin, end = (
             np.concatenate([begin[split], middle]),

@@ -185,7 +185,7 @@ def test_it_says_how_near_it_came():
     goal = Goal(pose=[6.0, 0.0, 0.0], trim="1, 0")
     result = plan(posed(goal, obstacles=walls, search=SearchSettings(max_expansions=15)))
     assert result.plan is None
-    assert result.reason.endswith("m off")
+    assert result.reason.endswith("rad off")
 
 
 @pytest.mark.slow

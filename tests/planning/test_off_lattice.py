@@ -116,20 +116,24 @@ def test_the_lattice_lies_under_the_start():
     np.testing.assert_allclose((by @ SE2(one.plan.end)).pose, other.plan.end, atol=1e-9)
 
 
+NEAREST = "the goal is beside the lattice of 0.5 m that begins at the start: the nearest node, "
+
+
 @pytest.mark.parametrize(
     ("goal", "said"),
     [
-        ([1.1, 0.0, 0.0],
-         "the goal is 0.1 m beside the lattice of 0.5 m that begins at the start: its next cell "
-         "is at (1, 0) m"),
-        ([1.0, 0.5, 0.3],
-         "the heading of the goal is 0.3 rad beside the headings of the lattice that begins at "
-         "the start: that of 'heading 0' is 0 rad"),
+        (Goal(pose=[1.1, 0.0, 0.0]), "(1, 0) m at 0 rad, is 0.1 m and 0 rad off"),
+        (Goal(pose=[1.0, 0.5, 0.3]), "(1, 0.5) m at 0 rad, is 0 m and 0.3 rad off"),
+        (Goal(pose=[1.1, 0.0, 1.5], tolerance_m=0.05, tolerance_rad=0.2),
+         "(1, 0) m at 1.570796327 rad, is 0.1 m and 0.0707963 rad off; its tolerance is 0.05 m and "
+         "0.2 rad"),
+        (Goal(pose=[1.1, 0.0, 0.3], free_heading=True),
+         "(1, 0) m at 0 rad, is 0.1 m and 0 rad off"),
     ],
 )  # fmt: skip
 def test_a_goal_beside_the_lattice_is_told(goal, said):
     result = plan(Problem(library(), [0, 0, 0], goal, search=WORK), time_limit=60.0)
-    assert (result.status, result.reason) == (PlanStatus.NO_PLAN, said)
+    assert (result.status, result.reason) == (PlanStatus.NO_PLAN, NEAREST + said)
     assert result.counts == {}
 
 

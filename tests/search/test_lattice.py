@@ -206,7 +206,7 @@ from maneuver_automaton.search.lattice import first_plan
 for name in ("car", "moving", "prices"):
     found = first_plan(query_of(PROBLEMS[name]), budget=replace(UNLIMITED, expansions=25))
     word = found.word
-    print(name, found.expansions, found.queries, found.nearest.hex(), found.exhausted,
+    print(name, found.expansions, found.queries, *map(float.hex, found.nearest), found.exhausted,
           word and ([int(k) for k in word.trims], [float(t).hex() for t in word.durations]))
 for name in ("robot", "prices", "map"):
     _, nodes, links = grown(PROBLEMS[name], one=TIGHT, n=15)

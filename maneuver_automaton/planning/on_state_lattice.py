@@ -1,0 +1,144 @@
+"""Plans on a state lattice: a shortest path of a graph, found and proven by one search."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton.same_motion import POLISHED
+from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.off_lattice import why_off_lattice
+from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
+from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.lattice import expanded
+from maneuver_automaton.search.lattice_pass import give_back
+from maneuver_automaton.search.lattice_task import WEIGHT
+from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.state_lattice import Graph, GraphSearch, graph_of
+
+ALONE = 32768  # expansions of the exact search until one that is greedy begins beside it
+GREEDY = 4  # times fewer expansions than the exact search has in its turn
+MOST_CHUNK = 1 << 20
+MOST_WIDER = 2  # times that a window is widened where there is no plan
+ROUNDING = 1e-12  # relative, of sums of costs
+_NO_PATH = (
+    PlanStatus.UNREACHABLE,
+    "the lattice has no path to a goal: every node that can be reached was looked at",
+)
+
+
+def load_state_lattice(problem: Problem, workspace: Workspace) -> bool:
+    """Have ready what a search needs; whether a problem is one of a state lattice."""
+    graph = graph_of(problem, range(len(problem.goals)), workspace.prepared)
+    if graph is not None:
+        GraphSearch.of(graph, weight=1.0, budget=UNLIMITED).run(1, 0.0)
+    return graph is not None
+
+
+def plan_on_state_lattice(
+    problem: Problem, budget: Budget, workspace: Workspace, *, alternatives: int
+) -> PlanResult | None:
+    """The cheapest plan of a library on a lattice, and the proof; None if it is on none.
+
+    Every node within the tolerance of a goal is an aim. Obstacles are met where the body comes
+    nearer than `MARGIN` to them, as in the checks of a plan.
+    """
+    blocked = blocked_ends(problem)
+    open_ends = any(goal.tolerance_m > 0.0 for goal in problem.goals)
+    if blocked is not None and (blocked.status is PlanStatus.START_BLOCKED or not open_ends):
+        return blocked
+    goals = [k for k, goal in enumerate(problem.goals) if not why_off_lattice(problem, goal)]
+    graph = graph_of(problem, goals, workspace.prepared)
+    if graph is None:
+        return None
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, POLISHED)
+    found.counts.update(expansions=0, collision_queries=0)
+    if problem.search.backwards:
+        graph = graph.backwards() or graph
+    least, why, nodes = _search(found, graph)
+    complete = why[0] is not PlanStatus.OUT_OF_BUDGET
+    if not found.plans:
+        return found.none(*why, nodes=nodes)
+    if not problem.search.improve:  # A* with a weight is off by that factor at most
+        least /= problem.search.weight or WEIGHT
+    value = found.cost if least >= found.cost * (1.0 - ROUNDING) else least
+    if budget.watch is not None and budget.watch.problem is problem:
+        budget.watch.bound = max(budget.watch.bound, value)
+    kind = "exhaustive" if complete else "open"
+    return found.found(bound=LowerBound(value=value, kind=kind), nodes=nodes)
+
+
+def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, str], Array | None]:
+    """Search a lattice to the end; least cost of a plan, why there is none, and what was expanded.
+
+    Nodes are handed over where they are asked for.
+    """
+    least, wider, why, nodes = math.inf, 0, _NO_PATH, None
+    while True:
+        exact = _best(found, graph)
+        if found.problem.search.show_nodes:
+            nodes = expanded(graph.query, [exact.arrays])
+        if exact.alive:  # the time, or the number of expansions, is over
+            spent = f"{found.budget.seconds:.4g} s and {found.counts['expansions']} expansions"
+            late = found.why_unchecked or f"no plan within {spent}"
+            return min(least, exact.least_open), (PlanStatus.OUT_OF_BUDGET, late), nodes
+        least = min(least, exact.cost, found.cost)
+        if exact.cost < found.cost * (1.0 - ROUNDING) and graph.fine is not graph.coarse:
+            if found.budget.is_over:
+                return least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked), nodes
+            graph = replace(graph, fine=graph.coarse)  # it was refused: keep away from obstacles
+        elif exact.cut < min(found.cost, least) * (1.0 - ROUNDING):
+            if not found.plans and _is_closed(found, graph):
+                break
+            if not found.plans and wider == MOST_WIDER:
+                why = PlanStatus.NO_PLAN, "none in a window around all that stands, and no proof"
+                least = min(least, exact.cut)
+                break
+            graph, wider = graph.widened(), wider + 1
+        else:
+            break
+    if found.why_refused:
+        why = PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
+    return least, why, nodes
+
+
+def _best(found: Incumbents, graph: Graph) -> GraphSearch:
+    """A search for the cheapest path, with a greedy one beside it if there is no plan for long."""
+    budget, settings = found.budget, found.problem.search
+    weight = settings.weight or WEIGHT
+    exact = GraphSearch.of(graph, weight=1.0 if settings.improve else weight, budget=budget)
+    chunk, turns = ALONE, [exact]
+    while exact.alive and not (budget.is_over or exact.is_late):
+        for one in turns:
+            spent = found.counts["expansions"]
+            room = 2**62 if budget.expansions is None else budget.expansions - spent
+            if not room:
+                return exact
+            before, asked = one.expansions, one.queries
+            one.run(min(chunk if one is exact else chunk // GREEDY, room), found.cost)
+            found.counts.update(
+                expansions=one.expansions - before, collision_queries=one.queries - asked
+            )
+            if one.cost < found.cost and not one.alive:
+                word, goal = one.word()
+                found.note(one.cost)
+                found.offer(plan_of(found.problem, word), goal)
+        chunk = min(2 * chunk, MOST_CHUNK)
+        if len(turns) == 1 and settings.improve and not found.plans:
+            turns.append(GraphSearch.of(graph, weight=weight, budget=budget))
+    for one in turns:
+        give_back(graph.query, one.arrays)
+    return exact
+
+
+def _is_closed(found: Incumbents, graph: Graph) -> bool:
+    """Whether a search from the goals comes to its end within the window."""
+    back = graph.backwards() if graph.lattice.sign > 0 else None
+    if back is None:
+        return False
+    one = _best(found, back)
+    return not one.alive and one.cut == one.cost == math.inf

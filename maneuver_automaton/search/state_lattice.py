@@ -1,0 +1,430 @@
+"""Exact search of a state lattice: nodes of whole numbers, an admissible bound, all aims at once.
+
+A library whose maneuvers end in the middle of cells, at its own headings, is a graph: its cheapest
+plan is a shortest path. A* finds it, and proves it, from the start or from the goals.
+
+Source: Pivtoraiko, Kelly (2005), *Efficient constrained path planning via search in state
+lattices*, i-SAIRAS; Likhachev, Ferguson (2009), *Planning long dynamically feasible maneuvers for
+autonomous vehicles*, IJRR 28(8), for the search from the goal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton.budget import Budget, Pace
+from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import OnLattice
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search import _kernels_state_lattice as kernels
+from maneuver_automaton.search.lattice_arrays import LatticeArrays, LatticeLibrary
+from maneuver_automaton.search.lattice_goals import EXACT, at_headings
+from maneuver_automaton.search.lattice_library import library_of_trims
+from maneuver_automaton.search.lattice_memory import (
+    SearchArrays,
+    begin_anew,
+    room_takes,
+    search_arrays,
+    spare_searches,
+    with_room,
+)
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.lattice_trims import trims_of
+from maneuver_automaton.search.prepared import Prepared
+from maneuver_automaton.search.scene import Scene, for_library
+from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.word import Word
+
+CLOSE = 1e-6  # [half widths of the body] by which pieces of courses may be off
+MARGIN = 2e-5  # [m] what is nearer to a solid touches it; as fine as the checks of a plan
+MOST_STATES = 256  # of which nodes have numbers of their own
+FIRST_CHUNK = 64  # expansions
+USUAL_CHILDREN = 4  # of a node: where there are more, the arrays are widened again
+
+
+class StateLattice(NamedTuple):
+    """The graph of a library with S states and E edges, along time or against it."""
+
+    cell: float  # [m]
+    frame: tuple[float, float, float, float, float]  # x, y, heading, cos, sin in the world's frame
+    sign: int  # 1: along time, -1: against it
+    heading: Array  # (S,) [rad] in the frame of the lattice
+    first: IntArray  # (S + 1,) where the edges out of each state begin
+    target: IntArray  # (E,)
+    step: IntArray  # (E, 2) columns and rows
+    cost: Array  # (E,)
+    edge: IntArray  # (E,) in the arrays of the library
+    travel: Array  # (E,) [m] length of the path of the pose, or more
+    most_children: int
+    roots: IntArray  # (R, 3) column, row, state
+
+
+class Aims(NamedTuple):
+    """Where a search leads: the nodes of some states within a distance of some places."""
+
+    place: Array  # (G, 2) [m] in the frame of the lattice
+    within: Array  # (G,) [m]
+    admits: NDArray[np.bool_]  # (G, S)
+    per_metre: float  # least cost of a displacement
+    surplus: Array  # (S,) least cost beyond that of the displacement, from a state to an aim's
+
+
+class Tested(NamedTuple):
+    """What motions are tested with: pieces of their courses, and a scene that knows these."""
+
+    lib: LatticeArrays
+    scene: Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Graph:
+    """A problem on a state lattice, ready to be searched."""
+
+    query: LatticeQuery
+    lattice: StateLattice  # along time, from the start
+    aims: Aims
+    coarse: Tested
+    fine: Tested
+    goal_index: tuple[int, ...]  # (G,) which of the problem's goals the aims are
+    surcharge: float  # that each edge has and a plan has once less: the price of a switch
+
+    @property
+    def has_walls(self) -> bool:
+        """Whether no plan may leave the window."""
+        bounds = self.query.problem.bounds
+        return bounds.x is not None or bounds.y is not None
+
+    def widened(self) -> Graph:
+        """The same in a window twice as wide."""
+        window = self.fine.scene.edge_window.copy()
+        half = 0.5 * (window[2:4] - window[:2])
+        window[:2] -= half
+        window[2:4] += half
+        coarse, fine = (
+            one._replace(scene=one.scene._replace(edge_window=window))
+            for one in (self.coarse, self.fine)
+        )
+        return replace(self, coarse=coarse, fine=fine)
+
+    def backwards(self) -> Graph | None:
+        """The search from the goals to the start; None if they hold too many nodes to list."""
+        ahead, aims = self.lattice, self.aims
+        source = np.repeat(np.arange(len(ahead.heading)), np.diff(ahead.first))
+        order = np.argsort(ahead.target, kind="stable")
+        counts = np.bincount(ahead.target, minlength=len(ahead.heading))
+        roots = _nodes_within(aims, ahead.cell)
+        if roots is None:
+            return None
+        at = ahead.roots[0]
+        admits = np.zeros((1, len(ahead.heading)), dtype=np.bool_)
+        admits[0, at[2]] = True
+        lattice = ahead._replace(
+            sign=-1,
+            first=np.concatenate([[0], np.cumsum(counts)]),
+            target=source[order],
+            step=-ahead.step[order],
+            cost=ahead.cost[order],
+            edge=ahead.edge[order],
+            travel=ahead.travel[order],
+            most_children=int(counts.max(initial=0)),
+            roots=roots[:, :3].copy(),
+        )
+        start = Aims(
+            place=at[None, :2] * ahead.cell,
+            within=np.full(1, EXACT),
+            admits=admits,
+            per_metre=aims.per_metre,
+            surplus=_surplus(lattice, aims.per_metre, admits),
+        )
+        goals = tuple(self.goal_index[g] for g in roots[:, 3])
+        return replace(self, lattice=lattice, aims=start, goal_index=goals)
+
+
+def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Graph | None:
+    """The state lattice of a problem and the nodes within the tolerance of some of its goals.
+
+    None if it has none whose search is exact: the library is on no lattice, something moves, the
+    time counts beside the cost, or nothing is known of what the cost of a switch depends on.
+    """
+    model, horizon = problem.automaton.lattice, problem.horizon
+    timed = horizon.time is not None or horizon.max_time is not None or horizon.stay
+    if model is None or problem.moves or timed:
+        return None
+    if not isinstance(problem.cost, Cost) or problem.automaton.body_velocities.any():
+        return None
+    named, index = [], []
+    for k in goals:
+        for goal in at_headings(problem, problem.goals[k]):
+            named.append(goal)
+            index.append(k)
+    if not named:
+        return None
+    there = problem.starting_at(problem.start, time=problem.start_time, goals=named)
+    query = lattice_query(there, range(len(named)), prepared=prepared)
+    fine = prepared.once(_followed, query.library, problem.cost)
+    states = prepared.once(_states, query.library, fine, problem.setting)
+    if states is None:
+        return None
+    lattice, of_trim, surcharge = states
+    begun = query.start_trim
+    turn = float(query.start[2]) - float(lattice.heading[of_trim[begun][0]])
+    x, y = query.start[:2].tolist()
+    frame = (x, y, turn, math.cos(turn), math.sin(turn))
+    lattice = lattice._replace(frame=frame, roots=np.array([[0, 0, of_trim[begun][0]]]))
+    world = SE2(problem.start) @ SE2(np.array([0.0, 0.0, turn - float(query.start[2])]))
+    aims = _aims(problem, goals, world, lattice)
+    margin = min(MARGIN, query.margin)
+    scene = for_library(query.scene(margin), problem, fine)
+    return Graph(
+        query=query,
+        lattice=lattice,
+        aims=aims,
+        coarse=Tested(query.library.arrays, query.around),
+        fine=Tested(fine.arrays, scene),
+        goal_index=tuple(goals),
+        surcharge=surcharge,
+    )
+
+
+def _followed(library: LatticeLibrary, cost: Cost) -> LatticeLibrary:
+    """The library with courses that are followed exactly, piece by piece."""
+    trims = trims_of(library.priced, cost)
+    return library_of_trims(trims, library.parts, waits=False, close=CLOSE)
+
+
+def _states(
+    library: LatticeLibrary, fine: LatticeLibrary, problem: Problem
+) -> tuple[StateLattice, list[IntArray], float] | None:
+    """The graph of a library, the states of each of its trims, and the price of a switch.
+
+    Where changes of direction have a price, a heading is three states: the direction of the last
+    motion is ahead, in reverse, or none yet. None if an end is beside its cell or heading.
+    """
+    arrays, automaton, cost = library.arrays, library.priced.automaton, problem.cost
+    model = automaton.lattice
+    assert isinstance(model, OnLattice)
+    assert isinstance(cost, Cost)
+    heading = np.array([model.heading(automaton.trims[k].reduced_state) for k in library.trims])
+    source, target = arrays.edge_source, arrays.edge_target
+    ends = (SE2(_facing(heading[source])) @ SE2(arrays.edge_displacement[:, :3])).pose
+    step = np.round(ends[:, :2] / model.resolution)
+    off = np.abs(ends[:, :2] - step * model.resolution).max(initial=0.0)
+    turned = np.abs(wrapped(ends[:, 2] - heading[target])).max(initial=0.0)
+    directed = 3 if cost.direction_change > 0.0 else 1
+    exact = max(off, turned) <= EXACT and directed * len(heading) <= MOST_STATES
+    if not exact or not np.array_equal(fine.edge_maneuver, library.edge_maneuver):
+        return None
+    rows = []  # state, target, edge, cost
+    for e, k in enumerate(library.edge_maneuver.tolist()):
+        driven = problem.velocities_along(automaton.maneuvers[k])
+        signs = np.sign(driven[:, 0])
+        signs = signs[signs != 0.0].astype(int)
+        price = float(arrays.edge_cost[e]) + cost.switching(driven) + cost.switch
+        for gear in range(directed):
+            before, after = (0, 1, -1)[gear], gear
+            if len(signs) and directed > 1:
+                after = {1: 1, -1: 2}[int(signs[-1])]
+            turns = bool(len(signs) and before and before != signs[0])
+            paid = price + cost.direction_change * turns
+            rows.append(
+                (int(source[e]) * directed + gear, int(target[e]) * directed + after, e, paid)
+            )
+    rows.sort(key=lambda row: row[:1])
+    begins, targets, edges = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
+    counts = np.bincount(begins, minlength=directed * len(heading))
+    lattice = StateLattice(
+        cell=float(model.resolution),
+        frame=(0.0, 0.0, 0.0, 1.0, 0.0),
+        sign=1,
+        heading=np.repeat(heading, directed),
+        first=np.concatenate([[0], np.cumsum(counts)]),
+        target=np.ascontiguousarray(targets),
+        step=step[edges].astype(np.int64),
+        cost=np.array([row[3] for row in rows], dtype=np.float64),
+        edge=np.ascontiguousarray(edges),
+        travel=_travels(fine.arrays)[edges],
+        most_children=int(counts.max(initial=0)),
+        roots=np.zeros((0, 3), dtype=np.int64),
+    )
+    of_trim = [np.arange(directed) + directed * k for k in range(len(heading))]
+    return lattice, of_trim, float(cost.switch)
+
+
+def _travels(arrays: LatticeArrays) -> Array:
+    """Length (E,) of the path of the pose along each edge [m]."""
+    lengths = arrays.piece_speed * arrays.piece_time + 2.0 * arrays.piece_error
+    begins = arrays.first_piece[arrays.n_parts * len(arrays.edge_cost) : -1]
+    return np.asarray(np.add.reduceat(np.append(lengths, 0.0), begins))
+
+
+def _aims(problem: Problem, goals: Sequence[int], world: SE2, lattice: StateLattice) -> Aims:
+    """The nodes of a lattice, whose frame is seen from the world, within the goals' tolerances."""
+    model, automaton = problem.automaton.lattice, problem.automaton
+    assert model is not None
+    place, within, admits = [], [], []
+    for k in goals:
+        goal = problem.goals[k]
+        place.append((world.inverse() @ SE2(goal.pose)).pose[:2])
+        within.append(goal.tolerance_m + EXACT * (1.0 + float(np.abs(goal.pose[:2]).max())))
+        names = {one.trim for one in at_headings(problem, goal)}
+        headings = [
+            model.heading(trim.reduced_state) for trim in automaton.trims if trim.name in names
+        ]
+        off = np.abs(wrapped(np.subtract.outer(lattice.heading, headings)))
+        admits.append((off <= EXACT).any(axis=1))
+    moved = lattice.cell * np.hypot(*lattice.step.T)
+    moves = moved > 0.0
+    per_metre = float((lattice.cost[moves] / moved[moves]).min()) if moves.any() else 0.0
+    admitted = np.array(admits)
+    return Aims(
+        place=np.array(place),
+        within=np.array(within),
+        admits=admitted,
+        per_metre=per_metre,
+        surplus=_surplus(lattice, per_metre, admitted),
+    )
+
+
+def _surplus(lattice: StateLattice, per_metre: float, admits: NDArray[np.bool_]) -> Array:
+    """Least sum (S,) of what edges cost beyond their displacement, from each state to an aim's."""
+    source = np.repeat(np.arange(len(lattice.heading)), np.diff(lattice.first))
+    moved = lattice.cell * np.hypot(*lattice.step.T)
+    beyond = np.maximum(lattice.cost - per_metre * moved, 0.0)
+    least = np.where(admits.any(axis=0), 0.0, np.inf)
+    for _ in range(len(least)):
+        before = least.copy()
+        np.minimum.at(least, source, beyond + least[lattice.target])
+        if np.array_equal(before, least):
+            break
+    return least
+
+
+MOST_ROOTS = 1 << 16
+
+
+def _nodes_within(aims: Aims, cell: float) -> IntArray | None:
+    """Nodes (R, 4) that aims hold, and the number of the aim; None if there are too many."""
+    found = []
+    for g, (place, within) in enumerate(zip(aims.place, aims.within.tolist(), strict=True)):
+        low, high = np.ceil((place - within) / cell), np.floor((place + within) / cell)
+        if np.prod(np.maximum(high - low + 1.0, 0.0)) * aims.admits.shape[1] > MOST_ROOTS:
+            return None
+        columns, rows = (np.arange(a, b + 1.0) for a, b in zip(low, high, strict=True))
+        grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+        near = grid[np.hypot(*(grid * cell - place).T) <= within].astype(np.int64)
+        states = np.flatnonzero(aims.admits[g])
+        aim = np.full(len(near) * len(states), g)
+        rows_of = np.repeat(near, len(states), axis=0)
+        found.append(np.column_stack([rows_of, np.tile(states, len(near)), aim]))
+    return np.concatenate(found)
+
+
+def _facing(heading: Array) -> Array:
+    return np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=-1)
+
+
+@dataclass(slots=True, eq=False)
+class GraphSearch:
+    """A* on a state lattice, which can be stopped and resumed."""
+
+    graph: Graph
+    weight: float
+    arrays: SearchArrays
+    pace: Pace
+    alive: bool = True
+    is_late: bool = False  # no time is left to make room for more nodes
+
+    @classmethod
+    def of(cls, graph: Graph, *, weight: float, budget: Budget) -> GraphSearch:
+        """A search that is ready to run."""
+        query = graph.query
+        spare = query.prepared.once(spare_searches, query.library)
+        room = spare.pop() if spare else search_arrays(query.library.arrays.library)
+        arrays = with_room(room, len(graph.lattice.roots) + graph.lattice.most_children + 2)
+        begin_anew(arrays)
+        return cls(graph, weight, arrays, Pace(budget, FIRST_CHUNK))
+
+    @property
+    def expansions(self) -> int:
+        """Nodes expanded so far."""
+        return int(self.arrays.state[layout.EXPANSIONS])
+
+    @property
+    def queries(self) -> int:
+        """Motions that were tested."""
+        return int(self.arrays.state[layout.QUERIES])
+
+    @property
+    def cost(self) -> float:
+        """Cost of the path that was found; inf if none is."""
+        found = bool(self.arrays.state[layout.FOUND])
+        nodes = self.arrays.nodes[self.arrays.state[layout.NODE]]
+        price = self.graph.surcharge if found and nodes[layout.COST] > 0.0 else 0.0
+        return float(self.arrays.found[0]) - price if found else math.inf
+
+    @property
+    def cut(self) -> float:
+        """No plan that leaves the window costs less; inf if the window's rim is a wall."""
+        if self.graph.has_walls:
+            return math.inf
+        return float(self.arrays.found[kernels.CUT]) - self.graph.surcharge
+
+    @property
+    def least_open(self) -> float:
+        """No plan costs less, of a search with the weight 1 that has not come to its end."""
+        begun = self.arrays.state[layout.BEGUN] and self.arrays.state[layout.HEAP]
+        return max(float(self.arrays.heap_key[0]) - self.graph.surcharge, 0.0) if begun else 0.0
+
+    def run(self, n: int, upper_bound: float) -> None:
+        """Expand up to `n` more nodes, as long as they lead to less than a cost."""
+        last = self.expansions + n
+        upper_bound += self.graph.surcharge
+        self.pace.go_on(self.pace.budget)
+        while self.alive and (step := self.pace.take(last - self.expansions)):
+            used = int(self.arrays.state[layout.N_NODES])
+            most = used + USUAL_CHILDREN * step + self.graph.lattice.most_children + 2
+            self.is_late = room_takes(self.arrays, most) > self.pace.budget.left
+            if self.is_late:
+                return
+            self.arrays = with_room(self.arrays, most)
+            graph = self.graph
+            self.alive = bool(
+                kernels.expand_lattice(
+                    self.arrays,
+                    graph.lattice,
+                    graph.aims,
+                    graph.coarse,
+                    graph.fine,
+                    self.weight,
+                    step,
+                    upper_bound,
+                )
+            )
+            if self.expansions >= last:
+                return
+
+    def word(self) -> tuple[Word, int]:
+        """The path that was found, as a word, and the number of the goal where it ends."""
+        graph, links, state = self.graph, self.arrays.links, self.arrays.state
+        library, forwards = graph.query.library, graph.lattice.sign > 0
+        edges: list[int] = []
+        node = int(state[layout.NODE])
+        while links[node, layout.PARENT] >= 0:
+            edges.append(int(graph.lattice.edge[links[node, layout.EDGE]]))
+            node = int(links[node, layout.PARENT])
+        aim = int(state[layout.GOAL]) if forwards else int(links[node, layout.ROOT])
+        at = graph.query.start_trim
+        steps = [(SWITCH, int(library.trims[at]), 0.0)]
+        for edge in edges[::-1] if forwards else edges:
+            trim = int(library.trims[library.arrays.edge_target[edge]])
+            steps.append((int(library.edge_maneuver[edge]), trim, 0.0))
+        return graph.query.word_of(steps, 0), graph.goal_index[aim]
