@@ -73,7 +73,8 @@ class _Priorities:
         children = []
         for first, second in ((met.one, met.other), (met.other, met.one)):
             pairs = _closed(before | {(first, second)})
-            if (second, first) in pairs:
+            # Who gave way already and meets the other all the same has no way past it.
+            if (first, second) in before or (second, first) in pairs:
                 continue
             child = self._replanned(plans, second, pairs)
             if child is not None:

@@ -45,15 +45,17 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
     Environments*, ICRA, here along one path.
     """
     library = query.library.arrays
-    if not len(word.trims):
-        return with_cost(word, query)
     twists = library.library.twists
     still = np.flatnonzero(~twists[: library.library.n_trims].any(axis=1))
     rest = int(still[0]) if still.size else -1
-    path = _path_of(query, *_pieces(word, query))
+    # An empty word is a body that stands: a piece of no duration, in any trim.
+    stands = np.array([max(rest, 0)]), np.zeros(1)
+    path = _path_of(query, *(_pieces(word, query) if len(word.trims) else stands))
     state = _arrival(query, path, rest)
     if state < 0:
         return None
+    if not len(word.trims):
+        return with_cost(word, query)
     parts = _with_rests(path, state, rest)
     words = []
     for one in (parts, _with_fewer_rests(query, parts, rest)):

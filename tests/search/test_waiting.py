@@ -15,7 +15,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.waiting import MOST_PIECES, is_free, with_waits
-from maneuver_automaton.words.word import word_of_steps
+from maneuver_automaton.words.word import Word, word_of_steps
 
 ROBOT = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
 WAY = word_of_steps([(-1, 1, 6.0)], goal=0)
@@ -125,6 +125,18 @@ def test_who_stays_arrives_after_all_have_passed():
     stays = with_waits(query(later, horizon=Horizon(stay=True)), WAY)
     assert stays.duration > 18.0
     assert discs_apart(stays, [later], until=60.0) > 0.0
+
+
+def test_an_empty_word_stands_as_long_as_it_has_to():
+    empty = Word(trims=[], durations=[])
+    stays = Horizon(stay=True)
+    aside = Obstacle(Disc(0.4), motion=Motion([0.0, 9.0], [[-6.0, 3.0, 0], [6.0, 3.0, 0]]))
+    over = Obstacle(Disc(0.4), motion=Motion([0.0, 9.0], [[-6.0, 0.0, 0], [6.0, 0.0, 0]]))
+    gone = Obstacle(Disc(0.4, [0.0, 0.0]), present_s=(5.0, 9.0))
+    assert with_waits(query(aside, horizon=stays), empty).duration == 0.0
+    assert with_waits(query(over), empty).duration == 0.0  # it need not stay
+    assert with_waits(query(over, horizon=stays), empty) is None
+    assert with_waits(query(gone, horizon=stays), empty) is None
 
 
 def test_without_a_rest_a_way_is_free_or_is_none():
