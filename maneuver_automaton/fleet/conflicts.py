@@ -112,6 +112,17 @@ def where_it_stays(body: Obstacle) -> Obstacle:
     return Obstacle(body.at(float(body.motion.time[-1])), height=body.height)
 
 
+def standing_still(body: Obstacle) -> Obstacle:
+    """A body that never moves, as what stands there; any other as it is.
+
+    Searches are led round the one, and only past the other.
+    """
+    motion = body.motion
+    if motion is None or len(motion.time) > 1 or body.presence != (-math.inf, math.inf):
+        return body
+    return where_it_stays(body)
+
+
 def _left(motion: Motion, time: float) -> Motion:
     """A motion from a time on [s]."""
     if time <= float(motion.time[0]):

@@ -22,6 +22,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet.conflicts import Course, components, meetings
 from maneuver_automaton.fleet.groups import by_conflicts, by_priorities
+from maneuver_automaton.fleet.one_at_a_time import one_at_a_time
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.turns import Held, Turns
@@ -176,7 +177,7 @@ class _FleetSearch:
         self._plan_alone()
         alone = self.budget.elapsed
         able = [one.number for one in self.vehicles if one.number not in self.reasons]
-        self._plan_together(able, orders)
+        self._plan_together(able, orders, max_rounds)
         first = self.budget.elapsed
         if self.held:
             self._tell()
@@ -196,7 +197,7 @@ class _FleetSearch:
             if one.alone is None:
                 self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
 
-    def _plan_together(self, able: Sequence[int], orders: int) -> None:
+    def _plan_together(self, able: Sequence[int], orders: int, max_rounds: int | None) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
         alone = {k: found for k in able if (found := self.vehicles[k].alone) is not None}
         courses = {k: one.course for k, one in alone.items()}
@@ -216,39 +217,53 @@ class _FleetSearch:
         if not rest:
             self.order = sorted(able)
             return
-        best = self._in_orders(rest, orders, len(able))
+        until = self.budget.stage(ORDERS_SHARE)
+        rng = np.random.default_rng(self.seed)
+        drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
+        best = self._in_orders(drawn[:1], until)
         if len(best) < len(able):
-            turns = Turns(self.vehicles, self.fleet.margin, self.budget)
-            by_turns = turns.by_turns(sorted(able, key=self._alone_cost))
-            best = by_turns if self._rank(by_turns) < self._rank(best) else best
+            best = self._one_at_a_time(able, 0, rng, best)
+        if len(best) < len(able):
+            best = self._in_orders(drawn[1:], until, best)
+        n_th = 0
+        while len(best) < len(able) and not self.budget.is_over and max_rounds is None:
+            n_th += 1  # all the time there is for those that have no plan
+            best = self._one_at_a_time(able, n_th, rng, best)
+            again = [self._order_of(rest, n_th, rng) for _ in range(self.pool.jobs)]
+            best = self._in_orders(again, self.budget, best)
         self.held = best
         for k in able:
             if k not in best:
                 self.reasons[k] = self._who_is_in_the_way(k)
 
-    def _in_orders(self, rest: Sequence[int], orders: int, wanted: int) -> Held:
-        """The best plans of some orders past those that are held: the first that has so many.
+    def _one_at_a_time(
+        self, able: Sequence[int], n_th: int, rng: np.random.Generator, best: Held
+    ) -> Held:
+        """Plans in which one drives at a time, in an order, if these are better."""
+        order = self._order_of(able, n_th, rng)
+        found = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
+        return found if self._rank(found) < self._rank(best) else best
 
-        The first order alone at first, as it is enough most times; then some at a time.
+    def _in_orders(
+        self, drawn: Sequence[list[int]], until: Budget, best: Held | None = None
+    ) -> Held:
+        """The best plans of some orders past those that are held: the first that are complete.
+
+        As many at a time as there are processes.
         """
-        rng, until = np.random.default_rng(self.seed), self.budget.stage(ORDERS_SHARE)
-        drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
-        best: Held | None = None
-        begin, size = 0, 1
-        while begin < orders:
-            chosen = drawn[begin : begin + size]
-            begin, size = begin + size, self.pool.jobs
+        for begin in range(0, len(drawn), self.pool.jobs):
+            if until.is_over and best is not None:
+                break
+            chosen = drawn[begin : begin + self.pool.jobs]
             tasks = [Task(tuple(order), self.held) for order in chosen]
-            found = list(self.pool.each(_in_order, tasks, until))
-            for order, done in zip(chosen, found, strict=True):
+            for order, done in zip(chosen, self.pool.each(_in_order, tasks, until), strict=True):
                 planned = done.held or {}
                 self.queries += done.queries
                 if best is None or self._rank(planned) < self._rank(best):
                     best, self.order = planned, order
-                if len(planned) == wanted or until.is_over:
-                    return best
-        assert best is not None
-        return best
+            if len(best or ()) == len(self.vehicles) - len(self.reasons):
+                break
+        return best or {}
 
     def _order_of(self, numbers: Sequence[int], n_th: int, rng: np.random.Generator) -> list[int]:
         """The more important first, then the shortest way first; later orders are shuffled."""
@@ -404,9 +419,7 @@ class _FleetSearch:
             self.on_better(*self.improvements[-1])
 
     def _who_is_in_the_way(self, k: int) -> str:
-        """Why a vehicle has no plan, and whom its way alone would meet."""
-        if self.budget.is_over:
-            return f"no time was left to plan it within {self.budget.seconds:.4g} s"
+        """Why a vehicle has no plan, and whom its way alone would meet, when and where."""
         alone = self.vehicles[k].alone
         if alone is None:
             return "it has no path even alone"
@@ -415,9 +428,14 @@ class _FleetSearch:
             for one in self.vehicles
         }
         met = meetings({**courses, k: alone.course}, keep=self.fleet.margin, among=[k])
-        names = [self.vehicles[m.one if m.other == k else m.other].name for m in met]
-        listed = ", ".join(names) or "nobody"
-        return f"no path was found past the others; alone it would meet {listed}"
+        rows = []
+        for one in met:
+            other = self.vehicles[one.other if one.one == k else one.one].name
+            x, y = alone.plan.pose_at(max(one.time, alone.plan.start_time))[:2]
+            rows.append(f"{other} at {one.time:.4g} s near ({x:.4g}, {y:.4g})")
+        spent = f" within {self.budget.seconds:.4g} s" if self.budget.is_over else ""
+        listed = ", ".join(rows) or "nobody"
+        return f"no path was found past the others{spent}; alone it would meet {listed}"
 
     def _last_at_least(self) -> float:
         """No fleet arrives sooner [s]: each vehicle by itself, where its cost is its time."""

@@ -20,8 +20,10 @@ from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
 
-SAMPLES = 400  # places that are looked at
+SAMPLES = 4000  # places that are looked at
 MOST_TRIED = 40  # refuges that ways are searched to
+AS_NOW = 0.5  # share of the places at which the vehicle keeps its heading
+ALIKE, TURNED = 0.5, 0.8  # [lengths of the body], [rad]: of refuges so near only one is tried
 SEED = 14  # of the places
 FAR = 8.0  # [lengths of the body] from the way alone
 EXPANSIONS = 4000  # of the way to a refuge, and of that from there
@@ -41,7 +43,7 @@ def by_a_refuge(
     """
     best: Word | None = None
     counted = replace(budget, expansions=EXPANSIONS)
-    for pose in _refuges(problem, query, way)[:MOST_TRIED]:
+    for pose in refuges(problem, query, way):
         if budget.is_over:
             break
         aim = problem.starting_at(problem.start, time=problem.start_time, goals=Goal(pose))
@@ -63,7 +65,7 @@ def by_a_refuge(
     return best
 
 
-def _refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
+def refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
     """Poses (3,) beside a way at which the vehicle may stand from when it gets there, for ever.
 
     The nearest to the way first.
@@ -74,7 +76,9 @@ def _refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
     since = way.duration * rng.uniform(0.0, 1.0, SAMPLES)
     bases = way.pose_at(way.start_time + since)[:, :3]
     away = size * rng.uniform(0.0, FAR, SAMPLES)
-    bearing, heading = bases[:, 2] + rng.uniform(-math.pi, math.pi, (2, SAMPLES))
+    bearing, turned = rng.uniform(-math.pi, math.pi, (2, SAMPLES))
+    turned[: int(AS_NOW * SAMPLES)] = 0.0
+    heading, bearing = bases[:, 2] + turned, bases[:, 2] + bearing
     poses = np.column_stack(
         [bases[:, 0] + away * np.cos(bearing), bases[:, 1] + away * np.sin(bearing), heading]
     )
@@ -90,5 +94,13 @@ def _refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
         times=begins,
     )
     kept = np.flatnonzero(stands >= lasting)
-    order = kept[np.argsort(away[kept], kind="stable")]
-    return [poses[k] for k in order if not outside(poses[k], problem.bounds)]
+    found: list[Array] = []
+    for k in kept[np.argsort(away[kept], kind="stable")]:
+        pose, others = poses[k], np.array(found).reshape(-1, 3)
+        near = np.hypot(*(others[:, :2] - pose[:2]).T) < ALIKE * size
+        turn = np.abs(np.remainder(others[:, 2] - pose[2] + math.pi, 2.0 * math.pi) - math.pi)
+        if not (near & (turn < TURNED)).any() and not outside(pose, problem.bounds):
+            found.append(pose)
+            if len(found) == MOST_TRIED:
+                break
+    return found

@@ -1,4 +1,4 @@
-"""Vehicles planned one after another, past the plans of those before: in orders, groups, by turns.
+"""Vehicles planned one after another, past the plans of those before: in orders and groups.
 
 Source: Čáp, Novák, Kleiner, Selecký (2015), *Prioritized Planning Algorithms for Trajectory
 Coordination of Multiple Mobile Robots*, IEEE T-ASE 12(3): planned past the starts of those to come,
@@ -66,32 +66,6 @@ class Turns:
                 return None
             now[k] = found
         return {k: now[k] for k in group}
-
-    def by_turns(self, order: Sequence[int]) -> Held:
-        """One vehicle at a time, past all others where they stand: no search in time is needed.
-
-        Whoever has a way past all starts and goals has a plan then (well-formed, in the words of
-        the source). It takes as long as all together, and is what improvement begins with.
-        """
-        held: Held = {}
-        waiting, clock = list(order), max(one.problem.start_time for one in self.vehicles)
-        while waiting:
-            for k in waiting:
-                if self.budget.is_over:
-                    return held
-                there = {
-                    other: self.vehicles[other].standing for other in self.without_plan(held, {k})
-                }
-                there |= {other: one.course for other, one in held.items()}
-                arrived = [body for course in there.values() for body in course.arrived]
-                found = self.vehicles[k].past_arrived(arrived, clock, self.budget)
-                if found is not None:
-                    held[k], clock = found, found.arrival
-                    waiting.remove(k)
-                    break
-            else:
-                return held
-        return held
 
     def without_plan(self, held: Mapping[int, Found], but: set[int]) -> list[int]:
         """Vehicles that stand at their starts for ever."""

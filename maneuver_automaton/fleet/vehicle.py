@@ -16,9 +16,9 @@ from maneuver_automaton.collision.shapes import (
     Disc,
     Obstacle,
 )
-from maneuver_automaton.fleet.conflicts import PROOF, Course, where_it_stays
+from maneuver_automaton.fleet.conflicts import PROOF, Course, standing_still, where_it_stays
 from maneuver_automaton.fleet.levels import levels_of
-from maneuver_automaton.fleet.refuge import by_a_refuge
+from maneuver_automaton.fleet.refuge import by_a_refuge, refuges
 from maneuver_automaton.planning.blocked import (
     blocked_ends,
     goals_left,
@@ -32,13 +32,14 @@ from maneuver_automaton.planning.result import LowerBound, PlanResult
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem, moves
+from maneuver_automaton.receding_horizon.shifting import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, word_of_plan
 
 WAYS = 6  # alone, that are tried with rests
 QUICK = 1500  # expansions in space and time at first ...
@@ -81,6 +82,7 @@ class Vehicle:
     bound: LowerBound | None = None  # no plan of it costs less
     why_none: str = ""  # why it has no plan by itself
     ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
+    aside: Word | None = None  # a way that first makes room for others
     standing: Course = field(init=False)  # at its start, for ever
     expansions: int = 0
 
@@ -204,17 +206,20 @@ class Vehicle:
 
         One that does not switch at will is improved if it is searched for `again`.
         """
-        others = self.beside(others)
+        others = [standing_still(one) for one in self.beside(others)]
         if not others:
             return self.alone if self.alone is not None and self.alone.cost < known else None
         problem = replace(self.problem, obstacles=(*self.problem.obstacles, *others))
         if not self.at_will:
+            # No search among moving obstacles sees at once that one of them stays at the goal.
+            if not self._aims(self._past_the_arrived(others)):
+                return None
             found = self._found(self._planned(problem, budget, improve=again))
             return found if found is not None and found.cost < known else None
         own, aims = self.aimed, self.aims
         query = self._query(replace(problem, goals=own.goals))
         best: Word | None = None
-        for way in self.ways:
+        for way in (*self.ways, *filter(None, [self.aside])):
             if way.cost >= (best.cost if best else known) or budget.is_over:
                 break
             timed = with_waits(query, way)
@@ -244,38 +249,82 @@ class Vehicle:
             return None
         return self._word_found(query, best, aims)
 
-    def past_arrived(
-        self, arrived: Sequence[Obstacle], begin: float, budget: Budget
+    def leg(
+        self,
+        before: Found | None,
+        others: Sequence[Obstacle],
+        begin: float,
+        budget: Budget,
+        *,
+        aim: Goal | None = None,
     ) -> Found | None:
-        """A plan that rests until a time [s], and drives past others that all stand then."""
-        if not self.at_will:
-            return None
-        calm = replace(self.problem, obstacles=(*self.problem.obstacles, *self.beside(arrived)))
-        aims = self._aims(calm)
-        calm = replace(calm, goals=tuple(goal for _, goal in aims) or calm.goals)
+        """A plan from where it stands at a time [s], past others that all stand: home, or aside.
+
+        It stands at its start, or where what it has driven `before` ends.
+        """
+        goals = self.aimed.goals if aim is None else (aim,)
+        start, trim = self.problem.start, None
+        if before is not None:
+            start = before.plan.end
+            trim = None if self.at_will else self.problem.last_trim(goals[0]).name
+        calm = self.problem.starting_at(start, time=begin, goals=goals, trim=trim)
+        calm = replace(calm, obstacles=(*self.problem.obstacles, *self.beside(others)))
+        aims = ((0, aim),) if aim is not None else self._aims(calm)
+        calm = replace(calm, goals=tuple(goal for _, goal in aims) or goals)
         if not aims or blocked_ends(calm) is not None:
             return None
+        if not self.at_will:
+            return self._found(self._planned(calm, budget, improve=False))
         query = self._query(calm)
         first = first_plan(query, budget=replace(budget, expansions=QUICK))
         self._count(first.expansions)
-        rest = query.library.rest
-        if first.word is None or rest is None:
+        if first.word is None:
             return None
         word = improve(query, first.word, budget=budget, patience=AT_ONCE).word
-        wait = begin - self.problem.start_time
-        waits = [(SWITCH, rest, wait)] if wait > 0.0 else []
-        drives = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
-        steps = [*waits, *((SWITCH, trim, t) for trim, t in drives)]
-        found = self._word_found(query, query.word_of(steps, word.goal), aims)
-        # The rest is in no library of a search past static obstacles, and so has no price there.
-        return replace(found, cost=self.problem.cost_of(found.plan))
+        return self._word_found(query, word, aims)
+
+    def refuges(
+        self, before: Found | None, passing: Sequence[Obstacle], begin: float
+    ) -> list[Goal]:
+        """Poses near where it stands at which it is in nobody's way, the nearest first."""
+        start = self.problem.start if before is None else before.plan.end
+        calm = self.problem.starting_at(start, time=begin)
+        calm = replace(calm, obstacles=(*self.problem.obstacles, *self.beside(passing)))
+        here = Plan(start, (), durations=[], start_time=begin)
+        return [Goal(pose=pose) for pose in refuges(calm, self._query(calm), here)]
+
+    def then(self, before: Found | None, leg: Found, begin: float) -> Found:
+        """What it has driven before, a rest until a time [s], and another leg."""
+        automaton = self.problem.automaton
+        at = self.problem.start_time if before is None else before.arrival
+        plan = replace(leg.plan, start_time=begin)
+        if begin > at and automaton.rest is not None:
+            rest = plan.trims[0] if plan.trims else self.problem.first_trim
+            rest = automaton.trims[automaton.rest] if self.at_will or not rest.is_rest else rest
+            plan = followed_by(
+                Plan(plan.start, (rest,), durations=[begin - at], start_time=at), plan
+            )
+        if before is not None:
+            plan = followed_by(before.plan, plan)
+        cost = self.problem.cost_of(plan)
+        return Found(plan, cost, leg.goal_index, self.course_of(plan))
+
+    def keep_aside(self, found: Found) -> None:
+        """Keep a way on which it makes room for others, to drive it at other times."""
+        plan, exact = found.plan, not (self.problem.goals[0].tolerance_m or len(self.aims) > 1)
+        if self.at_will and exact and not self.problem.goals[0].tolerance_rad:
+            word = word_of_plan(self.problem.automaton, plan)
+            assert word is not None
+            moving = [k for k, trim in enumerate(plan.trims) if not trim.is_rest]
+            steps = [(SWITCH, int(word.trims[k]), float(word.durations[k])) for k in moving]
+            self.aside = self._query(self.aimed).word_of(steps, goal=0)
 
     def _past_the_arrived(self, others: Sequence[Obstacle]) -> Problem:
         """Its problem where those that stay at their goals stand there already."""
         arrived = [
-            where_it_stays(one)
+            one if one.motion is None else where_it_stays(one)
             for one in others
-            if one.motion is not None and one.presence[1] == math.inf
+            if one.motion is None or one.presence[1] == math.inf
         ]
         return replace(self.problem, obstacles=(*self.problem.obstacles, *arrived))
 

@@ -63,9 +63,14 @@ def verified(
         if row is None:
             break
         # Past a vehicle that has no plan nobody may drive; and what two libraries do not agree on
-        # is not returned.
-        name = driven[-1]
-        why[name] = f"{' and '.join(row.pair)} come within {row.distance_m:.3g} m of each other"
+        # is not returned. Who stands all the time stands there without its plan too.
+        name = max(driven, key=lambda one: (passed[names.index(one)].quiet_after, one))
+        other = row.pair[0] if name == row.pair[1] else row.pair[1]
+        x, y = passed[names.index(name)].motions[0].at(row.time_s)[:2]
+        why[name] = (
+            f"its plan comes within {max(row.distance_m, 0.0):.3g} m of {other} "
+            f"at {row.time_s:.4g} s near ({x:.4g}, {y:.4g})"
+        )
         results[name] = PlanResult(
             problem=results[name].problem, status=PlanStatus.NO_PLAN, reason=why[name]
         )

@@ -1,0 +1,132 @@
+"""Fleets in which someone stands at its goal: it is passed, or makes room and comes back."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.cli import run
+from maneuver_automaton.collision import Box, Disc
+from maneuver_automaton.fleet import (
+    FleetProblem,
+    FleetStatus,
+    plan_fleet,
+    simulate_fleet,
+    verify_fleet,
+)
+from maneuver_automaton.fleet.conflicts import standing_still
+from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.scenario import load_scenario
+from tests.fleet.robots import ROBOT, least_distance
+from tests.inertia import unicycle_automaton
+
+FIELD = Path(__file__).parents[2] / "../shared/data/field"
+BODY = Disc(0.3)
+KINDS = {"at will": ROBOT, "inertia": unicycle_automaton()}
+
+
+def fleet_of(kind, ends, walls=(), **more):
+    problems = [Problem(KINDS[kind], a, b, footprint=BODY, obstacles=walls) for a, b in ends]
+    return FleetProblem(problems, **more)
+
+
+def bay(kind, idle, *, turned=0.0):
+    """A corridor for one with a bay beside it; one drives through, one stands in it at its goal."""
+    walls = [
+        Box([10.0, 1.0], [4.0, -0.9]),
+        Box([5.0, 1.0], [0.5, 0.9]),
+        Box([5.0, 1.0], [6.5, 0.9]),
+        Box([1.2, 1.0], [3.5, 1.9]),
+        Box([1.0, 1.0], [-1.0, 0.0]),
+        Box([1.0, 1.0], [9.0, 0.0]),
+    ]
+    here = [idle, 0.0, turned]
+    return fleet_of(kind, [([0, 0, 0], [8, 0, 0]), (here, here)], walls, names=("driver", "idle"))
+
+
+def is_good(fleet, result):
+    return result.status is FleetStatus.FOUND and verify_fleet(fleet, result.plans).passed
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_who_stands_in_the_way_on_open_floor_is_passed(kind, seed):
+    rng = np.random.default_rng(seed)
+    by = SE2([*rng.uniform(-9.0, 9.0, 2), rng.uniform(-3.0, 3.0)])
+    places = [[2.0, 0.2 * rng.normal(), 1.0], [4.5, 0.2 * rng.normal(), -2.0]][: 1 + seed % 2]
+    fleet = fleet_of(kind, [([0, 0, 0], [6.5, 0, 0]), *((one, one) for one in places)]).moved(by)
+    # With inertia a round of improvement takes all the time there is.
+    result = plan_fleet(fleet, time_limit=120.0, max_rounds=6 if kind == "at will" else 0)
+    assert is_good(fleet, result)
+    assert result.plans["2"].duration == 0.0  # it is cheaper to be passed than to make room
+    assert result.cost < 2.0 * result.alone_cost
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(("idle", "turned"), [(3.5, 0.0), (2.2, 0.0), (4.8, math.pi)])
+def test_who_stands_in_a_corridor_makes_room_in_the_bay(kind, idle, turned):
+    fleet = bay(kind, idle, turned=turned)
+    result = plan_fleet(fleet, time_limit=120.0, max_rounds=0)
+    assert is_good(fleet, result)
+    assert result.plans["idle"].end == pytest.approx([idle, 0.0, turned], abs=1e-9)
+
+
+def test_a_loop_drives_what_makes_room():
+    fleet = bay("at will", 2.2)
+    first = plan_fleet(fleet, time_limit=120.0, max_rounds=0)
+    log = simulate_fleet(fleet, step=0.5, steps=60, first=first)
+    assert log.reached
+    assert least_distance(log) > 0.0
+    assert not list(log.violations)
+
+
+def test_all_change_places_where_nobody_has_a_way():
+    """Each goal is where another one stands: somebody drives aside first."""
+    ends = [([2.0 * k, 0, 0], [2.0 * ((k + 1) % 3), 0, 0]) for k in range(3)]
+    fleet = fleet_of("inertia", ends)
+    result = plan_fleet(fleet, time_limit=120.0, max_rounds=0)
+    assert is_good(fleet, result)
+
+
+def test_a_goal_where_another_one_stays_takes_no_search():
+    here = [3.0, 0.0, 0.0]
+    one, other = vehicles_of(fleet_of("inertia", [([0, 0, 0], here), (here, here)]))
+    one.plan_alone(Budget.from_now(60.0))
+    before = one.expansions
+    assert one.past(other.standing.obstacles, Budget.from_now(60.0)) is None
+    assert one.expansions == before
+
+
+def test_what_never_moves_is_seen_as_it_stands():
+    (one,) = vehicles_of(fleet_of("at will", [([1, 2, 0], [1, 2, 0])]))
+    (body,) = one.standing.obstacles
+    assert standing_still(body).motion is None
+    assert standing_still(body).shape.center.tolist() == [1.0, 2.0]
+
+
+def test_reasons_name_when_and_where_they_meet():
+    walls = [Box([12.0, 1.0], [4.0, y]) for y in (-0.9, 0.9)]
+    walls += [Box([1.0, 1.0], [x, 0.0]) for x in (-1.0, 9.0)]
+    ends = [([0, 0, 0], [8, 0, 0]), ([4, 0, 0], [4, 0, 0])]
+    fleet = fleet_of("at will", ends, walls, names=("driver", "idle"))
+    result = plan_fleet(fleet, time_limit=120.0, max_rounds=0, orders=1)
+    assert result.status is FleetStatus.PARTIAL
+    assert "alone it would meet idle at 3.4 s near (3.4, 0)" in result.reasons["driver"]
+
+
+@pytest.mark.skipif(not FIELD.is_dir(), reason="needs ../shared/data/field")
+@pytest.mark.parametrize(("name", "cost"), [("fleet-idle", 4.5), ("standing-vehicle", 8.2)])
+def test_files_that_were_met(name, cost, tmp_path, capsys):
+    file = FIELD / f"{name}.yaml"
+    result = plan_fleet(load_scenario(file).fleet, time_limit=60.0, max_rounds=8)
+    assert is_good(result.problem, result)
+    assert result.cost < cost
+    assert run(["plan", str(file), "--out", str(tmp_path), "--time-limit", "2", "--quiet"]) == 0
+    document = str(tmp_path / "plan.json")
+    assert run(["check", document, "--with", str(file)]) == 0
