@@ -91,6 +91,19 @@ class Automaton:
         if math.isfinite(lateral_limit(self.model)):
             self._check_lateral()
 
+    def within_lateral(self, model: Model) -> Automaton:
+        """The part of it that a vehicle can do which differs by a lower lateral acceleration."""
+        trims = tuple(one for one in self.trims if not is_too_sharp(model, one.body_velocity))
+        names = {trim.name for trim in trims}
+        maneuvers = tuple(
+            one
+            for one in self.maneuvers
+            if {one.source, one.target} <= names
+            and one.course is not None
+            and not is_too_sharp(model, one.course.twists(model)).any()
+        )
+        return replace(self, model=model, trims=trims, maneuvers=maneuvers)
+
     def _check_lateral(self) -> None:
         """Refuse what exceeds the lateral acceleration of the vehicle."""
         named = [(f"trim {one.name!r}", one.body_velocity) for one in self.trims]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models.model import Model
@@ -30,9 +31,12 @@ def lateral_acceleration(twists: Array) -> Array:
     return np.asarray(np.linalg.norm(twists[..., :2], axis=-1) * np.abs(twists[..., 2]))
 
 
-def is_too_sharp(model: Model, twists: Array) -> Array:
+def is_too_sharp(model: Model, twists: Array) -> NDArray[np.bool_]:
     """Whether body velocities (..., dof) exceed the lateral acceleration of a vehicle (...,)."""
-    return np.asarray(lateral_acceleration(twists) > lateral_limit(model) * (1.0 + EXCEEDED))
+    most = lateral_limit(model)
+    if math.isinf(most):  # its twists may have no turn rate at all
+        return np.zeros(twists.shape[:-1], dtype=np.bool_)
+    return np.asarray(lateral_acceleration(twists) > most * (1.0 + EXCEEDED))
 
 
 def pace_within(model: Model, twist: Array) -> float:
@@ -45,5 +49,6 @@ def pace_within(model: Model, twist: Array) -> float:
     >>> pace_within(car, np.array([2.0, 0.0, -0.5]))
     2.0
     """
-    across = float(lateral_acceleration(twist))
-    return math.sqrt(lateral_limit(model) / across) if across > 0.0 else math.inf
+    most = lateral_limit(model)
+    across = 0.0 if math.isinf(most) else float(lateral_acceleration(twist))
+    return math.sqrt(most / across) if across > 0.0 else math.inf

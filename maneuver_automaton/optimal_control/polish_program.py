@@ -148,7 +148,8 @@ def guard_blocks(program: Program, held: Sequence[IntArray]) -> list[Blocks]:
     for guard, which in zip(program.scene.guards, held, strict=True):
         if len(which):
             limits = guard._replace(solids=None)
-            kind = _guard_kind(program.model, limits, weight, program.paced)
+            given = (program.model, limits, weight, program.paced)
+            kind = _guard_kind(*given)  # type: ignore[arg-type]  # values all
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
     return blocks
@@ -174,10 +175,13 @@ def _guard_kind(model: Model, guard: Guard, tightening: float, paced: bool) -> K
             z, u = state[dof:], control[:own]
             over = casadi.vertcat(*_over(casadi, model, guard, z, u))
             rates = casadi.vertcat(*model.dynamics(casadi.vertsplit(z), casadi.vertsplit(u)))
-            slope = casadi.jtimes(over, z, casadi.SX(rates)) if z.numel() else 0.0
-            below.append(over + sign * third * slope + room)
-            if sign > 0.0 or at_ends:
+            changes = casadi.which_depends(over, z, 1, True)  # in the interval: others are constant
+            bent = casadi.vertcat(casadi.SX(0, 1), *(over[k] for k, v in enumerate(changes) if v))
+            below.append(bent + sign * third * casadi.jtimes(bent, z, casadi.SX(rates)) + room)
+            if sign > 0.0:
                 below.append(over + node * room)
+            elif at_ends:
+                below.append(bent + room)
     every = casadi.vertcat(first, last, control, duration)
     return kind_of(casadi, every, casadi.vertcat(share, inner), below=casadi.vertcat(*below))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Literal
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import is_too_sharp
+from maneuver_automaton.models.lateral import is_too_sharp, lateral_limit
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trajectory import Trajectory
@@ -157,7 +158,12 @@ def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> l
         )
     control, durations = segments(model, source, target, late=late)
     courses = list(drive_all(model, source, control=control, durations=durations))
-    sharp = [k for k, one in enumerate(courses) if is_too_sharp(model, one.twists(model)).any()]
+    limited = math.isfinite(lateral_limit(model))
+    sharp = [
+        k
+        for k, one in enumerate(courses)
+        if limited and is_too_sharp(model, one.twists(model)).any()
+    ]
     if sharp:
         slow = _one_by_one(model, source[sharp], target[sharp])
         for k, course in zip(sharp, slow, strict=True):

@@ -13,6 +13,7 @@ from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.automaton.stock import load_stock_library, stock_libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.primitives import Trim, trims_of
 from maneuver_automaton.primitives.bang_bang import has_limited_rates
 from maneuver_automaton.primitives.quickest import quickest_maneuvers
@@ -30,6 +31,7 @@ AXES = {  # of the grid of a vehicle with a reduced state
     "climb_m_s": "climb",
     "steering_rad": "steering",
 }
+LATERAL = "max_lateral_acceleration_m_s2"  # by which the vehicle of a library may differ
 WHERE: Where = ("automaton",)
 
 
@@ -255,6 +257,8 @@ def _fitting(automaton: Automaton, model: Model) -> Automaton:
     if has["model"] != needs["model"]:
         raise ValueError(f"got a library for {shown(has)}, but the vehicle is {shown(needs)}")
     keys = [key for key in dict.fromkeys((*has, *needs)) if has.get(key) != needs.get(key)]
+    if keys == [LATERAL] and lateral_limit(model) < lateral_limit(automaton.model):
+        return automaton.within_lateral(model)
     if keys:
         one, other = ({key: what.get(key) for key in keys} for what in (has, needs))
         raise ValueError(f"got a library for {shown(one)}, but the vehicle has {shown(other)}")

@@ -16,9 +16,9 @@ def piece_is_admitted(zone: Zone, trim: Trim) -> bool:
 
 
 def admitted_stretches(zone: Zone, maneuver: Maneuver, model: Model) -> NDArray[np.bool_]:
-    """Which stretches (n - 1,) between samples of a maneuver a zone admits, by both their ends."""
+    """Which stretches (n - 1,) of a maneuver a zone admits, by their begin, middle and end."""
     course = maneuver.course
     assert course is not None
     if not zone.admits_names([maneuver.source, maneuver.target]):
         return np.zeros(course.time.size - 1, dtype=np.bool_)
-    return np.asarray(zone.admits(course.twists(model)[::2]).all(axis=0))
+    return np.asarray(zone.admits(course.twists(model)).all(axis=0))

@@ -27,7 +27,7 @@ CAR = SecondOrderCar(
 )
 GOAL = [30.0, 30.0, 3.0]
 MOST = 3.0  # [m/s^2]
-WORK = SearchSettings(max_expansions=300)
+WORK = SearchSettings(max_expansions=60)
 PLANE = Box([400.0, 400.0])
 BEYOND = Box([200.0, 400.0], [115.0, 0.0])  # from x = 15 m on
 

@@ -710,6 +710,22 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
         ":6: automaton.maneuvers: stroke: got 0.0, but the speed of the second_order_car is within "
         "[-2.5, 2.5]; need a way that is not 0 and leads there",
     ),
+    "jerk": (
+        vehicle("{model: car, wheelbase_m: 2.5, max_jerk_m_s3: 2.0}"),
+        ":3: vehicle.max_jerk_m_s3: got 2.0, need no such key: no vehicle has its acceleration as "
+        "a state; state max_acceleration_m_s2",
+    ),
+    "rate of the curvature": (
+        vehicle("{model: car, wheelbase_m: 2.5, max_curvature_rate_per_m_s: 0.1}"),
+        ":3: vehicle.max_curvature_rate_per_m_s: got 0.1, need no such key: the curvature changes "
+        "as the wheels turn; state max_steering_rate_rad_s of second_order_car or single_track",
+    ),
+    "lateral acceleration of a robot": (
+        vehicle("{model: unicycle, max_lateral_acceleration_m_s2: 1.0}"),
+        ":3: vehicle.max_lateral_acceleration_m_s2: got 1.0, need no such key, which car, "
+        "second_order_car, car_with_trailer and single_track have; a zone limits it for any "
+        "vehicle",
+    ),
     "preset for inertia": (
         automaton("preset: parking"),
         ":5: automaton.preset: got 'parking', which is for second_order_unicycle and "
@@ -732,7 +748,8 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "trailer of a car without one": (
         vehicle("{model: car, wheelbase_m: 2.5, trailer: {rectangle_m: [1, 1]}}"),
         ":3: vehicle.trailer: unknown key; did you mean 'footprint'? Known keys: model, "
-        "wheelbase_m, max_steering_rad, max_speed_m_s, footprint, footprint_height_m",
+        "wheelbase_m, max_steering_rad, max_speed_m_s, max_lateral_acceleration_m_s2, footprint, "
+        "footprint_height_m",
     ),
     "trailer that is no shape": (
         vehicle(
