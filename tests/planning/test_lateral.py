@@ -15,11 +15,12 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Car, SecondOrderCar
+from maneuver_automaton.models import Car, CarWithTrailer, SecondOrderCar
 from maneuver_automaton.planning import plan
 from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.problem import Problem, SearchSettings
 from maneuver_automaton.scenario.presets import preset_automaton
+from maneuver_automaton.scenario.scenario import scenario_of_text
 from tests.search.cases import compiled_only
 
 CAR = SecondOrderCar(
@@ -143,6 +144,7 @@ def test_a_zone_holds_in_its_half_of_the_plane(limited):
     assert "polished" in found.plan.word
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_moved_problem_has_the_moved_plan():
     zone = Zone(shape=BEYOND, max_speed=4.0)
@@ -159,6 +161,41 @@ def test_a_moved_problem_has_the_moved_plan():
     assert there.cost == pytest.approx(here.cost, rel=1e-6)
     there_seen = (by.inverse() @ SE2(there.plan.pose_at(0.5 * there.cost))).pose
     assert there_seen == pytest.approx(here.plan.pose_at(0.5 * here.cost), abs=1e-3)
+
+
+@compiled_only
+def test_a_car_with_a_trailer_keeps_the_limit_too():
+    truck = CarWithTrailer(
+        wheelbase=3.0, hitch_length=4.0, max_steering=0.6, max_speed=4.0, max_hitch=0.9
+    )
+    gripped = replace(truck, max_lateral_acceleration=1.0)
+    zone = Zone(shape=PLANE, max_lateral_acceleration=1.0)
+    still = {"speed": [0.0], "hitch": [0.0], "steering": [0.0]}
+    costs = []
+    for model, zones in ((gripped, ()), (truck, (zone,))):
+        library = Automaton(model, trims_of(model, still).trims)
+        aim = Problem(library, [0, 0, 0], [15.0, 10.0, 1.5], zones=zones, search=WORK)
+        found = plan(aim, time_limit=200.0)
+        speed, steering = found.plan.sample().control.T
+        assert (speed**2 * np.abs(np.tan(steering)) / 3.0).max() <= 1.0
+        costs.append(found.cost)
+    assert costs == pytest.approx([7.691, 7.691], rel=1e-3)
+
+
+def test_a_stock_library_serves_less_what_breaks_the_limit():
+    scenario = scenario_of_text(
+        "schema: 1\n"
+        "vehicle: {model: single_track, max_acceleration_m_s2: 6, max_lateral_speed_m_s: 3,\n"
+        "  max_turn_rate_rad_s: 1, max_lateral_acceleration_m_s2: 3}\n"
+        "automaton: {preset: single_track}\n"
+        "start: {pose: [0, 0, 0], trim: 'speed 15, turn_rate 0'}\n"
+        "goal: {pose: [80, 0, 0], trim: 'speed 15, turn_rate 0'}\n",
+        name="bmw",
+    )
+    automaton = scenario.problem.automaton
+    assert automaton.model.max_lateral_acceleration == 3.0
+    assert 0 < len(automaton) < 23
+    assert 0 < len(automaton.maneuvers) < 252
 
 
 @pytest.mark.parametrize("preset", ["parking", "road"])
