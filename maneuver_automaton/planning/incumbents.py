@@ -178,8 +178,8 @@ class Incumbents:
         return late >= LATE or self.for_checks.left_to_check == 0.0
 
     def _with_lasting_coasts(self, plan: Plan, goal: Goal) -> Plan:
-        """The plan without very short trims, if there is time to check it, and once more if not."""
-        if self.budget.left_to_check < 2.0 * self.longest_check:
+        """The plan without very short trims, if there is time to check it."""
+        if self.budget.left_to_check < LONGER * self.longest_check:
             return plan
 
         def is_free(one: Plan) -> bool:
