@@ -216,7 +216,8 @@ def stretches(maneuver: Maneuver, model: Model) -> list[tuple[str, float]]:
     clear = [one for one in lasting if one[1] >= BRIEF_S or one[0].endswith(SIDES)]
     if not clear:
         return lasting
-    told, early = [], 0.0  # what is brief goes with what came before, or else with the first
+    told: list[tuple[str, float]] = []
+    early = 0.0  # what is brief goes with what came before, or else with the first
     for what, seconds in lasting:
         if told or (what, seconds) == clear[0]:
             told.append((what if (what, seconds) in clear else told[-1][0], seconds))
