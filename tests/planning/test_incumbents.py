@@ -7,17 +7,21 @@ import itertools
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from maneuver_automaton import planning
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.planning.checking import Condition
+from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.checking import Condition, what_is_hit
 from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
 from maneuver_automaton.planning.result import LowerBound, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.refinement.fitting import DEARER, SHORT, with_lasting_coasts
 
 ROBOT = Automaton.of_controls(
     Unicycle(),
@@ -176,3 +180,51 @@ def test_the_time_of_checks_is_kept_back_from_searches():
     assert found.longest_check >= 0.25
     assert found.for_better.deadline <= 9.0 - found.longest_check < before < 9.0
     assert found.for_first.deadline > found.for_better.deadline
+
+
+def test_a_short_trim_is_left_out_before_a_plan_is_checked() -> None:
+    found = incumbents(FREE)
+    assert found.offer(driven("ahead", "slow", durations=[3.9995, 0.001]), 0)
+    assert found.plans[0].plan.durations.tolist() == [4.0]
+    stated = incumbents(replace(FREE, horizon=Horizon(min_coast=0.0)))
+    assert stated.offer(driven("ahead", "slow", durations=[3.9995, 0.001]), 0)
+    assert stated.plans[0].plan.durations.tolist() == [3.9995, 0.001]
+
+
+def room(seed: int) -> Problem:
+    """A robot among boxes, by a search that counts its work."""
+    rng = np.random.default_rng(seed)
+    boxes = [Box(rng.uniform(0.3, 2.0, 2), rng.uniform(-2.0, 12.0, 2)) for _ in range(14)]
+    backing = Automaton.of_controls(
+        Unicycle(), {"ahead": (1, 0), "back": (-1, 0), "left": (1, 1), "right": (1, -1)}
+    )
+    while True:
+        ends = rng.uniform([0, 0, -3], [10, 10, 3], (2, 3))
+        problem = Problem(
+            backing,
+            ends[0],
+            ends[1],
+            obstacles=boxes,
+            footprint=Box([0.6, 0.4]),
+            search=SearchSettings(max_expansions=1000),
+        )
+        if blocked_ends(problem) is None:
+            return problem
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(k, marks=pytest.mark.slow) for k in range(3, 30))]
+)
+def test_plans_among_obstacles_have_no_short_trims(seed: int) -> None:
+    problem = room(seed)
+    exact = replace(problem, horizon=Horizon(min_coast=0.0))
+    result, before = (planning.plan(one, time_limit=600.0) for one in (problem, exact))
+    assert result.plan is not None
+    assert before.cost is not None
+    assert result.cost is not None
+    assert result.cost <= before.cost * (1.0 + DEARER)
+    if any(0.0 < time < SHORT for time in result.plan.durations.tolist()):
+        # Without it the plan is dear, or misses the goal, or hits something.
+        goal = problem.goals[0]
+        other = with_lasting_coasts(problem, result.plan, goal, is_free=lambda _plan: True)
+        assert other is result.plan or what_is_hit(problem, other, goal)
