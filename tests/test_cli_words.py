@@ -109,6 +109,15 @@ def test_a_model_of_ones_own_names_the_option(capsys):
         assert said.endswith("vehicle of your own needs --model MODULE:OBJECT\n")
 
 
+def test_a_loop_whose_goal_is_blocked_says_so(capsys):
+    Path("x.yaml").write_text(SCENARIO + "obstacles: [{disc_m: {center: [1, 0], radius: 0.5}}]\n")
+    assert run(["mpc", "x.yaml", "--no-plot"]) == 1
+    printed = capsys.readouterr()
+    assert "nothing was driven" in printed.out
+    assert "start is the goal" not in printed.out
+    assert printed.err.startswith("x.yaml: no_plan: the goal is blocked: ")
+
+
 def test_check_of_a_loop_of_one_vehicle_is_told(capsys):
     run(["mpc", "x.yaml", "--no-plot", "--quiet"])
     for more in ([], ["--with", "x.yaml"]):

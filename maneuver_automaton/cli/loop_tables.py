@@ -34,7 +34,8 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
     if rows:
         out.print(table(name, columns, shortened(rows), numbers=(0, 1, 2, 3, 4)))
     else:
-        out.print(Text(f"{name}\n\n  nothing to do: the start is the goal\n"))
+        said = "nothing to do: the start is the goal" if loop.reached else "nothing was driven"
+        out.print(Text(f"{name}\n\n  {said}\n"))
     disturbed = sum(bool(step.off_plan) for step in loop.steps)
     known = loop.steps_bound is not None and not disturbed  # the paper's is of undisturbed loops
     bound = f" (the paper's bound: {loop.steps_bound})" if known else ""

@@ -81,7 +81,7 @@ def print_facts(facts: Mapping[str, str]) -> None:
     out = console()
     for what, value in facts.items():
         if value:
-            line = f"  {what + ':':<{FACTS - 2}}{value}"
+            line = f"  {what + ':':<{FACTS - 3}} {value}"
             wrapped = textwrap.wrap(
                 line, out.width, subsequent_indent=" " * FACTS,
                 break_long_words=False, break_on_hyphens=False,
