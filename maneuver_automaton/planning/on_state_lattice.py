@@ -10,7 +10,7 @@ from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.off_lattice import why_off_lattice
+from maneuver_automaton.planning.off_lattice import goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
@@ -33,6 +33,8 @@ _NO_PATH = (
 
 def load_state_lattice(problem: Problem, workspace: Workspace) -> bool:
     """Have ready what a search needs; whether a problem is one of a state lattice."""
+    if goals_off_lattice(problem) is not None:
+        return True  # which is told without a search
     graph = graph_of(problem, range(len(problem.goals)), workspace.prepared)
     if graph is not None:
         GraphSearch.of(graph, weight=1.0, budget=UNLIMITED).run(1, 0.0)
@@ -51,6 +53,9 @@ def plan_on_state_lattice(
     open_ends = any(goal.tolerance_m > 0.0 for goal in problem.goals)
     if blocked is not None and (blocked.status is PlanStatus.START_BLOCKED or not open_ends):
         return blocked
+    off = goals_off_lattice(problem)
+    if off is not None:
+        return off
     goals = [k for k, goal in enumerate(problem.goals) if not why_off_lattice(problem, goal)]
     graph = graph_of(problem, goals, workspace.prepared)
     if graph is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple
@@ -24,7 +23,6 @@ class Incumbent(NamedTuple):
     word: Word | None
     expansions: int
     status: SearchStatus
-    nearest: float = math.inf  # [m] from a goal to the nearest place that was reached
 
 
 def incumbent_words(
@@ -58,10 +56,10 @@ def incumbent_words(
         return SearchStatus.OUT_OF_BUDGET if over else SearchStatus.EXHAUSTED
 
     grids = distance_grids(query)
-    word, first, nearest = known, 0, 0.0
+    word, first = known, 0
     if word is None:
         found = first_plan(query, budget=budget, grids=grids)
-        word, first, nearest = found.word, found.expansions, found.nearest
+        word, first = found.word, found.expansions
     total = first
     if word is not None:
         if known is None:
@@ -79,7 +77,7 @@ def incumbent_words(
         for better in one.gains():
             yield Incumbent(better, first + one.expansions, SearchStatus.FOUND)
         total = first + one.expansions
-    yield Incumbent(None, total, ended(total), nearest)
+    yield Incumbent(None, total, ended(total))
 
 
 def quick_word(

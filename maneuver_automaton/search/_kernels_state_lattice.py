@@ -77,7 +77,7 @@ def least_to_go(aims: Aims, x: float, y: float, state: int) -> float:
     for g in range(aims.place.shape[0]):
         d_x, d_y = aims.place[g, 0] - x, aims.place[g, 1] - y
         least = min(least, math.sqrt(d_x * d_x + d_y * d_y) - aims.within[g])
-    return max(least, 0.0) * aims.per_metre + aims.surplus[state]
+    return float(max(least, 0.0) * aims.per_metre + aims.surplus[state])
 
 
 @inlined_kernel
