@@ -51,7 +51,7 @@ BLOCKING = ("unreachable", "start_blocked", "goal_blocked")
 
 
 def _lattice() -> Automaton:
-    body = LatticeBody(resolution=0.1, headings=16, turning_radius=0.5)
+    body = LatticeBody(resolution=0.1, turning_radius=0.5)
     return preset_automaton("lattice_diff", body)
 
 
