@@ -95,7 +95,7 @@ class _Floor:
         beside = [
             body for i, one in self._courses().items() if i not in (j, k) for body in one.arrived
         ]
-        for goal in vehicle.refuges(before, [*beside, *way.course.obstacles], self._clock):
+        for goal in vehicle.refuges(before, way, beside, self._clock):
             if self.budget.is_over:
                 return False
             leg = self._leg(j, others, aim=goal)

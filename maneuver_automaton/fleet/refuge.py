@@ -65,20 +65,25 @@ def by_a_refuge(
     return best
 
 
-def refuges(problem: Problem, query: LatticeQuery, way: Plan) -> list[Array]:
+def refuges(problem: Problem, query: LatticeQuery, way: Plan, *, off: bool = False) -> list[Array]:
     """Poses (3,) beside a way at which the vehicle may stand from when it gets there, for ever.
 
-    The nearest to the way first.
+    The nearest to the way first. `off` the way of another vehicle it stands from its start on: near
+    that way, or near its start.
     """
     rng, world = np.random.default_rng(SEED), query.world
     size = max(world.body.reach, query.library.radius * 0.5)
     # Seen from the way, so that a moved problem has the moved refuges.
     since = way.duration * rng.uniform(0.0, 1.0, SAMPLES)
-    bases = way.pose_at(way.start_time + since)[:, :3]
+    bases = np.array(way.pose_at(way.start_time + since)[:, :3])
+    if off:
+        since[:], bases[::2] = 0.0, problem.start[:3]
     away = size * rng.uniform(0.0, FAR, SAMPLES)
     bearing, turned = rng.uniform(-math.pi, math.pi, (2, SAMPLES))
     turned[: int(AS_NOW * SAMPLES)] = 0.0
     heading, bearing = bases[:, 2] + turned, bases[:, 2] + bearing
+    if problem.automaton.translated is not None:
+        heading[:] = problem.start[2]
     poses = np.column_stack(
         [bases[:, 0] + away * np.cos(bearing), bases[:, 1] + away * np.sin(bearing), heading]
     )

@@ -8,6 +8,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import Budget
@@ -284,14 +286,14 @@ class Vehicle:
         return self._word_found(query, word, aims)
 
     def refuges(
-        self, before: Found | None, passing: Sequence[Obstacle], begin: float
+        self, before: Found | None, way: Found, others: Sequence[Obstacle], begin: float
     ) -> list[Goal]:
-        """Poses near where it stands at which it is in nobody's way, the nearest first."""
+        """Poses off the way of another vehicle, and off others, the nearest to it first."""
         start = self.problem.start if before is None else before.plan.end
-        calm = self.problem.starting_at(start, time=begin)
-        calm = replace(calm, obstacles=(*self.problem.obstacles, *self.beside(passing)))
-        here = Plan(start, (), durations=[], start_time=begin)
-        return [Goal(pose=pose) for pose in refuges(calm, self._query(calm), here)]
+        around = (*self.problem.obstacles, *self.beside([*others, *way.course.obstacles]))
+        calm = replace(self.problem.starting_at(start, time=begin), obstacles=around)
+        poses = refuges(calm, self._query(calm), way.plan, off=True)
+        return [Goal(pose=np.append(pose, start[3:])) for pose in poses]
 
     def then(self, before: Found | None, leg: Found, begin: float) -> Found:
         """What it has driven before, a rest until a time [s], and another leg."""
