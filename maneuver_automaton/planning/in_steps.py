@@ -1,24 +1,41 @@
-"""One sequence of steps to a plan, for every vehicle: see `steps`."""
+"""One sequence of steps to a plan, for every vehicle: see `steps`.
+
+A vehicle that can follows the paths of a simpler one, which switches at will: it stops at each
+switch.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.along_paths import AlongPaths
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import bound_along_paths
-from maneuver_automaton.planning.checking import Condition, load_checks
-from maneuver_automaton.planning.free_words import free_words, words_once
+from maneuver_automaton.planning.checking import Condition, TooLate, load_checks, what_is_hit
+from maneuver_automaton.planning.free_space import free_words, words_once
 from maneuver_automaton.planning.incumbents import Accepted, Incumbents
-from maneuver_automaton.planning.lattice_words import LatticeWords, improved, search_lattice
-from maneuver_automaton.planning.polishing import polish_found
+from maneuver_automaton.planning.lattice_words import (
+    AT_ONCE,
+    LatticeWords,
+    improved,
+    search_lattice,
+)
+from maneuver_automaton.planning.polishing import Aimed, guess_along, polish_found
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.planning.steps import Steps, steps_of
+from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
+from maneuver_automaton.refinement.path_guesses import path_guesses
+from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.limits import why_impossible
@@ -29,6 +46,10 @@ WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no 
 LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
 OTHERS = 6  # costlier words that are looked at where bounds or obstacles may refuse the cheapest
 IN_SPACE = 23  # the same where some may pass above or below
+FIRST_SHARE = 0.8  # of the time limit, for a first path
+IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+STOPPING_S = 0.01  # [s] that it takes to stop and steer along a path
+WAITS = 9  # at rest, before a path is followed among moving obstacles
 
 
 def plan_in_steps(
@@ -142,3 +163,78 @@ def _why_none(
     return PlanStatus.OUT_OF_BUDGET, (
         f"no plan within {found.budget.seconds:.4g} s and {spent}{paths.reason}{near}"
     )
+
+
+@dataclass(slots=True, eq=False)
+class AlongPaths:
+    """Paths of the simpler vehicle, and what came of them."""
+
+    found: Incumbents
+    reason: str = ""  # why there is no path
+    enclosed: str = ""  # why no plan can exist
+    guesses: list[Aimed] = field(default_factory=list)  # along the paths, for polishing
+
+    def plans(self) -> Iterator[tuple[Plan, int]]:
+        """Stop and steer along a first path, then along one that is fast to follow so."""
+        found, problem = self.found, self.found.problem
+        free = kinematic_problem(problem, switch=0.0)
+        first = self._track(free, found.budget.stage(FIRST_SHARE), patience=AT_ONCE)
+        if first.plan is None or first.goal_index is None:
+            self.enclosed = first.reason if first.enclosed else ""
+            self.reason = f" ({first.reason})" if first.reason else ""
+            return
+        yield from _stopping(found, first.plan, first.goal_index)
+        if found.budget.is_over:
+            return
+        along = path_guesses(problem.automaton.model)
+        if along is not None and first.plan.duration > 0.0:
+            self.guesses.append(guess_along(problem, along, first.plan))
+        soon = found.budget.stage(IMPROVED_SHARE)
+        better = self._track(kinematic_problem(problem), soon, known=first.plan)
+        if better.plan is not None and better.goal_index is not None and found.may_check:
+            yield from _stopping(found, better.plan, better.goal_index)
+
+    def _track(self, problem: Problem, budget: Budget, **more: Any) -> Tracked:
+        """A path of the simpler vehicle; what it takes is counted."""
+        prepared = self.found.workspace.prepared
+        path = track(problem, budget=budget, prepared=prepared, **more)
+        self.found.counts.update(expansions=path.expansions, collision_queries=path.queries)
+        return path
+
+
+def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
+    """Stop and steer along a path, once moving obstacles let it pass.
+
+    The path was free at the pace of the simpler vehicle. This one is slower, so that it meets
+    moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
+    """
+    problem, goal = found.problem, found.problem.goals[goal_index]
+    if found.for_checks.left_to_check < STOPPING_S:
+        return
+    plan = stop_and_steer(
+        problem.automaton.model,  # type: ignore[arg-type]
+        path,
+        first=problem.first_trim,
+        last=problem.last_trim(goal),
+    )
+    if not problem.moves:
+        yield plan, goal_index
+        return
+    settled = max(
+        float(one.motion.time[-1])
+        for one in problem.obstacles
+        if isinstance(one, Obstacle) and one.motion is not None
+    )
+    for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
+        if found.budget.is_over:
+            return
+        durations = plan.durations.copy()
+        durations[0] += wait
+        later = replace(plan, durations=durations)
+        try:
+            hit = what_is_hit(problem, later, goal, found.workspace, budget=found.for_checks)
+        except TooLate:
+            return
+        if not hit:
+            yield later, goal_index
+            return

@@ -1,4 +1,7 @@
-"""Words of the lattice among obstacles: a first one, then better ones, and others beside it."""
+"""Words of the lattice among obstacles: a first one, then better ones, and others beside it.
+
+Others lead round the other sides of obstacles: a stone is laid on each path that is known.
+"""
 
 from __future__ import annotations
 
@@ -13,16 +16,16 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.blocked import goals_left
+from maneuver_automaton.collision import Disc, Obstacle
+from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import load_checks
-from maneuver_automaton.planning.detours import with_stones
-from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
+from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.no_way import before_proof
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
-from maneuver_automaton.problem import moves
+from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whole_of
 from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
@@ -49,6 +52,12 @@ TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
 MOST_DETOURS = 8  # known paths beside which others are looked for
+STONES = (  # where stones are laid and their radii, in shares of the path
+    (0.5, 0.12),  # so wide that the other side of an obstacle is the shorter path
+    (0.5, 0.02),  # so small that it closes a narrow passage alone
+    (0.3, 0.08),
+    (0.7, 0.08),
+)
 
 
 @dataclass(slots=True, eq=False)
@@ -343,3 +352,21 @@ def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate
             if is_new(plan, known, UNFINISHED):
                 known.append(plan)
                 yield _candidate(query, word)
+
+
+def with_stones(problem: Problem, known: Plan) -> Iterator[Problem]:
+    """Problems with one more obstacle each, which closes the path of a known plan.
+
+    Problems whose start or goal the stone touches are left out.
+    """
+    times = np.linspace(0.0, known.duration, 101)
+    poses = known.pose_at(times)
+    driven = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
+    if not driven[-1] > 0.0:
+        return
+    for share, radius in STONES:
+        place = poses[int(np.searchsorted(driven, share * driven[-1]))]
+        disc = Obstacle(Disc(radius * float(driven[-1]), place[:2].tolist()), name="stone")
+        closed = replace(problem, obstacles=(*problem.obstacles, disc))
+        if blocked_ends(closed) is None:
+            yield closed

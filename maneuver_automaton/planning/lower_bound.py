@@ -1,10 +1,15 @@
-"""`lower_bound(problem)`: how little a plan can cost, proven, whatever its word."""
+"""`lower_bound(problem)`: how little a plan can cost, proven; and plans until that is near.
+
+What was proven of one start is kept for others: one map, many queries.
+"""
 
 from __future__ import annotations
 
 import functools
 import math
+import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
@@ -18,16 +23,57 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
-from maneuver_automaton.planning.kept_bounds import KeptBounds
 from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
-from maneuver_automaton.planning.result import LowerBound
+from maneuver_automaton.planning.result import LowerBound, PlanResult
+from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.prepared import RECENT
 
-LOOK = 0.002  # [s] between two looks whether there is one
+GLANCE = 0.002  # [s] between two looks whether there is one
 SHARES = (0.0, 0.5, 2.0)  # of a plan's cost, shared by the changes it may have: prices of one
 POLISHING = 0.85  # share of the time after which what there is gets polished
+MOST = 4  # functions of the same goals
+WORK_PER_EXPANSION = 5_000  # steps times cells of the proof where expansions are counted
+LOOK = 0.02  # [s] between two looks at the proof once the search is over
+
+
+@dataclass(slots=True, eq=False)
+class KeptBounds:
+    """The last functions that were proven for the same goals, costs and body on one map."""
+
+    functions: deque[CostToGo] = field(default_factory=lambda: deque(maxlen=MOST))
+
+    def bound(self, problem: Problem) -> float:
+        """The best bound from the start of a problem, 0 if nothing is known of it."""
+        found = (one.anywhere(problem.start[:3]) for one in self.functions)
+        return max(found, default=0.0)
+
+
+def kept_bounds(problem: Problem, workspace: Workspace) -> KeptBounds | None:
+    """Those of a planner, for the goals of a problem; None for callers that hold no planner.
+
+    A call on its own does the same work at every call.
+    """
+    if workspace.prepared is RECENT:
+        return None
+    from maneuver_automaton.bounds.pose_scene import lasting_obstacles
+
+    aims = tuple(
+        (tuple(goal.pose[:3].tolist()), goal.tolerance_m, goal.tolerance_rad, goal.free_heading)
+        for goal in problem.goals
+    )
+    given = (problem.automaton, problem.cost, lasting_obstacles(problem), problem.footprint)
+    limits = (problem.margin, problem.bounds.x, problem.bounds.y)
+    return workspace.prepared.once(
+        _kept_for, aims, *given, *limits, problem.horizon.time is not None
+    )
+
+
+def _kept_for(*_given: object) -> KeptBounds:
+    """A place for functions, one for all that they depend on."""
+    return KeptBounds()
 
 
 def lower_bound(
@@ -157,7 +203,7 @@ class Proving:
         while after_a_plan and self.watch.cost == math.inf:
             if self._over():
                 return
-            time.sleep(LOOK)
+            time.sleep(GLANCE)
         if self._over():
             return
         for proof in proofs_of(
@@ -278,3 +324,72 @@ def _ramp(problem: Problem) -> _Ramp:
     fastest = float(np.abs(twists[:, 0]).max())
     seconds = fastest / float(model.control_limits[0, 1])
     return _Ramp(seconds, cost.time, 1.0 / (cost.time + cost.length * fastest))
+
+
+def plan_to_gap(
+    problem: Problem,
+    search: Callable[[Budget], PlanResult],
+    budget: Budget,
+    watch: Watch,
+    *,
+    kept: KeptBounds | None = None,
+) -> PlanResult:
+    """The answer of a search, with what is proven of it.
+
+    The proof runs in a thread of its own, mostly in compiled code, and both stop once the gap is
+    small enough. Where expansions are counted the search goes first, and the proof does a stated
+    amount of work after it: neither then depends on the clock, unless the time is over. `kept` is
+    what was proven of other starts, and gets what is proven here.
+    """
+    if budget.expansions is not None:
+        result = search(budget)
+        if result.plan is None or result.cost is None:
+            return result
+        watch.note(result.cost)
+        most = WORK_PER_EXPANSION * budget.expansions
+        proving = Proving(problem, budget, watch, max_work=most, kept=kept)
+        proving.run()
+        return proven(result, proving)
+    proving = Proving(problem, budget, watch, kept=kept)
+    thread = _Beside(functools.partial(proving.run, after_a_plan=True))
+    thread.start()
+    try:
+        result = search(replace(budget, watch=watch))
+        if result.plan is not None and result.cost is not None:
+            watch.cost = result.cost
+            while thread.is_alive() and not (watch.is_closed or budget.is_over):
+                thread.join(LOOK)
+    finally:
+        watch.is_abandoned = True
+        thread.join()
+    if thread.error is not None:
+        raise thread.error
+    return proven(result, proving)
+
+
+def proven(result: PlanResult, proving: Proving) -> PlanResult:
+    """A result with the best bound of its own and of a proof, and since when it is known."""
+    if result.cost is None or result.bound is None:
+        return result
+    found = proving.bound(result.cost)
+    if found.value < result.bound.value:
+        found = replace(result.bound, history=found.history, work=found.work)
+    return replace(result, bound=found, lower_bound=found.value, gap=found.gap(result.cost))
+
+
+@dataclass(eq=False)
+class _Beside(threading.Thread):
+    """A thread that keeps the error it ends with."""
+
+    work: Callable[[], None]
+    error: BaseException | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        super().__init__(daemon=True)
+
+    def run(self) -> None:
+        """Do the work."""
+        try:
+            self.work()
+        except BaseException as error:  # noqa: BLE001, raised again by who waits
+            self.error = error

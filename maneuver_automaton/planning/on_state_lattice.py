@@ -8,9 +8,8 @@ from dataclasses import replace
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.planning.blocked import blocked_ends
+from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.off_lattice import goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem

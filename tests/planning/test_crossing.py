@@ -8,7 +8,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.planning import plan
-from maneuver_automaton.planning.crossing import coasts_through
+from maneuver_automaton.planning.among_zones import coasts_through
 from maneuver_automaton.problem import Problem, SearchSettings
 from tests.planning.test_among_zones import ACROSS, ALONG, ROBOT, posed
 from tests.search.cases import compiled_only

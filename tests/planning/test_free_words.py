@@ -6,7 +6,7 @@ import pytest
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc, Obstacle
-from maneuver_automaton.planning.free_words import free_words, word_candidate, words_once
+from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem, SearchSettings

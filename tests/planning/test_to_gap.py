@@ -14,8 +14,8 @@ from maneuver_automaton.bounds import cell_proofs
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.cli import run
 from maneuver_automaton.planning import PlanResult, PlanStatus, lower_bound
+from maneuver_automaton.planning.lower_bound import plan_to_gap
 from maneuver_automaton.planning.no_way import with_proof
-from maneuver_automaton.planning.to_gap import plan_to_gap
 from tests import scenes
 from tests.bounds.scenes import gap
 
