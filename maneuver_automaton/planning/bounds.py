@@ -52,22 +52,6 @@ def lattice_bound(query: LatticeQuery) -> LowerBound:
     return LowerBound(value=disc, kind="disc") if disc > closed.value else closed
 
 
-def speed_bound(problem: Problem) -> float:
-    """No plan of whatever kind is cheaper: the straight line at the greatest speed of the model."""
-    cost, fastest = problem.cost, _greatest_speed(problem.automaton)
-    if not isinstance(cost, Cost):
-        return 0.0
-    return _least_distance(problem) * (cost.time / fastest + cost.length)
-
-
-def word_bound(problem: Problem) -> float:
-    """No word of the library is cheaper: the straight line at its best price per metre.
-
-    A maneuver leads as far as its displacement, so it has a price per metre like a trim.
-    """
-    return _least_distance(problem) * least_price_per_metre(problem.automaton, problem.cost)
-
-
 @kept_by_first
 def _greatest_speed(automaton: Automaton) -> float:
     """Greatest speed [m/s] of the model."""
@@ -76,7 +60,7 @@ def _greatest_speed(automaton: Automaton) -> float:
 
 @kept_by_first
 def least_price_per_metre(automaton: Automaton, cost: StageCost) -> float:
-    """Cost per metre of a library's cheapest trim or maneuver; at least 0."""
+    """Cost per metre of a library's cheapest trim or maneuver, by its displacement; at least 0."""
     still, name = origin_of(automaton, automaton.trims[0]), automaton.trim_names[0]
     priced = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
     places = [0, 1, *range(3, still.size)]
@@ -100,9 +84,15 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     from maneuver_automaton.search.lattice_query import lattice_query
 
     model, cost = problem.automaton.model, problem.cost
-    known = speed_bound(problem)
+    # the straight line to the nearest goal: at the greatest speed, or the best price of words
+    straight = min(
+        max(0.0, goal.off(problem.start)[0] - goal.tolerance_m) for goal in problem.goals
+    )
+    known = 0.0
+    if isinstance(cost, Cost):
+        known = straight * (cost.time / _greatest_speed(problem.automaton) + cost.length)
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words
-        known = max(known, word_bound(problem))
+        known = max(known, straight * least_price_per_metre(problem.automaton, cost))
     if not (follows_paths(model) and rests_at_both_ends(problem) and isinstance(cost, Cost)):
         return LowerBound(value=known, kind="distance")
     simpler = kinematic_problem(problem, switch=0.0)
@@ -113,12 +103,3 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     duration = least + ramp if least >= ramp else 2.0 * math.sqrt(least * ramp)
     value = cost.time * duration + cost.length * least * fastest
     return LowerBound(value=max(known, value), kind=bound.kind if value > known else "distance")
-
-
-def _least_distance(problem: Problem) -> float:
-    """Distance from the start to the tolerance of the nearest goal [m]."""
-
-    def distance(goal: Goal) -> float:
-        return max(0.0, goal.off(problem.start)[0] - goal.tolerance_m)
-
-    return min(distance(goal) for goal in problem.goals)

@@ -87,17 +87,19 @@ def plan_by_words(
         found.counts["words_that_hit"] = found.refused[Condition.COLLISION]
     if not found.plans:
         return found.none(*_why_none(found, listed))
-    best = found.plans[0]
     exact = not any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals)
-    free = listed.candidates[0].cost if listed.proven and exact else None
+    if listed.proven and exact:
+        bound = LowerBound(value=listed.candidates[0].cost, kind="exhaustive")
+    else:
+        bound = formula_bound(problem)
+    return found.found(bound=bound, searched=searched, certificate=certificate_of(found))
+
+
+def certificate_of(found: Incumbents) -> float | None:
+    """The certificate of the cheapest plan; None for one that is no word of the library."""
+    problem, best = found.problem, found.plans[0]
     word = word_of_plan(problem.automaton, best.plan)
-    return found.found(
-        bound=_lower_bound(problem, free),
-        searched=searched,
-        certificate=None
-        if word is None
-        else certificate(problem, problem.goals[best.goal_index], word),
-    )
+    return None if word is None else certificate(problem, problem.goals[best.goal_index], word)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -115,21 +117,16 @@ def _search_goals(found: Incumbents) -> _Listed:
     sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
     goals = [k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)]
     others = None if sorted_out else SPARE * found.alternatives
-    rows: list[tuple[tuple[float, int, tuple[int, ...]], Candidate]] = []
+    words: list[tuple[Word, int]] = []
     exhausted, proven = True, set[int]()  # goals whose every admitted word was searched
     for index, result in free_words(found, goals, others=others):
         exhausted = exhausted and result.status is not SearchStatus.OUT_OF_BUDGET
         proven |= {index} if result.exhaustive else set()
         found.counts.update(result.counts)
-        rows += [(_order(word), word_candidate(problem, word, index)) for word in result.solutions]
-    rows.sort(key=lambda row: row[0])
-    return _Listed(
-        candidates=[one for _, one in rows], exhausted=exhausted, proven=len(proven) == len(goals)
-    )
-
-
-def _order(word: Word) -> tuple[float, int, tuple[int, ...]]:
-    return float(f"{word.cost:.9g}"), len(word.trims), tuple(word.trims.tolist())
+        words += [(word, index) for word in result.solutions]
+    words.sort(key=lambda row: (float(f"{row[0].cost:.9g}"), len(row[0].trims), *row[0].trims))
+    candidates = [word_candidate(problem, word, index) for word, index in words]
+    return _Listed(candidates=candidates, exhausted=exhausted, proven=len(proven) == len(goals))
 
 
 def _why_none(found: Incumbents, listed: _Listed) -> tuple[PlanStatus, str]:
@@ -190,10 +187,3 @@ def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | No
     return (PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PLAN), (
         f"the goal cannot be reached in {limit:g} s: the least time found is {least:.6g} s"
     )
-
-
-def _lower_bound(problem: Problem, free: float | None) -> LowerBound:
-    """No admitted plan is cheaper: the optimum `free` of bounds if proven, or a closed bound."""
-    if free is not None:
-        return LowerBound(value=free, kind="exhaustive")
-    return formula_bound(problem)

@@ -19,8 +19,8 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import bound_along_paths
 from maneuver_automaton.planning.checking import Condition, TooLate, load_checks, what_is_hit
-from maneuver_automaton.planning.free_space import free_words, words_once
-from maneuver_automaton.planning.incumbents import Accepted, Incumbents
+from maneuver_automaton.planning.free_space import certificate_of, free_words, words_once
+from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.lattice_words import (
     AT_ONCE,
     LatticeWords,
@@ -37,10 +37,8 @@ from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
 from maneuver_automaton.refinement.path_guesses import path_guesses
 from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search.beginning import Begun
-from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.result import plan_of
-from maneuver_automaton.words.word import word_of_plan
 
 WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no plan yet
 LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
@@ -97,7 +95,7 @@ def plan_in_steps(
     return found.found(
         bound=(lattice and lattice.bound) or bound_along_paths(problem),
         searched=searched,
-        certificate=None if steps.at_will else _certificate(problem, found.plans[0]),
+        certificate=None if steps.at_will else certificate_of(found),
         nodes=nodes,
     )
 
@@ -133,12 +131,6 @@ def _count_refused(found: Incumbents, lattice: LatticeWords | None) -> None:
         by_audit = found.refused[Condition.AUDIT]
         found.counts["rejected_by_fcl"] = found.rejected - by_audit
         found.counts["rejected_by_audit"] = by_audit
-
-
-def _certificate(problem: Problem, best: Accepted) -> float | None:
-    """The certificate of a plan that is a word of the library; None for one that is not."""
-    word = word_of_plan(problem.automaton, best.plan)
-    return None if word is None else certificate(problem, problem.goals[best.goal_index], word)
 
 
 def _why_none(

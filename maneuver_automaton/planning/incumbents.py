@@ -161,21 +161,17 @@ class Incumbents:
         """
         late = 0
         for one in candidates:
-            known = [
-                other.plan for other in self.plans if other.offered <= one.cost + _slack(one.cost)
-            ]
+            most = one.cost + CHEAPER * abs(one.cost)
+            known = [other.plan for other in self.plans if other.offered <= most]
             if len(known) > self.alternatives or not self.may_check:
                 return
-            if late and (self.plans or self._is_late(late)):
+            over = late >= LATE or self.for_checks.left_to_check == 0.0
+            if late and (self.plans or over):
                 return
             plan = one.plan()
             if is_new(plan, known, self.likeness):
                 self.offer(plan, one.goal_index, proven=one.proven)
             late += self.budget.is_over
-
-    def _is_late(self, late: int) -> bool:
-        """Whether no other plan is checked after so many that were late."""
-        return late >= LATE or self.for_checks.left_to_check == 0.0
 
     def _with_lasting_coasts(self, plan: Plan, goal: Goal) -> Plan:
         """The plan without very short trims, if there is time to check it."""
@@ -194,10 +190,7 @@ class Incumbents:
             return plan
 
     def _keep(self, plan: Plan, goal_index: int, *, proven: bool, cost: float) -> bool:
-        """Keep a plan if it passes the checks; of one motion only the cheapest plan stays.
-
-        It was offered at a `cost`.
-        """
+        """Keep a plan, offered at a `cost`, if it passes; of one motion the cheapest stays."""
         begin = self.budget.elapsed
         goal = self.problem.goals[goal_index]
         checked = check_plan(self.problem, plan, goal, self.workspace, budget=self.for_checks)
@@ -303,8 +296,3 @@ class Incumbents:
     def _timing(self, searched: float) -> dict[str, float]:
         refined = max(self.budget.elapsed - searched - self.checking, 0.0)
         return {"search": searched, "refine": refined, "audit": self.checking}
-
-
-def _slack(cost: float) -> float:
-    """By how much a plan may be costlier than its word was found to be."""
-    return CHEAPER * abs(cost)

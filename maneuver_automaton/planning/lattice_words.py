@@ -192,7 +192,9 @@ def _first(lattice: LatticeWords, begun: Begun | None = None) -> FirstPlan | Non
     query, limit = lattice.query, lattice.limit
     if query.problem.obstacles and not lattice.found.plans:
         limit = before_proof(limit)
-    if not lattice.knows_all and _needs_quick_word(query) and _quick(lattice):
+    # where a search by cost alone would look everywhere, or for too long motions
+    in_time = math.isfinite(query.most_time) or query.library.per_metre == 0.0
+    if not lattice.knows_all and in_time and _quick(lattice):
         return None
     if query.problem.moves and lattice.knows_all:
         first = lattice.first_plan(query, limit, most=QUICK)
@@ -223,11 +225,7 @@ def _quick(lattice: LatticeWords) -> bool:
 
 
 def late_at_first(query: LatticeQuery) -> LatticeQuery:
-    """The query with no longest time where the cheaper of two words is the quicker one.
-
-    There a first word may be late, since shortcuts and polishing make it quicker; a word that stays
-    late is refused.
-    """
+    """The query with no longest time where cheaper is quicker: shortcuts and polishing hasten."""
     edges, trims = query.library.arrays, query.library.arrays.library
     rates = trims.rates[: trims.n_trims]  # the last row is the turn of a free heading
     close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
@@ -235,17 +233,17 @@ def late_at_first(query: LatticeQuery) -> LatticeQuery:
     return replace(query, most_time=math.inf) if timed else query
 
 
-def _needs_quick_word(query: LatticeQuery) -> bool:
-    """Whether a search by cost alone would look everywhere, or for too long motions."""
-    return math.isfinite(query.most_time) or query.library.per_metre == 0.0
-
-
 def improved(lattice: LatticeWords) -> list[Candidate]:
     """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
     if not lattice.words:
         return []
     if has_paces(lattice.query):
-        _at_pace(lattice)
+        # take the trims of a large library that fill the time, once the first word is shortened
+        query, left = lattice.query, lattice.for_others
+        lattice.improve(query, lattice.words[-1], left, patience=AT_ONCE, better=lattice.gained)
+        lattice.query, word = paced(query, lattice.words[-1])
+        if word is not lattice.words[-1]:
+            lattice.gained(word)
     query, found = lattice.query, lattice.found
     if query.problem.moves and lattice.knows_all:
         _let_pass(lattice)
@@ -263,18 +261,13 @@ def improved(lattice: LatticeWords) -> list[Candidate]:
         return []
     candidates = [_candidate(query, word) for word in (*lattice.words, *better.others)]
     if found.alternatives and not lattice.for_others.is_over:
-        candidates += _free_words(lattice)
+        # words that are locally optimal in free space: collision-free ones are so here, too
+        goals, most = _goals(query), FREE_WORDS * found.alternatives
+        stages = free_words(found, goals, others=most, share=FREE_WORDS_SHARE)
+        for word, index in words_once(stages):
+            candidates.append(word_candidate(found.problem, word, index, proven=False))
         candidates += _detours(lattice, better.word, 2 * found.alternatives)
     return sorted(candidates, key=lambda one: one.cost)
-
-
-def _at_pace(lattice: LatticeWords) -> None:
-    """Take the trims of a large library that fill the time, once the first word is shortened."""
-    query, budget = lattice.query, lattice.for_others
-    lattice.improve(query, lattice.words[-1], budget, patience=AT_ONCE, better=lattice.gained)
-    lattice.query, word = paced(query, lattice.words[-1])
-    if word is not lattice.words[-1]:
-        lattice.gained(word)
 
 
 def _for_the_best(lattice: LatticeWords) -> Budget:
@@ -320,14 +313,6 @@ def _goals(query: LatticeQuery) -> list[int]:
 def _candidate(query: LatticeQuery, word: Word) -> Candidate:
     make = functools.partial(plan_of_word, query, word)
     return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
-
-
-def _free_words(lattice: LatticeWords) -> Iterator[Candidate]:
-    """Words that are locally optimal in free space: collision-free ones are so here, too."""
-    found, goals = lattice.found, _goals(lattice.query)
-    others = FREE_WORDS * found.alternatives
-    for word, index in words_once(free_words(found, goals, others=others, share=FREE_WORDS_SHARE)):
-        yield word_candidate(found.problem, word, index, proven=False)
 
 
 def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate]:

@@ -210,7 +210,10 @@ class Proving:
             self.problem, incumbent=lambda: self.watch.cost, ends=self._late, over=self._over
         ):
             self.work = proof.work
-            self._remember(proof.function)
+            if proof.function is not None:  # for poses on the way, and for other starts
+                self.functions.append(proof.function)
+                if self.kept is not None:
+                    self.kept.functions.append(proof.function)
             kind = "incumbent" if proof.optimal and proof.value >= self.watch.cost else "cells"
             self._better(LowerBound(value=proof.value, kind=kind))
             if self._over():
@@ -229,13 +232,6 @@ class Proving:
             self.best = bound
             self.history.append((self.budget.elapsed, bound.value))
             self.watch.bound = bound.value
-
-    def _remember(self, function: CostToGo | None) -> None:
-        """Keep what proves it, for poses on the way and for other starts."""
-        if function is not None:
-            self.functions.append(function)
-            if self.kept is not None:
-                self.kept.functions.append(function)
 
     def _over(self) -> bool:
         return self.watch.is_abandoned or self.watch.is_closed or self.budget.is_over

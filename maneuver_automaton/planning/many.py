@@ -58,7 +58,7 @@ class _Asked:
 
     def answers(self, queries: Queries) -> list[Any]:
         """The answers to some queries, in this process."""
-        take, limit = self.take or _whole, self.time_limit
+        take, limit = self.take or (lambda result: result), self.time_limit
         if isinstance(queries, list):
             return [take(plan(problem, time_limit=limit)) for problem in queries]
         assert self.planner is not None
@@ -184,7 +184,10 @@ def _answers(
     rest = (asked.time_limit, asked.take)
     pieces = [(common, _dumped(part), *rest) for part in parts]
     sent = in_parallel(_answered_apart, pieces, jobs=jobs, scheduler=scheduler)
-    chunks = (_loaded(one, asked.shared(part)) for one, part in zip(sent, parts, strict=True))
+    chunks = (
+        _Receiver(io.BytesIO(one), asked.shared(part)).load()
+        for one, part in zip(sent, parts, strict=True)
+    )
     return _told(kept, chunks, len(asked), journal, progress)
 
 
@@ -204,10 +207,6 @@ def _told(
         if progress is not None:
             progress(done, n)
         yield from found
-
-
-def _whole(result: PlanResult) -> PlanResult:
-    return result
 
 
 def _answered_apart(piece: tuple[bytes, bytes, float, Take | None]) -> bytes:
@@ -282,11 +281,6 @@ class _Receiver(pickle.Unpickler):
 def _read_only(array: Array) -> Array:
     array.setflags(write=False)
     return array
-
-
-def _loaded(sent: bytes, shared: list[object]) -> list[Any]:
-    found: list[Any] = _Receiver(io.BytesIO(sent), shared).load()
-    return found
 
 
 def _dumped(value: Any) -> bytes:

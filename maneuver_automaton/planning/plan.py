@@ -83,7 +83,7 @@ def plan(
     workspace = workspace_of(problem.obstacles)
     if on_better is not None:
         watch = watch or Watch(gap=-math.inf)
-        watch.shows = functools.partial(_show, _known_bound_of(problem), watch, on_better)
+        watch.shows = _shown(problem, watch, on_better)
     return plan_in(
         workspace,
         problem,
@@ -94,29 +94,21 @@ def plan(
     )
 
 
-def _known_bound_of(problem: Problem) -> Callable[[], LowerBound]:
-    """The bound that takes no search, made when it is asked for first."""
+def _shown(
+    problem: Problem, watch: Watch, on_better: Callable[[PlanResult], None]
+) -> Callable[[Callable[..., PlanResult]], None]:
+    """What hands a better plan on, with the best bound that there is meanwhile."""
+    from maneuver_automaton.planning.lower_bound import known_bound
 
-    @functools.cache
-    def bound() -> LowerBound:
-        from maneuver_automaton.planning.lower_bound import known_bound
+    known = functools.cache(lambda: known_bound(problem))
 
-        return known_bound(problem)
+    def show(found: Callable[..., PlanResult]) -> None:
+        bound = known()
+        if watch.bound > bound.value:
+            bound = LowerBound(value=watch.bound, kind="cells")
+        on_better(_noted(found(bound=bound)))
 
-    return bound
-
-
-def _show(
-    known: Callable[[], LowerBound],
-    watch: Watch,
-    on_better: Callable[[PlanResult], None],
-    found: Callable[..., PlanResult],
-) -> None:
-    """Hand a better plan on, with the best bound that there is meanwhile."""
-    bound = known()
-    if watch.bound > bound.value:
-        bound = LowerBound(value=watch.bound, kind="cells")
-    on_better(_noted(found(bound=bound)))
+    return show
 
 
 def plan_in(

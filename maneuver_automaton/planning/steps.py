@@ -97,25 +97,18 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
         load_times_kernels()
         least_price_per_metre(problem.automaton, problem.cost)
         if steps.lattice:
-            _load_libraries(problem, workspace)
+            goals, horizon = range(len(problem.goals)), problem.horizon
+            library = lattice_library(problem, goals, prepared=workspace.prepared)
+            if horizon.time or horizon.max_time or library.per_metre == 0.0:
+                in_time = replace(problem, cost=BY_TIME)
+                lattice_library(in_time, goals, prepared=workspace.prepared)
         if _suits_words(problem) or steps.words:
             load_linked_words()
             for goal in problem.goals:
                 load_words_of(problem, goal)
 
 
-def _load_libraries(problem: Problem, workspace: Workspace) -> None:
-    """Have the libraries ready of the lattice over maneuvers, at the prices that it needs."""
-    goals, horizon = range(len(problem.goals)), problem.horizon
-    library = lattice_library(problem, goals, prepared=workspace.prepared)
-    if horizon.time or horizon.max_time or library.per_metre == 0.0:
-        lattice_library(replace(problem, cost=BY_TIME), goals, prepared=workspace.prepared)
-
-
 def _suits_words(problem: Problem) -> bool:
-    """Whether words may be searched first: nothing is in the way, or the time is to be met exactly.
-
-    Where no rest fills a fixed time, words alone have times that add up to it.
-    """
+    """Whether words may be searched first: nothing is in the way, or they alone meet the time."""
     rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
     return not problem.obstacles or (problem.horizon.time is not None and not rests)

@@ -22,7 +22,7 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.no_way import proven_blocked
-from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
@@ -69,7 +69,9 @@ def plan_within_tolerance(
         if found.why_unchecked:
             return found.none(PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
         return found.none(*_why_none(problem, results[0], found.why_refused, budget))
-    return found.found(bound=_lower_bound(problem, results[0]), nodes=results[0].nodes)
+    exact = results[0]
+    bound = exact.bound if exact.problem.goals == problem.goals else None
+    return found.found(bound=bound or formula_bound(problem), nodes=exact.nodes)
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:
@@ -92,13 +94,6 @@ def _questions(problem: Problem) -> Iterator[Problem]:
     share = None if most is None else max(1, most // len(asked))
     for goals in asked:
         yield replace(problem, goals=goals, search=replace(problem.search, max_expansions=share))
-
-
-def _lower_bound(problem: Problem, exact: PlanResult) -> LowerBound:
-    """No plan that ends within a tolerance is cheaper: bounds count it for the goals themselves."""
-    if exact.bound is not None and exact.problem.goals == problem.goals:
-        return exact.bound
-    return formula_bound(problem)
 
 
 def _aims(problem: Problem) -> Iterator[Goal]:
@@ -176,10 +171,7 @@ def _poses_within(
 
 
 def _offer_loosened(found: Incumbents, plan: Plan) -> None:
-    """Offer the plan with the cheapest end within the tolerance that passes the checks.
-
-    Its own end, where no other is better.
-    """
+    """Offer the plan with the cheapest end within the tolerance, or its own, that passes."""
     problem = found.problem
     for index in _goals_met(problem, plan):
         loose = _with_loose_ends(problem, plan, problem.goals[index], found.for_better)
@@ -189,10 +181,7 @@ def _offer_loosened(found: Incumbents, plan: Plan) -> None:
 
 
 def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal, budget: Budget) -> list[Plan]:
-    """The plan with other coasting times, all of them or the last ones, the cheapest first.
-
-    Where nothing is in the way the times of the whole word are the best there are.
-    """
+    """The plan with other coasting times, all of them or the last ones, the cheapest first."""
     if budget.is_over:
         return [plan]
     guarded = bool(problem.obstacles or problem.zones or not problem.bounds.are_open)
