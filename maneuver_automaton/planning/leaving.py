@@ -11,12 +11,12 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.convex import convex_pieces
@@ -35,18 +35,20 @@ DEEPER, TURNS = 1e-9, 1e-9  # [m] of rounding; [rad/s] that are straight on
 EVERY = 5  # samples of a first trim after which a second one is tried
 MOST_WAYS, MOST_MIDDLES, MOST_SECONDS = 4, 60, 12  # planned from; first coasts; trims after them
 
+_Way = tuple[float, tuple[Trim, ...], tuple[float, ...]]  # [m] the body goes at most; trims, [s]
+
 
 def plan_leaving(
     problem: Problem, plan: Callable[..., PlanResult], *, time_limit: float
 ) -> PlanResult:
     """The plan of a problem whose start touches something, by `plan` from where it is left."""
     deadline = time.perf_counter() + time_limit
-    held = [
-        k
+    touched = {
+        k: one
         for k, one in enumerate(problem.obstacles)
         if where_touched(replace(problem, obstacles=(one,)), problem.start, problem.start_time)
-    ]
-    if not held or outside(problem.start, problem.bounds):
+    }
+    if not touched or outside(problem.start, problem.bounds):
         return plan(problem, time_limit=time_limit)
     refused = [
         (problem.moves, "an obstacle moves"),
@@ -55,17 +57,13 @@ def plan_leaving(
         (bool(problem.parts), "the vehicle carries something"),
         (problem.horizon.time is not None, "the time is fixed"),
     ]
-    if any(one for one, _ in refused):
-        why = next(words for one, words in refused if one)
+    if why := next((words for one, words in refused if one), ""):
         return _blocked(problem, f"no way out is looked for where {why}")
-    touched = [problem.obstacles[k] for k in held]
-    rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in held)
+    rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in touched)
     others = replace(problem, obstacles=rest)
-    contact, none, planned = _Contact(problem, touched), None, 0
-    for way in _ways_out(problem, contact, deadline - 0.5 * time_limit):
-        first = Plan(
-            problem.start, way.trims, durations=way.durations, start_time=problem.start_time
-        )
+    contact, none, planned = _Contact(problem, [*touched.values()]), None, 0
+    for length, trims, times in _ways_out(problem, contact, deadline - 0.5 * time_limit):
+        first = Plan(problem.start, trims, durations=times, start_time=problem.start_time)
         goal = Goal(pose=first.end)
         alone = replace(others, goals=(goal,), horizon=Horizon(), start_trim=None)
         if not check_plan(alone, first, goal).passed:
@@ -75,19 +73,18 @@ def plan_leaving(
             break
         last, planned = plan(_after(problem, first), time_limit=max(left, LEAST)), planned + 1
         none = none or last
-        whole = _joined(first, last.plan)
-        if last.plan is None or last.goal_index is None or whole is None:
+        if last.plan is None or last.goal_index is None:
             continue
+        whole = joined(first, last.plan) if last.plan.trims else first
         checked = check_plan(others, whole, problem.goals[last.goal_index])
         if checked.audit is None or not checked.passed:
             continue
-        apart = [
-            one for one in (last.clearance_m, checked.audit.min_clearance_m) if one is not None
-        ]
-        names = [one.name or f"obstacle {k}" for k, one in zip(held, touched, strict=True)]
+        both = (last.clearance_m, checked.audit.min_clearance_m)
+        apart = min((one for one in both if one is not None), default=None)
+        names = [one.name or f"obstacle {k}" for k, one in touched.items()]
         note = (
             f"left the start, which touches {' and '.join(names)} ({contact.depth:.3g} m deep, the "
-            f"margin included), by {way.length:.3g} m of {' - '.join(first.word)} in "
+            f"margin included), by {length:.3g} m of {' - '.join(first.word)} in "
             f"{first.duration:.3g} s: never deeper, clear of all else; the audit admits this "
             "contact alone, and clearance counts from there"
         )
@@ -100,8 +97,8 @@ def plan_leaving(
             gap=None,
             bound=None,
             certificate=None,
-            clearance_m=min(apart, default=None),
-            audit=replace(checked.audit, min_clearance_m=min(apart, default=None)),
+            clearance_m=apart,
+            audit=replace(checked.audit, min_clearance_m=apart),
             improvements=(),
             notes=(*last.notes, note),
         )
@@ -123,39 +120,19 @@ def _blocked(problem: Problem, why: str) -> PlanResult:
 def _after(problem: Problem, first: Plan) -> Problem:
     """What is left to plan once the first trims are driven."""
     horizon = problem.horizon
-    if horizon.max_trims is not None:
-        horizon = replace(horizon, max_trims=max(horizon.max_trims - len(first.trims), 1))
-    if horizon.max_time is not None:
-        left = max(horizon.max_time - first.duration, LEAST)
-        horizon = replace(horizon, max_time=left)
+    trims = horizon.max_trims and max(horizon.max_trims - len(first.trims), 1)
+    left = horizon.max_time and max(horizon.max_time - first.duration, LEAST)
+    horizon = replace(horizon, max_trims=trims, max_time=left)
     begin = first.start_time + first.duration
     return replace(problem, start=first.end, start_time=begin, start_trim=None, horizon=horizon)
-
-
-def _joined(first: Plan, then: Plan | None) -> Plan | None:
-    """One plan of two that follow each other; equal trims where they meet are one."""
-    if then is None:
-        return None
-    trims, durations = [*first.trims, *then.trims], [*first.durations, *then.durations]
-    k = len(first.trims)
-    if then.trims and trims[k - 1].name == trims[k].name:
-        durations[k - 1] += durations.pop(k)
-        del trims[k]
-    return Plan(first.start, tuple(trims), durations=durations, start_time=first.start_time)
-
-
-class _Way(NamedTuple):
-    """Trims that lead out of a contact."""
-
-    length: float  # [m] that the fastest point of the body goes
-    trims: tuple[Trim, ...]
-    durations: tuple[float, ...]  # [s]
 
 
 class _Contact:
     """What the body touches at the start of a problem, all seen from there, unturned."""
 
     def __init__(self, problem: Problem, touched: list[AnyObstacle]) -> None:
+        import shapely
+
         self.reach = body_of(problem.footprint).reach
         self.step = max(STEP * self.reach, LEAST)
         self.clear = problem.margin + max(SLACK * self.reach, LEAST)
@@ -163,7 +140,12 @@ class _Contact:
         self.body = [piece for shape in problem.footprint for piece in convex_pieces(shape)]
         self.body = self.body or [(np.zeros((1, 2)), 0.0)]
         away = SE2(np.array([-problem.start[0], -problem.start[1], 0.0]))
-        self.solids = [_solids(one.moved(away)) for one in touched]
+        self.solids = [  # convex pieces (corners, rounding); of a map, its runs of cells
+            [(shapely.get_coordinates(run)[:-1], 0.0) for run in runs_of(one)]
+            if isinstance(one, OccupancyMap)
+            else convex_pieces(one.shape)
+            for one in (obstacle.moved(away) for obstacle in touched)
+        ]
         self.boxes = [
             np.array([[*(ring.min(axis=0) - r), *(ring.max(axis=0) + r)] for ring, r in pieces])
             for pieces in self.solids
@@ -172,10 +154,7 @@ class _Contact:
         self.depth = problem.margin - float(self.off(self.start, within=self.within).min())
 
     def off(self, pose: Array, *, within: float) -> Array:
-        """Distance of the body to each obstacle; where they overlap, less the depth [m].
-
-        What is further away, or deeper, than `within` [m] is so at least.
-        """
+        """Distance to each obstacle, the depth with a minus where it overlaps; clipped [m]."""
         import shapely
 
         place = pose[:2] - self.start[:2]
@@ -198,9 +177,10 @@ class _Contact:
             found.append(aside or -float(shapely.distance(area.boundary, point)))
         return np.clip(found, -within, within)
 
-    def coast(self, trim: Trim, begin: Array) -> Iterator[tuple[float, Array, bool]]:
-        """Times, poses, and whether it is clear there, as long as it gets no deeper."""
-        speed, turn = self.speed_of(trim), abs(float(trim.body_velocity[2]))
+    def coast(self, trim: Trim, begin: Array) -> Iterator[tuple[float, float, Array, bool]]:
+        """Time, way of the fastest point, pose, and whether that is clear: while no deeper."""
+        speed = float(fastest_point(self.parts, trim.body_velocity[None])[0])
+        turn = abs(float(trim.body_velocity[2]))
         if not speed > 0.0:
             return
         lasting = min(trim.max_duration, self.within / speed, math.tau / max(turn, TURNS))
@@ -211,51 +191,33 @@ class _Contact:
             off = self.off(here, within=max(-float(before.min()), self.clear) + self.step)
             if (off < np.minimum(before, self.clear) - DEEPER).any():
                 return
-            yield after, here, bool((off >= self.clear).all())
+            yield after, speed * after, here, bool((off >= self.clear).all())
             before = off
-
-    def speed_of(self, trim: Trim) -> float:
-        """Speed that no point of the body exceeds [m/s]."""
-        return float(fastest_point(self.parts, trim.body_velocity[None])[0])
-
-
-def _solids(obstacle: AnyObstacle) -> list[tuple[Array, float]]:
-    """Convex pieces (corners, rounding) of an obstacle; of a map, its runs of cells."""
-    import shapely
-
-    if isinstance(obstacle, OccupancyMap):
-        return [(shapely.get_coordinates(run)[:-1], 0.0) for run in runs_of(obstacle)]
-    return convex_pieces(obstacle.shape)
 
 
 def _ways_out(problem: Problem, contact: _Contact, deadline: float) -> Iterator[_Way]:
     """Ways out of one trim, the shortest first, then those of two."""
     trims: Sequence[Trim] = problem.automaton.trims
-    begun: list[tuple[_Way, Array]] = [(_Way(0.0, (), ()), problem.start)]
+    begun: list[tuple[_Way, Array]] = [((0.0, (), ()), problem.start)]
     for _ in range(2):
         best: dict[tuple[str, ...], _Way] = {}
         middles = []
-        for way, begin in begun:
-            if way.trims and time.perf_counter() > deadline:
+        for (far, word, times), begin in begun:
+            if word and time.perf_counter() > deadline:
                 break
             for trim in trims:
-                for n, (after, pose, clear) in enumerate(contact.coast(trim, begin)):
-                    length = way.length + contact.speed_of(trim) * after
-                    longer = _Way(length, (*way.trims, trim), (*way.durations, after))
+                for n, (after, length, pose, clear) in enumerate(contact.coast(trim, begin)):
+                    longer = far + length, (*word, trim), (*times, after)
                     if after < problem.horizon.min_coast:
                         continue
                     if clear:
-                        word = tuple(one.name for one in longer.trims)
-                        best[word] = min(best.get(word, longer), longer, key=lambda one: one.length)
+                        names = tuple(one.name for one in longer[1])
+                        best[names] = min(best.get(names, longer), longer, key=lambda one: one[0])
                         break
                     if n % EVERY == 0:
                         middles.append((longer, pose))
-        yield from sorted(
-            best.values(),
-            key=lambda one: (
-                round(one.length, 9),
-                round(problem.cost_of_trims(one.trims, np.array(one.durations)), 9),
-            ),
-        )
+        costs = {n: problem.cost_of_trims(one[1], np.array(one[2])) for n, one in best.items()}
+        for names in sorted(best, key=lambda n: (round(best[n][0], 9), round(costs[n], 9))):
+            yield best[names]
         trims = trims[:: -(-len(trims) // MOST_SECONDS)]
         begun = middles[:: max(-(-len(middles) // MOST_MIDDLES), 1)]
