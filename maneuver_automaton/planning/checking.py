@@ -244,10 +244,7 @@ def _what_hits(
 def _courses_within_reach(
     plan: Plan, layer: Layer, problem: Problem, *, before: int
 ) -> tuple[list[int], list[Course], str]:
-    """Of the maneuvers before a primitive, what may come near a layer: numbers and courses.
-
-    Up to the first maneuver without a course, and the name of that.
-    """
+    """What may come near a layer before a primitive, and the first maneuver without a course."""
     numbers: list[int] = []
     courses: list[Course] = []
     for k, primitive in enumerate(plan.primitives[:before]):

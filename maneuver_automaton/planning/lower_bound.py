@@ -151,11 +151,7 @@ def lower_bound(
 def _with_few_changes(
     problem: Problem, budget: Budget, work: int | None, *, most: int, incumbent: float
 ) -> LowerBound:
-    """Bound of plans with at most so many changes of direction.
-
-    Where every change costs a price more, such a plan costs at most so many prices more: what is
-    proven of the costlier costs, less these prices, holds for it. The best of some prices counts.
-    """
+    """Bound of plans with few changes: at some price for each, less that of so many."""
     best, cost = known_bound(problem), problem.cost
     if not isinstance(cost, Cost):
         return best

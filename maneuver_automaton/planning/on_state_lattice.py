@@ -24,10 +24,7 @@ GREEDY = 4  # times fewer expansions than the exact search has in its turn
 MOST_CHUNK = 1 << 20
 MOST_WIDER = 2  # times that a window is widened where there is no plan
 ROUNDING = 1e-12  # relative, of sums of costs
-_NO_PATH = (
-    PlanStatus.UNREACHABLE,
-    "the lattice has no path to a goal: every node that can be reached was looked at",
-)
+_NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
 
 def load_state_lattice(problem: Problem, workspace: Workspace) -> bool:
@@ -77,11 +74,8 @@ def plan_on_state_lattice(
 
 
 def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, str], Array | None]:
-    """Search a lattice to the end; least cost of a plan, why there is none, and what was expanded.
-
-    Nodes are handed over where they are asked for.
-    """
-    least, wider, why, nodes = math.inf, 0, _NO_PATH, None
+    """Search a lattice to the end; least cost of a plan, why there is none, nodes if asked for."""
+    least, wider, why, nodes = math.inf, 0, (PlanStatus.UNREACHABLE, _NO_PATH), None
     while True:
         exact = _best(found, graph)
         if found.problem.search.show_nodes:

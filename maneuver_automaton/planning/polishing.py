@@ -143,15 +143,14 @@ def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan
 def _in_groups(
     problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
 ) -> Iterator[tuple[int, Iterable[Guess]]]:
-    """Guesses for one goal each that are polished together.
-
-    Those along paths that the vehicle cannot follow come last: nothing else may suffer from them.
-    """
+    """Guesses for one goal each, polished together; along paths it cannot follow they come last."""
     if known:
         yield from _by_goal(problem, _guesses(problem, known, paths, budget))
     if problem.moves:
         return  # a path knows nothing of time
-    if is_led_by_paths(problem):
+    model = problem.automaton.model
+    led = path_guesses(model) is not None and not follows_paths(model)  # paths are guesses only
+    if led and rests_at_both_ends(problem):
         yield from _by_goal(problem, guesses_along_paths(problem, budget))
 
 
@@ -161,8 +160,7 @@ def _guesses(
     """Guesses along kinematic plans; where there are none, the plans that are known."""
     if rests_at_both_ends(problem) and follows_paths(problem.automaton.model) and not problem.moves:
         along = guesses_along_paths(problem, budget)
-        first = next(along, None)
-        if first is not None:
+        if (first := next(along, None)) is not None:
             yield first
             yield from along
             return
@@ -201,10 +199,7 @@ def iterations_within(budget: Budget) -> int | None:
 
 
 def _without_passed(problem: Problem, known: Plan) -> Problem:
-    """The problem without obstacles above or below which a `known` plan passes.
-
-    The solver takes the others for as high as can be. What it finds is checked among all.
-    """
+    """The problem without obstacles above or below which a `known` plan passes: all are high."""
     if not any(isinstance(one, Obstacle) and one.height for one in problem.obstacles):
         return problem
     origin, body = origin_near(known.start[:2]), parts_of(problem.footprint)
@@ -221,13 +216,6 @@ def _without_passed(problem: Problem, known: Plan) -> Problem:
         > problem.margin
     ]
     return replace(problem, obstacles=tuple(kept))
-
-
-def is_led_by_paths(problem: Problem) -> bool:
-    """Whether paths of a kinematic vehicle are guesses only, as this one cannot follow them."""
-    model = problem.automaton.model
-    led = path_guesses(model) is not None and not follows_paths(model)
-    return led and rests_at_both_ends(problem)
 
 
 def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
