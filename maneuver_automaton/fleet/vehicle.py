@@ -37,9 +37,9 @@ from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.shifting import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.waiting import with_waits
-from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_plan
 

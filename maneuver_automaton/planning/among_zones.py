@@ -43,7 +43,7 @@ from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
+from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 MOST_QUESTIONS = 8  # choices of zones to enter and zones to go around
 CROSSED_SHARE = 0.5  # of the time left, for a plan from zone to zone

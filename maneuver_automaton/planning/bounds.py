@@ -46,7 +46,7 @@ def lattice_bound(query: LatticeQuery) -> LowerBound:
         return closed
     per_metre = float((rates[drives] / library.speeds[drives]).min())
     fixed = library.rest_rate * (problem.horizon.time or 0.0) if pads else 0.0
-    from maneuver_automaton.search.plane_bound import plane_bound
+    from maneuver_automaton.search.lattice import plane_bound
 
     disc = fixed + per_metre * plane_bound(query)
     return LowerBound(value=disc, kind="disc") if disc > closed.value else closed

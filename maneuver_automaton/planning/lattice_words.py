@@ -34,9 +34,9 @@ from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.beginning import Begun, ends_seen
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.waiting import with_waits
-from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.word import Word
 
 AT_ONCE = Patience(attempts=0, passes=0)

@@ -19,8 +19,8 @@ from maneuver_automaton.receding_horizon.shifting import (
     moving_pieces,
     rest_of,
 )
-from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.inside import outside, stays_inside
+from maneuver_automaton.search.result import TIE
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,10 +16,9 @@ from maneuver_automaton.receding_horizon.mitigation import Mitigation
 from maneuver_automaton.receding_horizon.reanchoring import quickest, rejoining
 from maneuver_automaton.receding_horizon.shifting import rested
 from maneuver_automaton.receding_horizon.situation import Situation
-from maneuver_automaton.search.alternatives import tied
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.limits import closed_bound, sole_bound
-from maneuver_automaton.search.result import SearchStatus, plan_of
+from maneuver_automaton.search.result import SearchStatus, plan_of, tied
 from maneuver_automaton.words.word import is_word_of
 
 SECOND_OPINION = 0.02  # [s] for short words beside insertion

@@ -33,12 +33,11 @@ from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, 
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
-from maneuver_automaton.search.alternatives import TIE
 from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import priced_library
-from maneuver_automaton.search.result import plan_of
-from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.search.result import TIE, plan_of
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept

@@ -17,8 +17,7 @@ from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import merged, without_nothing
 from maneuver_automaton.search.result import plan_of
-from maneuver_automaton.search.setup import search_setup
-from maneuver_automaton.search.sub_library import sub_library
+from maneuver_automaton.search.setup import search_setup, sub_library
 from maneuver_automaton.search.words import search_setup_words
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 

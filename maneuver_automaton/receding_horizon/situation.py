@@ -24,7 +24,7 @@ from maneuver_automaton.receding_horizon.reanchoring import (
 )
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
 from maneuver_automaton.receding_horizon.shifting import moves_on, rest_of, rested
-from maneuver_automaton.search.alternatives import TIE
+from maneuver_automaton.search.result import TIE
 
 FINISHED = 2  # candidates of a step for which controls between those of the library are sought
 ROUNDING = 1e-13  # relative, of a pose that was computed from a plan

@@ -25,8 +25,8 @@ from maneuver_automaton.problem import STANDING, Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.word_plan import plan_of_word
 
 PRICES = (  # of a change of direction, and of a switch of trims, in the time of a turning radius
     (0.8, 0.0),

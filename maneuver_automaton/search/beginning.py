@@ -38,8 +38,7 @@ from maneuver_automaton.search.lattice_task import (
     numbers_of_cells,
     task_of,
 )
-from maneuver_automaton.search.lattice_window import pad_around
-from maneuver_automaton.search.lattice_worlds import CLEARLY, Ends
+from maneuver_automaton.search.lattice_worlds import CLEARLY, Ends, pad_around
 from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.scene import Scene
 

@@ -18,16 +18,24 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search.alternatives import in_order
-from maneuver_automaton.search.exact_end import corrected, with_fewer_digits
-from maneuver_automaton.search.insertion_task import Found, InsertionTask
-from maneuver_automaton.search.library_arrays import LibraryArrays, library_arrays
-from maneuver_automaton.search.result import SearchResult, SearchStatus
-from maneuver_automaton.search.setup import SearchSetup, search_setup
+from maneuver_automaton.search.library_arrays import (
+    UNUSED,
+    LibraryArrays,
+    corrected,
+    library_arrays,
+    with_fewer_digits,
+    within_time,
+)
+from maneuver_automaton.search.result import (
+    Found,
+    InsertionTask,
+    SearchResult,
+    SearchStatus,
+    TimedWord,
+    in_order,
+)
+from maneuver_automaton.search.setup import FEW, SearchSetup, search_setup, sub_library
 from maneuver_automaton.search.shortening import shortened
-from maneuver_automaton.search.sub_library import FEW, sub_library
-from maneuver_automaton.search.time_limit import UNUSED, within_time
-from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.search.words import resting, search_setup_words
 from maneuver_automaton.words.word import Word
 

@@ -18,9 +18,8 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.free_insertion import free_stages
-from maneuver_automaton.search.insertion_task import InsertionTask
 from maneuver_automaton.search.linked_insertion import linked_stages
-from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus
 
 
 def search_insertion(

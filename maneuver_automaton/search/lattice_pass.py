@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import wrapped
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
@@ -28,7 +29,7 @@ from maneuver_automaton.search.lattice_task import Resolution, Task, goal_of_roo
 from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.transitions import SWITCH
-from maneuver_automaton.words.word import Word, with_price
+from maneuver_automaton.words.word import Word, plan_of, with_price
 
 FIRST_CHUNK = 64  # expansions
 TIMELY = 256  # expansions between two looks at what was found
@@ -272,3 +273,29 @@ def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int
 def with_cost(word: Word, query: LatticeQuery) -> Word:
     """The word with its cost in the lattice library, prices of switches included."""
     return with_price(query.library.priced, word)
+
+
+def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
+    """The word from the problem's own start, its times corrected until it ends at the goal.
+
+    Where trims are switched at will, a rest fills a fixed time.
+    """
+    problem = query.problem
+    plan = plan_of(
+        query.automaton,
+        word,
+        problem.start,
+        goal=query.goal_poses[word.goal],
+        free_heading=bool(query.free_heading[word.goal]),
+        start_time=problem.start_time,
+    )
+    fixed, rest = problem.horizon.time, query.library.rest
+    if not query.automaton.is_kinematic or fixed is None or rest is None:
+        return plan
+    if not plan.duration < fixed:
+        return plan
+    return replace(
+        plan,
+        trims=(*plan.trims, problem.automaton.trims[rest]),
+        durations=np.append(plan.durations, fixed - plan.duration),
+    )

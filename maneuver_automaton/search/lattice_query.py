@@ -21,8 +21,7 @@ from maneuver_automaton.problem import Problem, SearchSettings
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.lattice_window import window_of
-from maneuver_automaton.search.lattice_worlds import Ends, Worlds, ends_of, worlds_around
+from maneuver_automaton.search.lattice_worlds import Ends, Worlds, ends_of, window_of, worlds_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import Scene, scene_of
 from maneuver_automaton.words.library import NO_TRIM

@@ -1,8 +1,14 @@
-"""The whole library of a problem as the arrays that insertion and pricing share."""
+"""The whole library of a problem as the arrays that insertion and pricing share.
+
+Start and goal seen from each other are the same for a moved problem but for rounding, and rounding
+decides where insertion has a choice among equals. So it searches for a goal with fewer digits, and
+its times are corrected afterwards until the goal itself is met.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -11,6 +17,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.setup import SearchSetup
+from maneuver_automaton.words.closing import MET, EndConditions, closest_times
 from maneuver_automaton.words.library import MovingTrims
 
 
@@ -98,3 +105,62 @@ def _columns(library: MovingTrims, n_trims: int, rest: int | None, free_heading:
         weights = np.append(weights, 0.0)
     # kernels are compiled for arrays that can be written
     return _Columns(trims, number_of, np.array(twists, order="C"), np.array(rates), weights)
+
+
+UNUSED = -1  # stands in `trims` for what is no trim of the automaton
+
+
+def within_time(library: LibraryArrays, limit: float) -> LibraryArrays:
+    """The library with a column for unused time, so that a word may last at most `limit` [s].
+
+    The inequality becomes the equality "coasting times and unused time add up to `limit`". Unused
+    time has no twist and no cost; its reduced cost is the price of time, which must be at least 0.
+    The library must not have a condition on the time already.
+    """
+    at = library.n_priced
+    weights = np.append(np.ones(at + 1), np.zeros(library.tail))
+    return replace(
+        library,
+        trims=np.insert(library.trims, at, UNUSED),
+        twists=np.insert(library.twists, at, 0.0, axis=0),
+        rates=np.insert(library.rates, at, 0.0),
+        rows=np.vstack([np.insert(library.rows, at, 0.0, axis=1), weights]),
+        targets=np.append(library.targets, limit),
+        rest=at,
+        n_priced=at + 1,
+    )
+
+
+DIGITS = 9  # of the goal that is searched for, after the point [m, rad]
+UNUSUAL = 1.7  # keeps steps in the number of digits away from the sizes people choose
+TINY = 1e-12  # [m, rad] below this start and goal are one
+RANK = 1e-11  # singular values below this, relative, count as none
+
+
+def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
+    """The setup with its goal rounded; as it is where start and goal would become one."""
+    x, y, turn, z = setup.goal.tolist()
+    size = max(abs(x), abs(y), abs(z), abs(math.remainder(turn, 2.0 * math.pi)), TINY)
+    finer = max(0, math.ceil(-math.log10(UNUSUAL * size)))
+    goal = setup.goal.round(DIGITS + finer) + 0.0  # no negative zeros
+    rounded = replace(setup, goal=goal)
+    return setup if rounded.start_is_goal else rounded
+
+
+def corrected(library: LibraryArrays, word: IntArray, times: Array, goal: Array) -> Array | None:
+    """Times (n,) near `times` with which the word ends at `goal`; None if there are none.
+
+    The smallest change: the goal is less than 1e-9 away, and less for small ones.
+    """
+    others = slice(int(library.climbs), None)  # an end's altitude is a condition anyway
+    conditions = EndConditions(
+        start=np.zeros(4),
+        twists=library.twists[word],
+        goal=goal,
+        rows=library.rows[others, word],
+        targets=library.targets[others],
+    )
+    best, missing = closest_times(conditions, times, rank=RANK, at_least=-math.inf)
+    if not missing < MET or (best < -MET).any():
+        return None
+    return np.asarray(best.clip(min=0.0))

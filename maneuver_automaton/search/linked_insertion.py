@@ -19,14 +19,18 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.insertion_task import Found, InsertionTask
 from maneuver_automaton.search.linked_words import (
     EXPANSIONS_A_WORD,
     scan_linked_words,
     steer_linked_words,
 )
-from maneuver_automaton.search.result import SearchResult, SearchStatus
-from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.result import (
+    Found,
+    InsertionTask,
+    SearchResult,
+    SearchStatus,
+    TimedWord,
+)
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words.word import Word, word_of_plan
 

@@ -19,9 +19,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.alternatives import TIE, in_order
-from maneuver_automaton.search.result import SearchResult, SearchStatus
-from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.result import TIE, SearchResult, SearchStatus, TimedWord, in_order
 from maneuver_automaton.search.word_scan import scanned
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words import _kernels_candidates as kernels

@@ -11,10 +11,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.alternatives import in_order
-from maneuver_automaton.search.result import SearchResult, SearchStatus
-from maneuver_automaton.search.setup import SearchSetup, search_setup
-from maneuver_automaton.search.sub_library import sub_library
+from maneuver_automaton.search.result import SearchResult, SearchStatus, in_order
+from maneuver_automaton.search.setup import SearchSetup, search_setup, sub_library
 from maneuver_automaton.search.words import resting
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.word import Word

@@ -61,8 +61,8 @@ def smallest_lattice_query() -> LatticeQuery:
     from maneuver_automaton.collision import Box, Obstacle, OccupancyMap
     from maneuver_automaton.search._kernels_distance import distances
     from maneuver_automaton.search.distance_grid import distance_grid
+    from maneuver_automaton.search.lattice import plane_bound
     from maneuver_automaton.search.lattice_query import lattice_query
-    from maneuver_automaton.search.plane_bound import plane_bound
 
     wall = Obstacle(Box([1.0, 1.0], [0.0, 9.0]))
     room = OccupancyMap(np.eye(2, dtype=np.bool_), resolution=0.5, origin=[5.0, 9.0, 0.1])

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.collision import Zone
 from maneuver_automaton.collision.convex import DIGITS
 from maneuver_automaton.collision.layers import ROUNDED, LayerArrays, layer_arrays
+from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.admission import admitted_stretches, piece_is_admitted
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_worlds import Worlds
 
@@ -122,3 +124,17 @@ def _admitted_pieces(problem: Problem, library: LatticeLibrary) -> NDArray[np.bo
                 for n in range(first[group], first[group + 1]):
                     admitted[z, n] = good[spans[n, 0] : spans[n, 1]].all()
     return admitted
+
+
+def piece_is_admitted(zone: Zone, trim: Trim) -> bool:
+    """Whether a zone admits a trim."""
+    return zone.admits_names([trim.name]) and bool(zone.admits(trim.body_velocity))
+
+
+def admitted_stretches(zone: Zone, maneuver: Maneuver, model: Model) -> NDArray[np.bool_]:
+    """Which stretches (n - 1,) of a maneuver a zone admits, by their begin, middle and end."""
+    course = maneuver.course
+    assert course is not None
+    if not zone.admits_names([maneuver.source, maneuver.target]):
+        return np.zeros(course.time.size - 1, dtype=np.bool_)
+    return np.asarray(zone.admits(course.twists(model)).all(axis=0))

@@ -13,7 +13,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.library_arrays import LibraryArrays
-from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.result import TimedWord
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 
 AT_ONCE = 4  # of the shortest trims, how many are tried to be left out

@@ -19,10 +19,8 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.alternatives import TIE, tied
-from maneuver_automaton.search.setup import SearchSetup
-from maneuver_automaton.search.sub_library import FEW, few_of
-from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.result import TIE, TimedWord, tied
+from maneuver_automaton.search.setup import FEW, SearchSetup, few_of
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims
 from maneuver_automaton.words.transitions import Transitions
 from maneuver_automaton.words.word import Word

@@ -21,9 +21,8 @@ from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.result import TimedWord, plan_of
 from maneuver_automaton.search.setup import SearchSetup, goal_from_start
-from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at
 from maneuver_automaton.words.library import (

@@ -9,8 +9,7 @@ import numpy as np
 
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.alternatives import in_order, tied
-from maneuver_automaton.search.result import SearchResult, SearchStatus
+from maneuver_automaton.search.result import SearchResult, SearchStatus, in_order, tied
 from maneuver_automaton.search.setup import SearchSetup, search_setup
 from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan, scanned
 from maneuver_automaton.words.word import Word

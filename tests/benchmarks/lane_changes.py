@@ -23,8 +23,8 @@ from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.word_plan import plan_of_word
 
 NODES = 61
 CASES = (

@@ -19,8 +19,8 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.word_plan import plan_of_word
 from tests.benchmarks import cases
 from tests.benchmarks.tables import show
 from tests.search.automata import inertial_unicycle, truck_with_trailer

@@ -18,12 +18,11 @@ from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search import lattice, lattice_schedules
-from maneuver_automaton.search.lattice_pass import pass_of
+from maneuver_automaton.search.lattice_pass import pass_of, plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_schedules import LINKED
 from maneuver_automaton.search.lattice_task import WEIGHT, Resolution, task_of
 from maneuver_automaton.search.reversal import forward_word, reversed_query
-from maneuver_automaton.search.word_plan import plan_of_word
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are
 from tests.search.cases import compiled_only

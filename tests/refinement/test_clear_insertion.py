@@ -17,10 +17,9 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Horizon, Problem
 from maneuver_automaton.refinement.clear_insertion import Whole, paced, whole_of
 from maneuver_automaton.search.lattice import first_plan
-from maneuver_automaton.search.lattice_pass import with_cost
+from maneuver_automaton.search.lattice_pass import plan_of_word, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.waiting import is_free
-from maneuver_automaton.search.word_plan import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from tests.search.cases import compiled_only
 from tests.solids import check_plan

@@ -15,7 +15,7 @@ from maneuver_automaton.refinement import work
 from maneuver_automaton.refinement.improve import Improvement, Patience
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.refinement.restarts import FINER
-from maneuver_automaton.search.word_plan import plan_of_word
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps
 from tests.refinement.test_incumbent_words import GOAL, WALLS, least_clearance, off_goal, query

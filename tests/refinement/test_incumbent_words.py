@@ -17,9 +17,9 @@ from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.search.word_plan import plan_of_word
 from tests.search.automata import (
     inertial_unicycle,
     linked,

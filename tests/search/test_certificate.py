@@ -9,7 +9,7 @@ import pytest
 
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.timed_word import TimedWord
+from maneuver_automaton.search.result import TimedWord
 from maneuver_automaton.search.word_setup import word_setup
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only

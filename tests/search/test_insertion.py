@@ -28,10 +28,9 @@ from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.library_arrays import library_arrays
-from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.result import TimedWord, plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
-from maneuver_automaton.search.timed_word import TimedWord
 from tests import reference
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are

@@ -10,8 +10,8 @@ import shapely
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.search.lattice import plane_bound
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.plane_bound import plane_bound
 from tests import scenes
 from tests.quickly import quick_are
 from tests.reference_lattice import shortest_way

@@ -11,9 +11,8 @@ from maneuver_automaton._compile import kernel
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_problem as kernels
 from maneuver_automaton.search._kernels_scan_costs import least_after, least_per_metre
-from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.result import TimedWord, plan_of
 from maneuver_automaton.search.setup import search_setup
-from maneuver_automaton.search.timed_word import TimedWord
 from maneuver_automaton.search.word_scan import WordScan
 from maneuver_automaton.search.word_setup import word_setup
 from maneuver_automaton.words.conjugation import conjugated, conjugated_turn, goal_before
