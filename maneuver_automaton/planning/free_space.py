@@ -21,7 +21,7 @@ from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.limits import why_impossible
-from maneuver_automaton.search.result import SearchResult, plan_of
+from maneuver_automaton.search.result import InsertionTask, SearchResult, plan_of
 from maneuver_automaton.words.word import Word, word_of_plan
 
 SPARE = 2  # solutions for every alternative, as some may be one motion
@@ -46,13 +46,14 @@ def free_words(
             for result in search_goal(problem, goal, alternatives=others, budget=part):
                 yield index, result
             continue
-        for result in insertion_stages(
-            problem,
-            goal,
+        task = InsertionTask(
+            problem=problem,
+            goal=goal,
             alternatives=others or 0,
             budget=found.budget.stage(share),
             upper_bound=math.inf if others else found.cost,
-        ):
+        )
+        for result in insertion_stages(task):
             yield index, result
 
 

@@ -31,11 +31,12 @@ from maneuver_automaton.refinement.improve import Improved, Patience, improve
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.refinement.restarts import restarts_of
-from maneuver_automaton.search.beginning import Begun, ends_seen
+from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.lattice_worlds import Ends
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.word import Word
 
@@ -173,7 +174,9 @@ def search_lattice(found: Incumbents, steps: Steps, begun: Begun | None = None) 
     """
     problem, prepared = found.problem, found.workspace.prepared
     goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
-    ends = None if begun is None else ends_seen(begun)
+    ends = None
+    if begun is not None:
+        ends = Ends(begun.bench.desk.seen[:, :3].copy(), begun.bench.desk.clear.copy())
     query = lattice_query(problem, goals, prepared=prepared, ends=ends)
     known = query.library.at_will
     table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE

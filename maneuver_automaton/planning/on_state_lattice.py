@@ -14,7 +14,7 @@ from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatu
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice import expanded
-from maneuver_automaton.search.lattice_pass import give_back
+from maneuver_automaton.search.lattice_memory import give_back
 from maneuver_automaton.search.lattice_task import WEIGHT
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.state_lattice import Graph, GraphSearch, graph_of
@@ -129,7 +129,7 @@ def _best(found: Incumbents, graph: Graph) -> GraphSearch:
         if len(turns) == 1 and settings.improve and not found.plans:
             turns.append(GraphSearch.of(graph, weight=weight, budget=budget))
     for one in turns:
-        give_back(graph.query, one.arrays)
+        give_back(graph.query.prepared, graph.query.library, one.arrays)
     return exact
 
 

@@ -25,8 +25,9 @@ from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_trims import stands_for_more
-from maneuver_automaton.search.linked_words import load_linked_words, load_words_of
+from maneuver_automaton.search.linked_words import ALPHABET, load_linked_words
 from maneuver_automaton.search.ready import load_insertion_kernels, load_times_kernels
+from maneuver_automaton.search.word_setup import word_setup
 
 BY_TIME = Cost(time=1.0)  # one value: what is prepared for it is found again
 
@@ -105,7 +106,7 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
         if _suits_words(problem) or steps.words:
             load_linked_words()
             for goal in problem.goals:
-                load_words_of(problem, goal)
+                word_setup(problem, goal, most_trims=ALPHABET, steers=True)
 
 
 def _suits_words(problem: Problem) -> bool:

@@ -10,8 +10,7 @@ import numpy as np
 
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_schedules import as_wide_as_turns
-from maneuver_automaton.search.lattice_task import Resolution
+from maneuver_automaton.search.lattice_task import Resolution, as_wide_as_turns
 
 PRUNE = 1.08  # of a new search: its raw path is longer than the improved one
 FIRST_CAP = 1500  # expansions of the first new search ...

@@ -30,15 +30,15 @@ from maneuver_automaton.search.lattice_query import (
     lattice_query,
     usual_margin,
 )
-from maneuver_automaton.search.lattice_schedules import first_resolutions
 from maneuver_automaton.search.lattice_task import (
     Resolution,
     Task,
     back_off_of,
+    first_resolutions,
     numbers_of_cells,
     task_of,
 )
-from maneuver_automaton.search.lattice_worlds import CLEARLY, Ends, pad_around
+from maneuver_automaton.search.lattice_worlds import CLEARLY, pad_around
 from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.scene import Scene
 
@@ -167,12 +167,6 @@ def begin(problem: Problem, prepared: Prepared, budget: Budget) -> Begun | None:
         free.append(bench)
         return None
     return Begun(bench=bench, may_go_on=bool(said))
-
-
-def ends_seen(begun: Begun) -> Ends:
-    """The ends of a query that was begun, as `ends_of` has them."""
-    desk = begun.bench.desk
-    return Ends(desk.seen[:, :3].copy(), desk.clear.copy())
 
 
 def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:

@@ -155,7 +155,8 @@ def _priced(problem: Problem, goal: Goal, word: Word) -> PricedWord:
     before = chained(np.zeros(own.shape[1]), steps)
     twists, product = conjugated(own[word.trims], steps)
     times, rates = np.array(word.durations), all_rates[word.trims]
-    binds = _time_binds(problem, word)
+    most = problem.horizon.max_time
+    binds = most is not None and word.duration > most - BINDING * (1.0 + most)
     rises = bool(own[:, 3:].any() or twists[:, 3:].any())
     fixed = problem.horizon.time is not None or binds
     stretches = list[Stretch]()
@@ -189,12 +190,6 @@ def _rates(problem: Problem) -> Array:
     if problem.horizon.time is None or rest is None:
         return problem.rates
     return np.asarray(problem.rates - problem.rates[rest])
-
-
-def _time_binds(problem: Problem, word: Word) -> bool:
-    """Whether a word lasts as long as it may at most."""
-    most = problem.horizon.max_time
-    return most is not None and word.duration > most - BINDING * (1.0 + most)
 
 
 def _stretches(word: Word) -> Iterator[tuple[int, int]]:

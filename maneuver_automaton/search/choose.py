@@ -18,7 +18,7 @@ from maneuver_automaton.search.ready import (
 )
 from maneuver_automaton.search.result import SearchResult
 from maneuver_automaton.search.setup import search_setup
-from maneuver_automaton.search.word_scan import MOST_TRIMS, load_tables
+from maneuver_automaton.search.word_scan import MOST_TRIMS, tables_of
 from maneuver_automaton.search.words import search_words
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
@@ -37,7 +37,7 @@ def load_search(problem: Problem) -> None:
         tail = int(any(goal.free_heading for goal in problem.goals))
         load_word_kernels(min((problem.horizon.max_trims or MOST_TRIMS) + tail, MOST_TRIMS))
         if len(problem.automaton) > LARGE:
-            load_tables(search_setup(problem, problem.goals[0]))
+            tables_of(search_setup(problem, problem.goals[0]))
     else:
         more = problem.start.size > 3 or problem.horizon.time or problem.horizon.max_time
         turned = any(goal.free_heading for goal in problem.goals)

@@ -14,7 +14,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
@@ -70,7 +70,9 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
     found = Found(problem, task.alternatives + 1, task.budget)
-    work = _work(task, setup)
+    exact, setup = setup.goal, with_fewer_digits(setup)
+    seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
+    work = _Work(problem, setup, library_arrays(problem, setup), exact, task, seeds)
     most_time = problem.horizon.max_time
     free = _improved(work)
     found.add(_in_time(free, most_time))
@@ -91,14 +93,6 @@ def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
     """The solutions that end in time."""
     kept = tuple(one for one in found.solutions if one.duration <= _latest(most_time))
     return replace(found, solutions=kept)
-
-
-def _work(task: InsertionTask, setup: SearchSetup) -> _Work:
-    """The work of a search for the goal of a task."""
-    exact, setup = setup.goal, with_fewer_digits(setup)
-    seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
-    library = library_arrays(task.problem, setup)
-    return _Work(task.problem, setup, library, exact, task, seeds)
 
 
 def _usual_seeds(task: InsertionTask, setup: SearchSetup) -> int:
@@ -136,13 +130,22 @@ def _improved(work: _Work) -> SearchResult:
 
     Without seeds those of the known plan; where it has none, those of the usual seeds.
     """
-    known = [] if work.task.known is None else list(_as_seed(work, work.task.known))
+    known, plan, automaton = [], work.task.known, work.problem.automaton
+    if plan is not None and len(plan.trims) <= LONGEST:
+        names = _names(automaton)
+        if all(trim.name in names for trim in plan.trims):
+            word = np.array([automaton.index_of(trim.name) for trim in plan.trims], dtype=np.int64)
+            if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
+                known.append(_in_library(work, word, plan.durations))
     if work.seeds == 0:
         found = _improved_from(work, known)
         if found.solutions:
             return found
         work = replace(work, seeds=_usual_seeds(work.task, work.setup))
-    return _improved_from(work, [*known, *_seeds(work)])
+    seeds = _words_of_few(work, work.problem)
+    if not seeds and work.total is not None and not work.task.budget.is_over:
+        seeds = _fast_words(work)
+    return _improved_from(work, [*known, *seeds])
 
 
 def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
@@ -252,19 +255,6 @@ def _with_fewer_switches(
             longer = short
 
 
-def _as_seed(work: _Work, known: Plan) -> Iterator[TimedWord]:
-    """A plan in the library's numbers, rest and free turn appended.
-
-    None if a trim is not in the library, or the word is longer than those that are searched.
-    """
-    automaton, library = work.problem.automaton, work.library
-    names = _names(automaton)
-    if len(known.trims) <= LONGEST and all(trim.name in names for trim in known.trims):
-        word = np.array([automaton.index_of(trim.name) for trim in known.trims], dtype=np.int64)
-        if not word.size or (library.number_of[word] >= 0).all():
-            yield _in_library(work, word, known.durations)
-
-
 @kept_by_first
 def _names(automaton: Automaton) -> frozenset[str]:
     return frozenset(automaton.trim_names)
@@ -351,16 +341,8 @@ def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
     return trims[begins], np.add.reduceat(times, begins)
 
 
-def _seeds(work: _Work) -> Iterator[TimedWord]:
-    """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
-    found = _words_of_few(work, work.problem)
-    if not found and work.total is not None and not work.task.budget.is_over:
-        found = _fast_words(work)
-    yield from found
-
-
 def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
-    """Seeds of `problem` from the sub-library."""
+    """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
     solutions = search_setup_words(
         problem,
         sub_library(work.setup),
@@ -403,12 +385,7 @@ def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
     if library.free_heading:
+        turned = float(library.twists[word, 2] @ np.array(times))  # the rest is turned at 1 rad/s
         word.append(len(library.rates) - 1)
-        times.append(_free_turn(library, word[:-1], times))
+        times.append(float(np.remainder(library.goal[2] - turned, 2.0 * np.pi)))
     return TimedWord(tuple(word), np.array(times))
-
-
-def _free_turn(library: LibraryArrays, word: list[int], times: list[float]) -> float:
-    """Time of the turn that a free heading needs at the end of a word [s], at 1 rad/s."""
-    turned = float(library.twists[word, 2] @ np.array(times))
-    return float(np.remainder(library.goal[2] - turned, 2.0 * np.pi))

@@ -76,42 +76,24 @@ def search_insertion(
     (3.25, True)
     """
     *_, last = insertion_stages(
-        problem,
-        goal,
-        alternatives=alternatives,
-        seeds=seeds,
-        budget=budget,
-        known=known,
-        upper_bound=upper_bound,
+        InsertionTask(
+            problem=problem,
+            goal=goal,
+            alternatives=alternatives,
+            seeds=seeds,
+            known=known,
+            budget=budget,
+            upper_bound=upper_bound,
+        )
     )
     return last
 
 
-def insertion_stages(
-    problem: Problem,
-    goal: Goal,
-    *,
-    alternatives: int = 0,
-    seeds: int | None = None,
-    budget: Budget = UNLIMITED,
-    known: Plan | None = None,
-    upper_bound: float = math.inf,
-) -> Iterator[SearchResult]:
-    """Results so far after each stage; the last one is the answer of `search_insertion`.
-
-    The parameters are those of `search_insertion`.
-    """
-    task = InsertionTask(
-        problem=problem,
-        goal=goal,
-        alternatives=alternatives,
-        seeds=seeds,
-        known=known,
-        budget=budget,
-        upper_bound=upper_bound,
-    )
+def insertion_stages(task: InsertionTask) -> Iterator[SearchResult]:
+    """Results so far after each stage; the last one is the answer of `search_insertion`."""
+    most = task.alternatives + 1
     # a trim that has to last a while cannot be priced for an instant
-    at_will = problem.automaton.is_kinematic and problem.horizon.min_coast == 0.0
+    at_will = task.problem.automaton.is_kinematic and task.problem.horizon.min_coast == 0.0
     for stage in (free_stages if at_will else linked_stages)(task):
-        kept = tuple(one for one in stage.solutions if one.cost < upper_bound)[: alternatives + 1]
+        kept = tuple(one for one in stage.solutions if one.cost < task.upper_bound)[:most]
         yield replace(stage, solutions=kept, status=SearchStatus.FOUND if kept else stage.status)

@@ -16,15 +16,15 @@ from maneuver_automaton.search import _kernels_plane
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.distance_grid import OCTILE, DistanceGrid, distance_grid
-from maneuver_automaton.search.lattice_memory import SearchArrays
-from maneuver_automaton.search.lattice_pass import Pass, give_back, pass_of, with_cost
+from maneuver_automaton.search.lattice_memory import SearchArrays, give_back
+from maneuver_automaton.search.lattice_pass import Pass, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_schedules import (
+from maneuver_automaton.search.lattice_task import (
+    Resolution,
     Schedule,
     first_resolutions,
     schedule_of,
 )
-from maneuver_automaton.search.lattice_task import Resolution
 from maneuver_automaton.search.reversal import forward_word, reversed_query, to_reverse
 from maneuver_automaton.words.word import Word
 
@@ -119,7 +119,7 @@ def first_plan(
     )
     for search in passes:
         if begun is None or search is not turns[0].begun:  # whose arrays are those of the bench
-            give_back(search.query, search.arrays)
+            give_back(query.prepared, search.query.library, search.arrays)
     return found
 
 

@@ -157,15 +157,6 @@ class MotionArrays(NamedTuple):
     edge_high: Array
 
 
-def no_edges() -> tuple[EdgeArrays, MotionArrays]:
-    """Empty arrays of edges, for a vehicle that changes between all its trims at will."""
-    numbers, values = np.zeros(0, dtype=np.int64), np.zeros(0)
-    edges = EdgeArrays(numbers, numbers, numbers, np.zeros((0, 4)), values, values)
-    rows, first = np.zeros((0, 3)), np.zeros(1, dtype=np.int64)
-    motion = MotionArrays(first, rows, rows, values, values, values, values, values, values, values)
-    return edges, motion
-
-
 def lattice_arrays(
     library: LibraryArrays,
     parts: Sequence[Part],

@@ -12,13 +12,11 @@ from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.search.lattice_arrays import (
     EdgeArrays,
     MotionArrays,
-    no_edges,
 )
 from maneuver_automaton.search.part_motion import (
     CLOSE,
     Part,
     bodies_of,
-    body_reach,
     carried_twists,
     course_of,
     fastest_of,
@@ -60,7 +58,8 @@ def motion_along(
     to within so many half widths of the body as `close` says.
     """
     if not edges.maneuver.size:
-        return no_edges()[1], np.zeros((0, 2), dtype=np.int64)
+        first, rows, none = np.zeros(1, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)
+        return MotionArrays(first, rows, rows, *[none] * 7), np.zeros((0, 2), dtype=np.int64)
     automaton, bodies = library.automaton, bodies_of(parts)
     trim_twists = library.arrays.twists[: library.arrays.n_trims]
     twists = [carried_twists(trim_twists, part.trim_poses) for part in parts]
@@ -75,6 +74,9 @@ def motion_along(
     for p in range(len(parts) + 1):
         body = bodies[p] if p < len(parts) else None
         table = own if body is None else twists[p]
+        reach = 0.0  # of the farthest point of the body from the pose of its part [m]
+        if body is not None:
+            reach = float(np.hypot(body.middle_x, body.middle_y)) + body.reach
         courses = []
         for k, maneuver in zip(edges.maneuver, chosen, strict=True):
             n = 2 if maneuver.course is None else len(maneuver.course.time)
@@ -83,7 +85,7 @@ def motion_along(
         pieces = pieces_of(
             courses,
             ends=np.stack([table[sources], table[targets]], axis=1),
-            reach=0.0 if body is None else body_reach(body),
+            reach=reach,
             close=close,
             timed=timed,
             stepwise=automaton.lattice is not None,

@@ -51,7 +51,7 @@ def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
         return None
     first, last = problem.first_trim, problem.last_trim(goal)
     # the lattice's own frame, seen from the world: at the start it has the first trim's heading
-    world = SE2(problem.start) @ SE2(_facing(-model.heading(first.reduced_state)))
+    world = SE2(problem.start) @ SE2(facing(-model.heading(first.reduced_state)))
     seen = (world.inverse() @ SE2(goal.pose)).pose
     cell = np.round(seen[:2] / model.resolution) * model.resolution
     turn = math.remainder(model.heading(last.reduced_state) - float(seen[2]), 2.0 * math.pi)
@@ -89,7 +89,7 @@ def nodes_within(problem: Problem, goal: Goal) -> list[Goal]:
     turn = float(problem.start[2]) - model.heading(problem.first_trim.reduced_state)
     most = math.ceil(goal.tolerance_m / model.resolution) + 1
     steps = np.stack(np.meshgrid(*[np.arange(-most, most + 1.0)] * 2), axis=-1).reshape(-1, 2)
-    places = nearest.pose[:2] + np.asarray(SE2(_facing(turn)).act(steps * model.resolution))
+    places = nearest.pose[:2] + np.asarray(SE2(facing(turn)).act(steps * model.resolution))
     off = np.hypot(*(places - goal.pose[:2]).T)
     slack = EXACT * (1.0 + float(np.abs(goal.pose[:2]).max()))
     order = [k for k in np.argsort(off, kind="stable") if off[k] <= goal.tolerance_m + slack]
@@ -126,8 +126,9 @@ def _end(automaton: Automaton, model: OnLattice, k: int) -> Array:
     """Where maneuver `k` ends (2,) [m], along the axes of the lattice."""
     one = automaton.maneuvers[k]
     heading = model.heading(automaton[one.source].reduced_state)
-    return np.asarray(SE2(_facing(heading)).act(one.displacement[:2]))
+    return np.asarray(SE2(facing(heading)).act(one.displacement[:2]))
 
 
-def _facing(heading: float) -> Array:
-    return np.array([0.0, 0.0, heading])
+def facing(heading: Array | float) -> Array:
+    """Poses (..., 3) at the origin."""
+    return np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=-1)

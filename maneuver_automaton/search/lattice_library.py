@@ -13,7 +13,6 @@ from maneuver_automaton.automaton.between import part_between
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.costs import StageCost
-from maneuver_automaton.models import OnLattice
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice_arrays import (
     CELL,
@@ -70,37 +69,22 @@ def lattice_library(
 
 @kept_by_first
 def _library_on(setting: Problem, automaton: Automaton, prepared: Prepared) -> LatticeLibrary:
-    return prepared.once(
-        _library,
-        automaton,
-        setting.cost,
-        setting.footprint,
-        tuple(setting.parts.items()),
-        fixed_time=setting.horizon.time is not None,
-        waits=setting.moves,
-        min_coast=setting.horizon.min_coast,
-        limited=_limited(setting),
-    )
+    return prepared.once(_library, automaton, *_asked(setting))
 
 
 def library_with(problem: Problem, choice: Chosen) -> LatticeLibrary:
     """`lattice_library` with other trims, for a vehicle that switches at will; not kept."""
-    return _library(
-        problem.automaton,
-        problem.cost,
-        problem.footprint,
-        tuple(problem.parts.items()),
-        fixed_time=problem.horizon.time is not None,
-        waits=problem.moves,
-        min_coast=problem.horizon.min_coast,
-        limited=_limited(problem),
-        choice=choice,
-    )
+    return _library(problem.automaton, *_asked(problem), choice)
 
 
-def _limited(problem: Problem) -> bool:
-    """Whether a plan may last only so long."""
-    return problem.horizon.time is not None or problem.horizon.max_time is not None
+def _asked(
+    problem: Problem,
+) -> tuple[StageCost, tuple[Shape, ...], Carried, bool, bool, float, bool]:
+    """What a library depends on beside its automaton, as `_library` takes it."""
+    carried, horizon = tuple(problem.parts.items()), problem.horizon
+    fixed, limited = horizon.time is not None, horizon.max_time is not None
+    times = fixed, problem.moves, horizon.min_coast, fixed or limited
+    return (problem.cost, problem.footprint, carried, *times)
 
 
 def _library(
@@ -108,7 +92,6 @@ def _library(
     cost: StageCost,
     footprint: tuple[Shape, ...],
     carried: Carried,
-    *,
     fixed_time: bool,
     waits: bool,
     min_coast: float,
@@ -139,6 +122,7 @@ def library_of_trims(
     Courses are followed as closely as `motion_along` says.
     """
     library, arrays = priced.library, priced.library.arrays
+    lattice = library.automaton.lattice
     twists, rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     edges = edges_of(library)
     motion, spans = motion_along(library, parts, edges, timed=waits, close=close)
@@ -167,7 +151,8 @@ def library_of_trims(
         number_of=library.number_of,
         edge_maneuver=edges.maneuver,
         radius=radius,
-        cell=_cell(library.automaton, radius),
+        # poses of a lattice must not share a cell, since each has to be reached
+        cell=CELL * radius if lattice is None else OF_A_LATTICE * lattice.resolution,
         turns=tightest_turn(twists) / radius or 1.0,
         per_metre=per_metre,
         per_climb=_least(rates, np.abs(twists[:, 3])),
@@ -187,9 +172,3 @@ def _least(rates: Array, speed: Array) -> float:
     """Least cost per metre; 0 if no trim moves."""
     moving = speed > 0.0
     return float((rates[moving] / speed[moving]).min()) if moving.any() else 0.0
-
-
-def _cell(automaton: Automaton, radius: float) -> float:
-    """Side of a cell [m]: poses of a lattice must not share one, since each has to be reached."""
-    model = automaton.model
-    return OF_A_LATTICE * model.resolution if isinstance(model, OnLattice) else CELL * radius

@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search import _kernels_nodes as kernels
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.words.library import LibraryArrays, Scratch, scratch_of
 
 SMALLEST = 2048  # nodes
+MOST_SPARE = 4  # searches of one library whose arrays are kept
+LARGEST_SPARE = 1 << 15  # nodes of such a search, some 5 MB
 GROWN_S = 2.5e-7  # [s] that room for one node takes, what there is moved there
 
 
@@ -45,18 +48,33 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
     )
 
 
-def spare_searches(library: LatticeLibrary) -> list[SearchArrays]:
-    """A list that keeps arrays of searches with one library that nobody uses now."""
+def _spare(library: LatticeLibrary) -> list[SearchArrays]:
     del library  # whoever asks keeps one list for each
     return []
 
 
-def begin_anew(search: SearchArrays) -> None:
-    """Forget what was searched in these arrays; the next expansion begins with the roots."""
+def arrays_for(
+    prepared: Prepared, library: LatticeLibrary, nodes: int, known: SearchArrays | None = None
+) -> SearchArrays:
+    """Arrays in which nothing is searched, with room: `known` ones, or an earlier search's."""
+    if known is None:
+        try:
+            known = prepared.once(_spare, library).pop()
+        except IndexError:  # asked for before, another thread might take the last one
+            known = search_arrays(library.arrays.library)
+    search = with_room(known, nodes)
     generation = search.state[kernels.GENERATION] + 1  # frees all rows of the hash table at once
     search.state[:] = 0
     search.state[kernels.GENERATION] = generation
     search.found[0] = math.inf
+    return search
+
+
+def give_back(prepared: Prepared, library: LatticeLibrary, arrays: SearchArrays) -> None:
+    """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
+    spare = prepared.once(_spare, library)
+    if len(spare) < MOST_SPARE and len(arrays.nodes) <= LARGEST_SPARE:
+        spare.append(arrays)
 
 
 def room_takes(search: SearchArrays, nodes: int) -> float:

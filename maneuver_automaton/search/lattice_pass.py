@@ -18,10 +18,8 @@ from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, coasts_of
 from maneuver_automaton.search.lattice_memory import (
     SearchArrays,
-    begin_anew,
+    arrays_for,
     room_takes,
-    search_arrays,
-    spare_searches,
     with_room,
 )
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -37,8 +35,6 @@ AT_FIRST = 200_000  # words steered at the first expansion for which one is a po
 STEERED_S = 2.5e-8  # [s] that steering one word takes
 LONGER = 1.6  # times a least coasting time, for the longer of two coasts
 NO_EDGE = layout.COASTED
-MOST_SPARE = 4  # searches of one library whose arrays are kept
-LARGEST_SPARE = 1 << 15  # nodes of such a search, some 5 MB
 SAME_PLACE = 1e-6  # [m] by which poses at one place differ
 LEAST = 1e-5  # share of the cost that a better word has to save
 
@@ -154,23 +150,9 @@ def pass_of(
     scaled = _with_coasts(query, resolution, sign)
     task = task_of(query, resolution, sign=sign)
     scene = query.scene(query.margin * resolution.margin)
-    if arrays is None:
-        spare = query.prepared.once(spare_searches, query.library)
-        try:
-            arrays = spare.pop()
-        except IndexError:  # asked for before, another thread might take the last one
-            arrays = search_arrays(scaled.library)
-    room = with_room(arrays, len(task.roots) + 4)
-    begin_anew(room)
+    room = arrays_for(query.prepared, query.library, len(task.roots) + 4, arrays)
     pace = Pace(UNLIMITED, steps=first_steps(scaled, task))
     return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
-
-
-def give_back(query: LatticeQuery, arrays: SearchArrays) -> None:
-    """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
-    spare = query.prepared.once(spare_searches, query.library)
-    if len(spare) < MOST_SPARE and len(arrays.nodes) <= LARGEST_SPARE:
-        spare.append(arrays)
 
 
 def first_steps(library: LatticeArrays, task: Task) -> int:

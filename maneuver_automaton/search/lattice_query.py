@@ -67,11 +67,6 @@ class LatticeQuery:
         return self.problem.search
 
     @property
-    def half_width(self) -> float:
-        """Half the width of the narrowest part [m]."""
-        return self.library.half_width
-
-    @property
     def window(self) -> Array:
         """Window (9,) as in `_kernels_window.inside_window`."""
         return self.around.window
@@ -80,11 +75,6 @@ class LatticeQuery:
     def margin(self) -> float:
         """Proven clearance beyond the problem's own margin [m]."""
         return self.around.margin
-
-    @property
-    def keep(self) -> float:
-        """Distance kept from everything [m]."""
-        return self.problem.margin
 
     @property
     def start_time(self) -> float:
@@ -170,7 +160,9 @@ def lattice_query(
         aimed = _ends_in_plane(problem, goals, ends or ends_of(problem))
     else:
         aimed = _ends(problem, goals, library, worlds)
-    margin = _margin(library, worlds.whole, aimed.clear)
+    # the usual clearance, at most half of that at start and goals
+    halves = [0.5 * one for one in aimed.clear.tolist() if one > 0.0]
+    margin = float(max(LEAST_MARGIN, min([usual_margin(library, worlds.whole), *halves])))
     radius = library.radius
     box, window, bounded = window_of(problem.bounds, worlds.outer, aimed.seen, radius=radius)
     most = horizon.max_time if horizon.time is None else horizon.time
@@ -298,17 +290,9 @@ def _end_clearances(
 
 def usual_margin(library: LatticeLibrary, world: World) -> float:
     """Proven clearance if start and goals allow it, a share of the body [m]."""
-    return MARGIN * (library.half_width or _typical(world))
-
-
-def _margin(library: LatticeLibrary, world: World, clear: Array) -> float:
-    """Proven clearance: the usual one, at most half of that at start and goals."""
-    usual = usual_margin(library, world)
-    halves = [0.5 * one for one in clear.tolist() if one > 0.0]
-    return float(max(LEAST_MARGIN, min([usual, *halves])))
-
-
-def _typical(world: World) -> float:
-    """A length of the world, for vehicles that are points."""
-    width = world.box[2:] - world.box[:2]
-    return float(np.clip(0.02 * width.max(), 1e-3, 1.0)) if np.isfinite(width).all() else 1.0
+    if library.half_width:
+        return MARGIN * library.half_width
+    width = world.box[2:] - world.box[:2]  # a length of the world, for vehicles that are points
+    return MARGIN * (
+        float(np.clip(0.02 * width.max(), 1e-3, 1.0)) if np.isfinite(width).all() else 1.0
+    )

@@ -1,10 +1,10 @@
-"""One search of the lattice: its resolution, and its limits as the kernels see them."""
+"""One search of the lattice: its resolution, its limits as kernels see them, and the schedules."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +114,8 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         query.library, query.settings, resolution, timed, query.most_trims, query.least_coast
     )
     least, most = query.interval
-    return known._replace(
+    return Task(
+        **known,
         sign=sign,
         roots=roots,
         root_trims=root_trims,
@@ -145,7 +146,7 @@ def _sizes(
     timed: bool,
     most_trims: int,
     least_coast: float,
-) -> tuple[Task, int]:
+) -> tuple[dict[str, Any], int]:
     """The task of any query, without its ends; and how many layers its cells have.
 
     `timed`: of two nodes of a cell the costlier may be the one that is in time.
@@ -154,46 +155,28 @@ def _sizes(
     interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
     sharp = interval * library.radius * library.per_metre
     by_gear, by_trim, by_count, layers = _layers(library, resolution, most_trims, least_coast)
-    none, numbers = np.zeros((0, 4)), np.zeros(0, dtype=np.int64)
-    task = Task(
-        sign=1.0,
-        roots=none,
-        root_trims=numbers,
-        aims=none,
-        aim_trims=numbers,
-        aim_free=np.zeros(0, dtype=np.bool_),
-        lag=np.zeros(0),
-        frame_x=0.0,
-        frame_y=0.0,
-        frame_heading=0.0,
-        frame_cos=1.0,
-        frame_sin=0.0,
+    lasting = library.arrays.edge_durations[library.arrays.edge_durations > 0.0]
+    tick = resolution.durations * float(lasting.min()) if lasting.size else 1.0
+    task = dict[str, Any](
         cell=float(cell),
         headings=int(settings.headings or HEADINGS),
         fine_cell=float(resolution.fine * cell),
         fine_headings=FINE_HEADINGS,
         rise=float(resolution.scale * RISE * library.radius),
-        tick=_tick(library, resolution) if timed else 0.0,
-        radix=(1, 1, 1, 1),
+        tick=tick if timed else 0.0,  # of two nodes of a cell the costlier may be in time
         weight=float(resolution.weight),
         per_metre=float(library.per_metre) / (OCTILE if resolution.straight else 1.0),
         per_climb=float(library.per_climb),
         # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
         # for, and the node that ends at the goal must not be missed.
         per_interval=(float(sharp) or 1.0) if library.drives else math.inf,
-        least_interval=0.0,
-        most_interval=0.0,
         connection_factor=CONNECTION_FACTOR,
         connection_slack=_slack(library),
         tries=TRIES,
         stop_at_first=bool(resolution.stop),
         ends_early=bool(resolution.ends_early),
         truncated=resolution.truncated,
-        back_off=0.0,
         shortest_truncated=float(SHORTEST_TRUNCATED * _size(library)),
-        clock=0.0,
-        most_time=math.inf,
-        stay_until=-math.inf,
         most_trims=int(most_trims),
         least_coast=float(least_coast * (1.0 - ROUNDING)),
         checks_words=bool(most_trims > 0 or least_coast > 0.0 or library.limits_coasts),
@@ -268,25 +251,18 @@ def _slack(library: LatticeLibrary) -> float:
     return float(path + prices) if path > 0.0 else math.inf
 
 
-def _tick(library: LatticeLibrary, resolution: Resolution) -> float:
-    """Length in time of a cell [s], where a costlier node may be the one that is in time."""
-    durations = library.arrays.edge_durations
-    lasting = durations[durations > 0.0]
-    return resolution.durations * float(lasting.min()) if lasting.size else 1.0
-
-
-def _radix(query: LatticeQuery, task: Task, layers: int) -> tuple[int, int, int, int]:
+def _radix(query: LatticeQuery, task: dict[str, Any], layers: int) -> tuple[int, int, int, int]:
     """How many numbers each coordinate of a cell needs; more cells than that share numbers.
 
     Where numbers are short, places far apart share them: that drops a node, never a proof.
     """
     low_x, low_y, high_x, high_y = query.box.tolist()
     far = max(high_x - low_x, high_y - low_y)  # no pose of the window is farther from the frame
-    turns = max(task.headings, task.fine_headings) + 1
+    turns = max(task["headings"], task["fine_headings"]) + 1
     levels = MOST_LEVELS if query.library.climbs else 1
-    ticks = MOST_TICKS if task.tick > 0.0 else 1
+    ticks = MOST_TICKS if task["tick"] > 0.0 else 1
     others = layers * 2 * ticks * levels * turns  # two: truncated edges have cells of their own
-    return plain(cells_along)(task.fine_cell, far, others), turns, levels, ticks
+    return plain(cells_along)(task["fine_cell"], far, others), turns, levels, ticks
 
 
 def numbers_of_cells(query: LatticeQuery, task: Task, resolution: Resolution) -> int:
@@ -304,3 +280,95 @@ def back_off_of(library: LatticeLibrary) -> float:
 def _size(library: LatticeLibrary) -> float:
     """Half the width of the body [m]; of a point a share of its turns."""
     return library.half_width or library.radius * 0.1
+
+
+FAST = 1.5  # length scales of the tightest turn from which on there is a search of its size
+FAST_WEIGHT = 1.0  # of that: a fast vehicle cannot make up for greed once it is near the goal
+FAST_ALONE = 2000  # expansions of a search as wide as the turns, until others run in turn with it
+
+
+class Schedule(NamedTuple):
+    """Which resolutions begin after so many expansions of all together, or when none is left.
+
+    They run in turn, each twice as many expansions as in its turn before.
+    """
+
+    stages: tuple[tuple[int, tuple[Resolution, ...]], ...]
+    first_chunk: int
+    most_chunk: int
+    ends: tuple[float, ...] = (1.0,)  # where each begins: 1 at the start, -1 at the goals
+
+
+AT_WILL = Schedule(
+    (
+        (0, (Resolution(coarse=True),)),
+        (
+            300,
+            (
+                Resolution(truncated=True, guided=True, coarse=True),
+                Resolution(scale=0.5, durations=0.5, truncated=True, guided=True, coarse=True),
+            ),
+        ),
+        (1500, (Resolution(scale=0.24, durations=0.25, truncated=True, guided=True),)),
+        (
+            8000,
+            (
+                Resolution(scale=0.5, durations=0.5, truncated=True, fine=0.2, guided=True),
+                Resolution(scale=0.5, durations=0.5, truncated=True),
+                Resolution(scale=0.12, durations=0.17),
+            ),
+        ),
+        (
+            2**62,
+            (Resolution(scale=0.24, durations=0.25, truncated=True, margin=0.1, guided=True),),
+        ),
+    ),
+    first_chunk=64,
+    most_chunk=8192,
+    ends=(1.0, -1.0),
+)
+LINKED = Schedule(
+    (
+        (0, (Resolution(),)),
+        (300, (Resolution(scale=0.5, durations=0.5), Resolution(durations=0.7))),
+        (2000, (Resolution(scale=0.25, durations=0.25), Resolution(scale=0.5, durations=0.7))),
+        (2000, (Resolution(backwards=True),)),
+        (8000, (Resolution(scale=0.5, durations=0.5, weight=1.5, backwards=True),)),
+        (40000, (Resolution(scale=0.25, durations=0.25, margin=0.1),)),
+    ),
+    first_chunk=128,
+    most_chunk=16384,
+)
+
+
+def schedule_of(library: LatticeLibrary) -> Schedule:
+    """The schedule for a library: trims that are switched at will, or linked by transitions.
+
+    A vehicle that turns widely for its size begins with a search whose cells and coasts are as
+    wide: it decides little from one length of its body to the next.
+    """
+    if library.at_will:
+        return AT_WILL
+    fast = as_wide_as_turns(library)
+    (_, first), *later = LINKED.stages
+    stages = ((0, fast), (FAST_ALONE, first), *later) if fast else LINKED.stages
+    return LINKED._replace(
+        stages=tuple(
+            (after, tuple(replace(one, ends_early=True) for one in begun))
+            for after, begun in stages
+        )
+    )
+
+
+def first_resolutions(library: LatticeLibrary, settings: SearchSettings) -> tuple[Resolution, ...]:
+    """The resolutions with which a search begins, at the weight that is asked for."""
+    _, begun = schedule_of(library).stages[0]
+    if settings.weight is None:
+        return begun
+    return tuple(replace(one, weight=settings.weight) for one in begun)
+
+
+def as_wide_as_turns(library: LatticeLibrary) -> tuple[Resolution, ...]:
+    """The resolution of a vehicle that turns widely for its size; none for others."""
+    wide = library.turns
+    return (Resolution(scale=wide, durations=wide, weight=FAST_WEIGHT),) if wide > FAST else ()

@@ -20,7 +20,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import TIE, SearchResult, SearchStatus, TimedWord, in_order
-from maneuver_automaton.search.word_scan import scanned
+from maneuver_automaton.search.word_scan import WordScan, scanned
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words import _kernels_candidates as kernels
 from maneuver_automaton.words.library import NO_TRIM, four_columns
@@ -67,9 +67,8 @@ def steer_linked_words(
     headings = _headings(goal)[: 0 if setup.exactly else None]
     refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)
     steered = _steered(setup, headings, budget)
-    found = list(
-        _made_good(setup, steered, alternatives, upper_bound, budget, refined=refined)
-    )  # before the status is known
+    good = _made_good(setup, steered, alternatives, upper_bound, budget, refined=refined)
+    found = list(good)  # before the status is known
     return _result(
         setup,
         found,
@@ -136,18 +135,19 @@ def scan_linked_words(
     pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
     most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
     everything = alternatives is None and upper_bound == math.inf
-    scan, finished = scanned(
+    scan_of = functools.partial(
+        WordScan,
         problem,
         setup.as_search(),
         min(most, problem.horizon.max_trims or most),
-        alternatives=None if later else alternatives,
+        None if later else alternatives,
         upper_bound=upper_bound * (1.0 + SLACK * later) + TIE,
         nodes=NODES,
         spare=pads,
         slack=math.inf if everything else SLACK,
-        budget=budget,
-        most_words=None if expansions is None else WORDS_AN_EXPANSION * expansions,
     )
+    most_words = None if expansions is None else WORDS_AN_EXPANSION * expansions
+    scan, finished = scanned(scan_of, budget, most_words)
     found = _made_good(
         setup, scan.timed(), alternatives, upper_bound, budget, refined=setup.is_mended
     )
@@ -284,8 +284,3 @@ def load_linked_words() -> None:
     problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
     steer_linked_words(problem, goal)
     scan_linked_words(problem, goal)
-
-
-def load_words_of(problem: Problem, goal: Goal) -> None:
-    """Have the words ready that all problems of a vehicle at a cost are steered along."""
-    word_setup(problem, goal, most_trims=ALPHABET, steers=True)

@@ -338,11 +338,6 @@ def fastest_of(body: Body, twists: Array) -> Array:
     return fastest_points(body, twists) if len(twists) else np.zeros(0)
 
 
-def body_reach(body: Body) -> float:
-    """Farthest point of a body from the pose of its part [m]."""
-    return float(np.hypot(body.middle_x, body.middle_y)) + body.reach
-
-
 def bodies_of(parts: Sequence[Part]) -> tuple[Body, ...]:
     """The body of each part, for the kernels."""
     return tuple(body_of(part.shapes) for part in parts)

@@ -20,7 +20,7 @@ from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_library import Carried, library_of_trims
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_trims import priced_library, trims_of
-from maneuver_automaton.search.part_motion import Part, posed_parts
+from maneuver_automaton.search.part_motion import posed_parts
 from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
@@ -77,21 +77,18 @@ def _reversed_library(
 ) -> LatticeLibrary:
     """The library of an automaton in reverse, at the same prices, for static obstacles."""
     priced = priced_library(automaton, cost)
+    trims = tuple(replace(trim, body_velocity=-trim.body_velocity) for trim in automaton.trims)
+    maneuvers = tuple(_reversed(one) for one in automaton.maneuvers)
     back = library_of(
-        _reversed_automaton(automaton),
+        replace(automaton, trims=trims, maneuvers=maneuvers),
         rates=priced.arrays.rates[: priced.arrays.n_trims],
         maneuver_costs=priced.maneuver_costs,
     )
-    parts = posed_parts(automaton, footprint, dict(carried), priced.trims)
-    return library_of_trims(trims_of(back, cost), _reversed_parts(parts), waits=False)
-
-
-def _reversed_automaton(automaton: Automaton) -> Automaton:
-    """Trims of opposite twists, and maneuvers from their ends to their begins."""
-    trims = tuple(replace(trim, body_velocity=-trim.body_velocity) for trim in automaton.trims)
-    return replace(
-        automaton, trims=trims, maneuvers=tuple(_reversed(one) for one in automaton.maneuvers)
+    parts = tuple(
+        replace(part, course_poses=tuple(poses[::-1].copy() for poses in part.course_poses))
+        for part in posed_parts(automaton, footprint, dict(carried), priced.trims)
     )
+    return library_of_trims(trims_of(back, cost), parts, waits=False)
 
 
 def _reversed(maneuver: Maneuver) -> Maneuver:
@@ -115,12 +112,4 @@ def _reversed(maneuver: Maneuver) -> Maneuver:
         target=maneuver.source,
         displacement=back,
         course=course,
-    )
-
-
-def _reversed_parts(parts: tuple[Part, ...]) -> tuple[Part, ...]:
-    """The parts with the samples of every course in reverse."""
-    return tuple(
-        replace(part, course_poses=tuple(poses[::-1].copy() for poses in part.course_poses))
-        for part in parts
     )

@@ -73,7 +73,10 @@ def _admitted(
     library: LatticeLibrary, setting: Problem
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Which trims, and which pieces of maneuvers, each zone of a problem admits."""
-    return _admitted_trims(setting, library), _admitted_pieces(setting, library)
+    trims = [library.priced.automaton.trims[k] for k in library.trims] if setting.zones else []
+    rows = [[piece_is_admitted(zone, trim) for trim in trims] for zone in setting.zones]
+    admitted = np.array(rows, dtype=np.bool_).reshape(len(setting.zones), len(library.trims))
+    return admitted, _admitted_pieces(setting, library)
 
 
 def for_library(scene: Scene, problem: Problem, library: LatticeLibrary) -> Scene:
@@ -99,13 +102,6 @@ def _layers(problem: Problem, worlds: Worlds, pad: float, level: float) -> Layer
         high=np.append(np.round(high, DIGITS), everywhere),
         plane=worlds.plane,
     )
-
-
-def _admitted_trims(problem: Problem, library: LatticeLibrary) -> NDArray[np.bool_]:
-    """Which trims each zone admits, (Z, m)."""
-    trims = [library.priced.automaton.trims[k] for k in library.trims] if problem.zones else []
-    rows = [[piece_is_admitted(zone, trim) for trim in trims] for zone in problem.zones]
-    return np.array(rows, dtype=np.bool_).reshape(len(problem.zones), len(library.trims))
 
 
 def _admitted_pieces(problem: Problem, library: LatticeLibrary) -> NDArray[np.bool_]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -90,26 +89,9 @@ def sub_library(setup: SearchSetup) -> SearchSetup:
     return replace(setup, trims=few.trims, twists=few.twists, rates=few.rates, periods=few.periods)
 
 
-class FewTrims(NamedTuple):
-    """The trims of a sub-library: the same for every start and goal."""
-
-    trims: IntArray  # (M,) by the automaton's numbers
-    twists: Array  # (M, 4)
-    rates: Array  # (M,)
-    periods: Array  # (M,) [s]
-
-
 @kept_by_first
-def few_of(library: MovingTrims) -> FewTrims:
-    """The few trims that stand for a library."""
-    rows = _far_reaching(library)
-    return FewTrims(
-        library.trims[rows], library.twists[rows], library.rates[rows], library.periods[rows]
-    )
-
-
-def _far_reaching(library: MovingTrims) -> IntArray:
-    """Rows of the few trims."""
+def few_of(library: MovingTrims) -> MovingTrims:
+    """The few trims that stand for a library: the same for every start and goal."""
     twists, rates = library.twists, library.rates
     scaled = twists / np.abs(twists).max(axis=0).clip(min=1e-300)
     chosen: list[int] = []
@@ -135,4 +117,13 @@ def _far_reaching(library: MovingTrims) -> IntArray:
             choose(sign * twists[:, 3], everything)
     for angle in np.arange(8) * np.pi / 4.0:
         choose(np.cos(angle) * scaled[:, 0] + np.sin(angle) * scaled[:, 2], everything)
-    return np.array(list(dict.fromkeys(chosen)))
+    few = list(dict.fromkeys(chosen))
+    return replace(
+        library,
+        trims=library.trims[few],
+        twists=twists[few],
+        rates=rates[few],
+        periods=library.periods[few],
+        speeds=library.speeds[few],
+        turn_rates=library.turn_rates[few],
+    )

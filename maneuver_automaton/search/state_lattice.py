@@ -27,14 +27,12 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, LatticeLibrary
-from maneuver_automaton.search.lattice_goals import EXACT, at_headings
+from maneuver_automaton.search.lattice_goals import EXACT, at_headings, facing
 from maneuver_automaton.search.lattice_library import library_of_trims
 from maneuver_automaton.search.lattice_memory import (
     SearchArrays,
-    begin_anew,
+    arrays_for,
     room_takes,
-    search_arrays,
-    spare_searches,
     with_room,
 )
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -46,6 +44,7 @@ from maneuver_automaton.words.word import Word
 
 CLOSE = 1e-6  # [half widths of the body] by which pieces of courses may be off
 MARGIN = 2e-5  # [m] what is nearer to a solid touches it; as fine as the checks of a plan
+MOST_ROOTS = 1 << 16  # nodes at the goals that a search begins from
 MOST_STATES = 256  # of which nodes have numbers of their own
 FIRST_CHUNK = 64  # expansions
 USUAL_CHILDREN = 4  # of a node: where there are more, the arrays are widened again
@@ -96,12 +95,6 @@ class Graph:
     fine: Tested
     goal_index: tuple[int, ...]  # (G,) which of the problem's goals the aims are
     surcharge: float  # that each edge has and a plan has once less: the price of a switch
-
-    @property
-    def has_walls(self) -> bool:
-        """Whether no plan may leave the window."""
-        bounds = self.query.problem.bounds
-        return bounds.x is not None or bounds.y is not None
 
     def widened(self) -> Graph:
         """The same in a window twice as wide."""
@@ -215,7 +208,7 @@ def _states(
     assert isinstance(cost, Cost)
     heading = np.array([model.heading(automaton.trims[k].reduced_state) for k in library.trims])
     source, target = arrays.edge_source, arrays.edge_target
-    ends = (SE2(_facing(heading[source])) @ SE2(arrays.edge_displacement[:, :3])).pose
+    ends = (SE2(facing(heading[source])) @ SE2(arrays.edge_displacement[:, :3])).pose
     step = np.round(ends[:, :2] / model.resolution)
     off = np.abs(ends[:, :2] - step * model.resolution).max(initial=0.0)
     turned = np.abs(wrapped(ends[:, 2] - heading[target])).max(initial=0.0)
@@ -241,6 +234,9 @@ def _states(
     rows.sort(key=lambda row: row[:1])
     begins, targets, edges = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
     counts = np.bincount(begins, minlength=directed * len(heading))
+    along = fine.arrays
+    lengths = along.piece_speed * along.piece_time + 2.0 * along.piece_error
+    pose_pieces = along.first_piece[along.n_parts * len(along.edge_cost) : -1]
     lattice = StateLattice(
         cell=float(model.resolution),
         frame=(0.0, 0.0, 0.0, 1.0, 0.0),
@@ -251,19 +247,12 @@ def _states(
         step=step[edges].astype(np.int64),
         cost=np.array([row[3] for row in rows], dtype=np.float64),
         edge=np.ascontiguousarray(edges),
-        travel=_travels(fine.arrays)[edges],
+        travel=np.add.reduceat(np.append(lengths, 0.0), pose_pieces)[edges],
         most_children=int(counts.max(initial=0)),
         roots=np.zeros((0, 3), dtype=np.int64),
     )
     of_trim = [np.arange(directed) + directed * k for k in range(len(heading))]
     return lattice, of_trim, float(cost.switch)
-
-
-def _travels(arrays: LatticeArrays) -> Array:
-    """Length (E,) of the path of the pose along each edge [m]."""
-    lengths = arrays.piece_speed * arrays.piece_time + 2.0 * arrays.piece_error
-    begins = arrays.first_piece[arrays.n_parts * len(arrays.edge_cost) : -1]
-    return np.asarray(np.add.reduceat(np.append(lengths, 0.0), begins))
 
 
 def _aims(problem: Problem, goals: Sequence[int], world: SE2, lattice: StateLattice) -> Aims:
@@ -308,9 +297,6 @@ def _surplus(lattice: StateLattice, per_metre: float, admits: NDArray[np.bool_])
     return least
 
 
-MOST_ROOTS = 1 << 16
-
-
 def _nodes_within(aims: Aims, cell: float) -> IntArray | None:
     """Nodes (R, 4) that aims hold, and the number of the aim; None if there are too many."""
     found = []
@@ -328,10 +314,6 @@ def _nodes_within(aims: Aims, cell: float) -> IntArray | None:
     return np.concatenate(found)
 
 
-def _facing(heading: Array) -> Array:
-    return np.stack([np.zeros_like(heading), np.zeros_like(heading), heading], axis=-1)
-
-
 @dataclass(slots=True, eq=False)
 class GraphSearch:
     """A* on a state lattice, which can be stopped and resumed."""
@@ -346,11 +328,8 @@ class GraphSearch:
     @classmethod
     def of(cls, graph: Graph, *, weight: float, budget: Budget) -> GraphSearch:
         """A search that is ready to run."""
-        query = graph.query
-        spare = query.prepared.once(spare_searches, query.library)
-        room = spare.pop() if spare else search_arrays(query.library.arrays.library)
-        arrays = with_room(room, len(graph.lattice.roots) + graph.lattice.most_children + 2)
-        begin_anew(arrays)
+        room = len(graph.lattice.roots) + graph.lattice.most_children + 2
+        arrays = arrays_for(graph.query.prepared, graph.query.library, room)
         return cls(graph, weight, arrays, Pace(budget, FIRST_CHUNK))
 
     @property
@@ -374,7 +353,8 @@ class GraphSearch:
     @property
     def cut(self) -> float:
         """No plan that leaves the window costs less; inf if the window's rim is a wall."""
-        if self.graph.has_walls:
+        bounds = self.graph.query.problem.bounds
+        if bounds.x is not None or bounds.y is not None:
             return math.inf
         return float(self.arrays.found[kernels.CUT]) - self.graph.surcharge
 

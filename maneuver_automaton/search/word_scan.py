@@ -44,38 +44,12 @@ BoolArray = NDArray[np.bool_]
 
 
 def scanned(
-    problem: Problem,
-    setup: SearchSetup,
-    most: int,
-    *,
-    alternatives: int | None,
-    upper_bound: float,
-    nodes: int,
-    budget: Budget,
-    spare: bool = False,
-    slack: float = math.inf,
-    most_words: int | None,
-    not_first: int | None = None,
+    scan_of: Callable[..., WordScan], budget: Budget, most_words: int | None
 ) -> tuple[WordScan, bool]:
-    """A scan of all words of up to `most` trims, and whether no limit ended it.
-
-    Where `not_first` is a trim of the automaton, fewer words need to be scanned: those of `most`
-    trims that do not begin with it.
-    """
+    """A scan with `capacity` for all that it finds, and whether no limit ended it."""
     capacity = CAPACITY
     while True:
-        scan = WordScan(
-            problem,
-            setup,
-            most,
-            alternatives,
-            capacity=capacity,
-            nodes=nodes,
-            spare=spare,
-            slack=slack,
-            upper_bound=upper_bound,
-            not_first=not_first,
-        )
+        scan = scan_of(capacity=capacity)
         finished = scan.run(budget, most_words)
         if scan.n_found <= capacity:
             return scan, finished
@@ -94,7 +68,11 @@ class Mode:
 
 
 class WordScan:
-    """A scan of all words: its buffers, and what it has found."""
+    """A scan of all words of up to `most` trims: its buffers, and what it has found.
+
+    Where `not_first` is a trim of the automaton, fewer words need to be scanned: those of `most`
+    trims that do not begin with it.
+    """
 
     def __init__(
         self,
@@ -120,9 +98,10 @@ class WordScan:
         self.nodes = nodes
         self.spare = spare
         self.slack = slack
-        self.tables = _tables(setup)
-        self.not_first = None if not_first is None else _row_of(setup, not_first)
-        self._gridded = False
+        self.tables = tables_of(setup)
+        rows = [] if not_first is None else np.flatnonzero(setup.trims == not_first).tolist()
+        self.not_first = rows[0] if rows else -1  # a row of the search
+        self.gridded = False  # whether a word with two times free, which may miss a solution, was
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = not isinstance(problem.cost, Cost)
@@ -146,11 +125,6 @@ class WordScan:
             counter=np.zeros(1, dtype=np.int64),
             best=np.full(asked, upper_bound),
         )
-
-    @property
-    def gridded(self) -> bool:
-        """Whether a word with two times free was scanned, which may miss a solution."""
-        return self._gridded
 
     @property
     def n_found(self) -> int:
@@ -185,7 +159,7 @@ class WordScan:
                     if not self._scan_all(scan, chunk, mode, n, budget, max_words):
                         return False
                 if n + tail > 4 and self.n_steering > calls:
-                    self._gridded = True
+                    self.gridded = True
         return True
 
     def _takes_a_moment(self, mode: Mode, budget: Budget) -> bool:
@@ -216,7 +190,7 @@ class WordScan:
             PORTIONS_AT_ONCE,
             self.most,
             TIE,
-            -1 if self.not_first is None else self.not_first,
+            self.not_first,
         )
 
     def _scan_all(
@@ -389,17 +363,6 @@ class _Tables:
         return reaches if most == math.inf else np.minimum(reaches, most)
 
 
-def _row_of(setup: SearchSetup, trim: int) -> int | None:
-    """Row of a trim of the automaton among those of a search; None if it is not among them."""
-    rows = np.flatnonzero(setup.trims == trim)
-    return int(rows[0]) if rows.size else None
-
-
-def load_tables(setup: SearchSetup) -> None:
-    """Have ready what all problems of a library share."""
-    _tables(setup)
-
-
 class _SameForAll(NamedTuple):
     """What all searches of a library with some conditions share, for every start and goal."""
 
@@ -421,10 +384,7 @@ def _same_for_all(
     start: int,
     goal: int,
 ) -> _SameForAll:
-    """The arrays of trims above a rest of this rate, the linear conditions, and the transitions.
-
-    Kernels read these arrays and write to none of them.
-    """
+    """Trims above a rest of this rate, linear conditions, transitions; kernels only read them."""
     from maneuver_automaton.search._kernels_problem import Links
 
     rates, per_unit = _rates_above(tables, rest_rate)
@@ -456,38 +416,24 @@ def _same_for_all(
 
 @kept_by_first
 def _rates_above(tables: _Tables, rest: float) -> tuple[Array, Array]:
-    """Cost per second (M,) less that of a rest; and (M, 2) per metre and per radian, inf for none.
-
-    The free turn has no cost to take it off from.
-    """
+    """Cost per second (M,) less a rest's; and (M, 2) per metre and per radian, inf for none."""
     rates = tables.rates - rest * tables.weights if rest else tables.rates
     none = np.full(tables.paces.shape, np.inf)
     return rates, np.divide(rates[:, None], tables.paces, out=none, where=tables.paces > 0.0)
 
 
-def _tables(setup: SearchSetup) -> _Tables:
+def tables_of(setup: SearchSetup) -> _Tables:
     """The tables of a search, which those for the whole of a library share."""
     library = setup.library
     if setup.trims is library.trims and setup.rates is library.rates:
-        return _tables_kept(library, False, setup.free_heading)
+        return _tables_kept(library, setup.free_heading)
     if len(library.trims) > FEW and setup.trims is few_of(library).trims:
-        return _tables_kept(library, True, setup.free_heading)
-    rows = setup.trims, setup.twists, setup.rates, setup.periods
-    return _tables_of(*rows, setup.free_heading)
+        return _tables_kept(few_of(library), setup.free_heading)
+    return _tables(setup, setup.free_heading)
 
 
-@kept_by_first
-def _tables_kept(library: MovingTrims, is_few: bool, free_heading: bool) -> _Tables:
-    """The tables of a whole library, or of the few trims that stand for it."""
-    if is_few:
-        return _tables_of(*few_of(library), free_heading)
-    return _tables_of(library.trims, library.twists, library.rates, library.periods, free_heading)
-
-
-def _tables_of(
-    trims: IntArray, twists: Array, rates: Array, periods: Array, free_heading: bool
-) -> _Tables:
-    twists, rates, periods = np.array(twists), np.array(rates), np.array(periods)
+def _tables(setup: SearchSetup | MovingTrims, free_heading: bool) -> _Tables:
+    twists, rates, periods = np.array(setup.twists), np.array(setup.rates), np.array(setup.periods)
     least = float(rates.min(initial=math.inf))
     weights = np.ones(len(rates))
     if free_heading:
@@ -500,14 +446,14 @@ def _tables_of(
     fastest = np.maximum(speeds, np.abs(twists[:, 3]))
     straights = np.flatnonzero(~turning & (fastest > 0.0))
     return _Tables(
-        trims=trims,
+        trims=setup.trims,
         twists=twists,
         rates=rates,
         least_rate=least,
         periods=periods,
         weights=weights,
         paces=np.stack([np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])], axis=1),
-        parallel=_parallel(twists),
+        parallel=_parallel(twists[:, :3].tobytes(), len(twists)),
         turns=np.where(turning, periods, 0.0),
         straights=straights,
         fastest=fastest[straights],
@@ -515,14 +461,12 @@ def _tables_of(
     )
 
 
-def _parallel(twists: Array) -> BoolArray:
-    """Which pairs of twists span one line only (M, M), altitude aside."""
-    return _parallel_rows(twists[:, :3].tobytes(), len(twists))
+_tables_kept = kept_by_first(_tables)
 
 
 @functools.lru_cache(maxsize=4)
-def _parallel_rows(rows: bytes, n: int) -> BoolArray:
-    """The same of `n` twists; of thousands it takes longer than most searches, so it is kept."""
+def _parallel(rows: bytes, n: int) -> BoolArray:
+    """Which pairs of `n` twists span one line only (n, n): of thousands it takes long."""
     twists = np.frombuffer(rows).reshape(n, 3)
     lengths = np.sqrt((twists**2).sum(axis=1)).clip(min=1e-300)
     a, b, c = (twists / lengths[:, None]).T

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -88,17 +89,17 @@ def search_words(
         )
     if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
         return resting(problem, setup)
-    job, finished = scanned(
+    scan_of = partial(
+        WordScan,
         problem,
         setup,
         most,
-        alternatives=alternatives,
-        upper_bound=upper_bound,
+        alternatives,
         nodes=nodes,
-        budget=budget,
-        most_words=problem.search.max_expansions,
+        upper_bound=upper_bound,
         not_first=not_first,
     )
+    job, finished = scanned(scan_of, budget, problem.search.max_expansions)
     solutions = tuple(in_order(_handed_over(job, budget)))
     if alternatives is not None and len(solutions) > alternatives + 1:
         asked = solutions[: alternatives + 1]

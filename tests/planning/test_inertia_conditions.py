@@ -17,11 +17,10 @@ from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
-from maneuver_automaton.search import lattice, lattice_schedules
+from maneuver_automaton.search import lattice, lattice_task
 from maneuver_automaton.search.lattice_pass import pass_of, plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.lattice_schedules import LINKED
-from maneuver_automaton.search.lattice_task import WEIGHT, Resolution, task_of
+from maneuver_automaton.search.lattice_task import LINKED, WEIGHT, Resolution, task_of
 from maneuver_automaton.search.reversal import forward_word, reversed_query
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are
@@ -151,7 +150,7 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
         lattice, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)
     )
     stages = ((0, (Resolution(),)), (0, (Resolution(scale=0.5),)))
-    monkeypatch.setattr(lattice_schedules, "LINKED", LINKED._replace(stages=stages, first_chunk=4))
+    monkeypatch.setattr(lattice_task, "LINKED", LINKED._replace(stages=stages, first_chunk=4))
     next(incumbent_words(query, budget=counted(200)))
     assert weights == [1.3, WEIGHT]
 

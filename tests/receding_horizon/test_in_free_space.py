@@ -45,8 +45,13 @@ def test_going_on_from_the_plan_alone_it_drives_as_if_it_tried_other_words(start
 @compiled_only
 def test_other_words_are_tried_at_first_and_off_the_plan(monkeypatch):
     searched: list[int] = []
-    seeds = free_insertion._seeds
-    monkeypatch.setattr(free_insertion, "_seeds", lambda work: searched.append(1) or seeds(work))
+    seeds = free_insertion._words_of_few
+
+    def counted(*asked):
+        searched.append(1)
+        return seeds(*asked)
+
+    monkeypatch.setattr(free_insertion, "_words_of_few", counted)
     controller = RecedingHorizon(of_a_grid(STARTS[0]), step=1.0)
     _, first = controller.step(STARTS[0])
     assert len(searched) == 1

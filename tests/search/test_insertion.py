@@ -28,7 +28,7 @@ from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.library_arrays import library_arrays
-from maneuver_automaton.search.result import TimedWord, plan_of
+from maneuver_automaton.search.result import InsertionTask, TimedWord, plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
 from tests import reference
@@ -460,7 +460,8 @@ def test_trims_last_as_long_as_they_have_to(name):
 @pytest.mark.parametrize("name", VEHICLES)
 def test_the_last_stage_is_the_answer_and_none_is_dearer_than_the_one_before(name):
     problem = VEHICLES[name]()
-    stages = [stage.solutions[0].cost for stage in insertion_stages(problem, problem.goals[0])]
+    task = InsertionTask(problem=problem, goal=problem.goals[0])
+    stages = [stage.solutions[0].cost for stage in insertion_stages(task)]
     assert stages == sorted(stages, reverse=True)
     assert stages[-1] == best(problem).cost
 

@@ -28,8 +28,7 @@ from maneuver_automaton.search.lattice_memory import (
 )
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.lattice_schedules import AT_WILL
-from maneuver_automaton.search.lattice_task import Resolution, task_of
+from maneuver_automaton.search.lattice_task import AT_WILL, Resolution, task_of
 from maneuver_automaton.words.transitions import SWITCH
 from tests import scenes
 from tests.collision.scenes import random_map

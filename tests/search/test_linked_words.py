@@ -18,7 +18,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.insertion import insertion_stages
 from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
-from maneuver_automaton.search.result import SearchStatus, plan_of
+from maneuver_automaton.search.result import InsertionTask, SearchStatus, plan_of
 from maneuver_automaton.search.word_setup import word_setup
 from tests.goldens.inertia import sent
 from tests.inertia import car_automaton, unicycle_automaton
@@ -165,7 +165,7 @@ def test_a_fixed_time_is_met_without_solving_every_word_for_it():
 @pytest.mark.slow
 def test_words_that_climb_are_kept_though_no_node_is_at_the_altitude():
     one = sent("helicopter", 1)
-    _, scanned, *_ = insertion_stages(one, one.goals[0])
+    _, scanned, *_ = insertion_stages(InsertionTask(problem=one, goal=one.goals[0]))
     assert scanned.solutions[0].cost < 8.21  # 8.54 without them
 
 
