@@ -175,11 +175,7 @@ def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
 
 
 def _bench(problem: Problem, prepared: Prepared) -> Bench | None:
-    """A bench for queries like this one; None where more has to be looked at than its kernel does.
-
-    That is so where something moves or is carried, in space, among zones, with bounds along one
-    axis alone, and where nothing stands.
-    """
+    """A bench for queries like this one; None where its kernel does not look at all of them."""
     bounds, automaton = problem.bounds, problem.automaton
     if not automaton.is_kinematic or automaton.lattice is not None or problem.start.size != 3:
         return None

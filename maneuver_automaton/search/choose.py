@@ -60,33 +60,10 @@ def search_goal(
 ) -> list[SearchResult]:
     """The method asked for; `auto`: exhaustive where affordable, otherwise insertion, or both.
 
-    Parameters
-    ----------
-    problem : Problem
-    goal : Goal
-        One of the problem's goals.
-    alternatives : int, optional
-        How many solutions beside the cheapest; None asks for the complete list.
-    budget : Budget
-        The search ends with what it has once its time is over.
-    known : Plan, optional
-        A plan from the problem's start to the goal. Exhaustive search then lists only what is at
-        least as cheap (it may find nothing); insertion improves it beside its own seeds.
-    known_cost : float, optional
-        Its cost, where the caller has it.
-    ties : bool
-        Whether exhaustive search lists all that cost as much as the last solution asked for.
-    second_opinion : float
-        [s] that exhaustive search of short words may be expected to take beside insertion.
-    not_first : int, optional
-        As in `search_words`.
-    seeds : int, optional
-        As in `search_insertion`.
-
-    Returns
-    -------
-    list of SearchResult
-        One per method that was tried.
+    One result per method that was tried. Beside the parameters of `search_words` and
+    `search_insertion`: of a `known` plan and its cost exhaustive search lists only what is at least
+    as cheap (it may find nothing), and insertion improves it beside its own seeds; `second_opinion`
+    [s] is what exhaustive search of short words may be expected to take beside insertion.
     """
     method = problem.search.method
     if problem.horizon.min_coast > 0.0:

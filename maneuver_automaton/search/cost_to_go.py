@@ -54,23 +54,10 @@ def cost_to_go_table(
 ) -> CostTable:
     """Cost from every pose within `reach` of the goal, without obstacles, for any goal.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its automaton and cost; start, goals and obstacles do not matter.
-    reach : float, optional
-        Half the side of the square around the goal [m]; three turning radii if None.
-    folder : Path, optional
-        Where tables are kept, in files named after a hash of their key; the user's
-        cache folder if None. Where nothing can be written it works without.
-    prepared : Prepared, optional
-        Where tables are kept in memory.
-
-    Returns
-    -------
-    CostTable
-        ``value[k, j, i]`` belongs to the pose ``((i - half) cell, (j - half) cell, k 2 pi / n)``
-        seen from the goal.
+    Half the side of the square around the goal is `reach` [m], three turning radii if None. Tables
+    are kept in files of `folder`, the user's cache folder if None, named after a hash of their key;
+    where nothing can be written it works without. ``value[k, j, i]`` belongs to the pose
+    ``((i - half) cell, (j - half) cell, k 2 pi / n)`` seen from the goal.
 
     Raises
     ------

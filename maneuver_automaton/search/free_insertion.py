@@ -126,10 +126,7 @@ class _Work:
 
 
 def _improved(work: _Work) -> SearchResult:
-    """Solutions of all seeds and of what insertion makes of them, each word once.
-
-    Without seeds those of the known plan; where it has none, those of the usual seeds.
-    """
+    """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
     if plan is not None and len(plan.trims) <= LONGEST:
         names = _names(automaton)
@@ -191,10 +188,7 @@ def _fitting(work: _Work, rounds: int) -> int:
 
 
 def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
-    """The solutions of words; where only the cheapest is asked for, no costlier ones.
-
-    Once the time is over, that of the cheapest word that has one.
-    """
+    """Solutions of words; where one is asked for, or the time is over, no costlier ones."""
     budget = work.task.budget
     in_turn = work.task.alternatives == 0 and not prices_switches(work.problem.cost)
     solutions: list[Word] = []

@@ -54,17 +54,9 @@ def first_plan(
 ) -> FirstPlan:
     """The first connection from start to a goal, at the first resolution that has one.
 
-    Parameters
-    ----------
-    query : LatticeQuery
-        Its library says which resolutions are tried, and when.
-    budget : Budget
-        Its expansions are those of all searches together.
-    table : CostTable
-    grids : tuple of DistanceGrid, optional
-        Distances to the goals and to the start along fine cells, if they are known.
-    begun : Begun, optional
-        The first search of the schedule, if it is begun.
+    The library of the query says which resolutions are tried, and when; expansions of the `budget`
+    are those of all searches together. `grids` are those of fine cells, and `begun` is the first
+    search of the schedule, if they are known.
     """
     schedule = schedule_of(query.library)
     guides = _Guides(query, table, grids)
@@ -191,10 +183,7 @@ class _Turn:
 
 
 def _turns(guides: _Guides, schedule: Schedule, resolutions: tuple[Resolution, ...]) -> list[_Turn]:
-    """Searches at some resolutions, in turn from every end; among moving obstacles from the start.
-
-    One of the library in reverse only where that can be asked.
-    """
+    """Searches at some resolutions, in turn from each end; from the start where something moves."""
     turns: list[_Turn] = []
     query, chunk = guides.query, schedule.first_chunk
     ends = [sign for sign in schedule.ends if sign > 0.0 or not query.moves]

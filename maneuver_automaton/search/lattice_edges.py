@@ -146,14 +146,8 @@ def altitude_ranges(
 ) -> tuple[Array, Array]:
     """Least and greatest altitude (n,) [m] of pieces, seen from where their maneuver begins.
 
-    Parameters
-    ----------
-    maneuvers : sequence of Maneuver
-        Whose samples, one course after the other, the pieces are made of.
-    climbs : (k, 2) array
-        Climb [m/s] in the trims before and after each.
-    begin, end : (n,) array of int
-        First and last sample of every piece.
+    `climbs` (k, 2) [m/s] in the trims before and after each maneuver; `begin` and `end` (n,) are
+    the first and last sample of every piece, of all courses one after the other.
 
     Examples
     --------

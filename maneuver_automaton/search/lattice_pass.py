@@ -217,12 +217,7 @@ def _word(one: Pass) -> Word:
 def _with_maneuvers(
     query: LatticeQuery, steps: Sequence[tuple[int, int, float]], end: int
 ) -> list[tuple[int, int, float]]:
-    """Steps (transition, trim, time) in the automaton's numbers, from those of the search.
-
-    Steps of the search name the edge that leads to their trim, or none: then the transition from
-    the class before is meant, whatever maneuvers it is made of. Trims that last no time are left
-    out, but for the trim after the `end`, -1 if any will do.
-    """
+    """Steps in the automaton's numbers, with the edges of their transitions; `end` -1: any trim."""
     library = query.library
     at = query.start_trim
     found = [(SWITCH, int(library.trims[at]), 0.0)] if at >= 0 else []

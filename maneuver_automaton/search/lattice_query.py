@@ -265,10 +265,7 @@ def _end_clearances(
     trims: IntArray,
     level: float,
 ) -> Array:
-    """Clearance (1 + n,) beyond the margin at the start and every goal, over all parts [m].
-
-    Among moving obstacles, at the start time, and after everything has come to rest.
-    """
+    """Clearance (1 + n,) beyond the margin at all ends [m]; at goals once all has come to rest."""
     after = max(problem.start_time, worlds.whole.last_event)
     times = np.array([problem.start_time] + [after] * (len(ends) - 1))
     found = []

@@ -147,10 +147,7 @@ def _sizes(
     most_trims: int,
     least_coast: float,
 ) -> tuple[dict[str, Any], int]:
-    """The task of any query, without its ends; and how many layers its cells have.
-
-    `timed`: of two nodes of a cell the costlier may be the one that is in time.
-    """
+    """What tasks of all queries share, by name, and the layers of their cells."""
     cell = resolution.scale * (settings.cell or library.cell)
     interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
     sharp = interval * library.radius * library.per_metre
@@ -240,11 +237,7 @@ def _lag(library: LatticeLibrary, aim_trims: IntArray) -> Array:
 
 
 def _slack(library: LatticeLibrary) -> float:
-    """Cost that a connection may have beyond a multiple of the estimate, which knows no prices.
-
-    Two length scales and a full turn, and the switches and changes of direction of three trims and
-    of the joints at both their ends.
-    """
+    """Cost of two length scales, a full turn and the joints: the estimate knows no prices."""
     numbered = library.arrays.library
     path = SLACK * library.radius * library.per_metre + library.per_turn
     prices = MOST_JOINTS * (numbered.switch + numbered.direction_change)
@@ -252,10 +245,7 @@ def _slack(library: LatticeLibrary) -> float:
 
 
 def _radix(query: LatticeQuery, task: dict[str, Any], layers: int) -> tuple[int, int, int, int]:
-    """How many numbers each coordinate of a cell needs; more cells than that share numbers.
-
-    Where numbers are short, places far apart share them: that drops a node, never a proof.
-    """
+    """Numbers that coordinates of cells need; far cells may share one, which drops no proof."""
     low_x, low_y, high_x, high_y = query.box.tolist()
     far = max(high_x - low_x, high_y - low_y)  # no pose of the window is farther from the frame
     turns = max(task["headings"], task["fine_headings"]) + 1

@@ -179,11 +179,7 @@ def is_mirrored(twists: Array, rates: Array) -> bool:
 
 
 def _words(moving: IntArray, twists: Array) -> IntArray:
-    """Words of three trims whose neighbours differ; of fewer where there are fewer trims.
-
-    Where no trim turns, three times are more than a place asks for, and the times of a triple are
-    not determined: two trims that lead to different sides are enough. They are followed by none.
-    """
+    """Words of three trims whose neighbours differ; of two where none turns, which are enough."""
     every = moving.tolist()
     if len(every) > 1 and not twists[:, 2].any():
         return np.array(

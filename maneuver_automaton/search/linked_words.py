@@ -96,26 +96,9 @@ def scan_linked_words(
     of a word coast for a while. With an upper bound, or a number of alternatives, a word of four
     trims is left out where no node of its scanned time is nearly cheap enough.
 
-    Parameters
-    ----------
-    problem : Problem
-    goal : Goal
-    alternatives : int, optional
-        How many solutions beside the cheapest. None: all that are found, nothing is pruned.
-    budget : Budget
-        The search ends with what it has once its time is over; ``search.max_expansions`` of the
-        problem limits it by the number of words instead: the same at every call.
-    upper_bound : float
-        Cost of a plan that is known: what is costlier may be left out.
-    max_trims : int
-        Trims of a word that coast, at most; the horizon's ``max_trims`` may be less.
-    alphabet : int
-        Words are made of so many trims of the library, of a larger one of those that differ most.
-
-    Returns
-    -------
-    SearchResult
-        ``complete`` if no word was left out.
+    Most parameters are those of `search_words`; ``search.max_expansions`` of the problem limits the
+    number of words instead of the time: the same at every call. `max_trims` are those that coast.
+    Words are made of `alphabet` trims of the library, of a larger one of those that differ most.
 
     Examples
     --------
@@ -174,11 +157,7 @@ def _made_good(
     *,
     refined: bool,
 ) -> Iterator[TimedWord]:
-    """Words found, each with times that meet all conditions, and with its own price.
-
-    They come by rising cost as the search sees it, which is a lower bound where switches are
-    priced. Unless they are `refined`, their times only lose the error of rounding.
-    """
+    """Words found by rising cost, with times that meet all conditions, and their own prices."""
     most = setup.problem.search.max_expansions
     prices = list[float]()
     slack = 1.0 + SLACK * refined + TIE
@@ -231,11 +210,7 @@ def _headings(goal: Goal) -> Array:
 
 
 def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[TimedWord]:
-    """Words of up to three trims and a climb that lead to the goal, cheapest first.
-
-    Once the time is over, those of the rows of the library that were steered by then: the first
-    ones, which are the shortest, in any case.
-    """
+    """Words of up to three trims and a climb to the goal, cheapest first, as time allows."""
     arrays, scratch = setup.library.arrays, setup.library.scratch()
     start, goal = four_columns(np.array([setup.problem.start, setup.goal.pose]))[:, None]
     found: list[tuple[NDArray[Any], ...]] = []  # costs, numbers of headings, climbs, rows, times

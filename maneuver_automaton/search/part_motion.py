@@ -61,20 +61,12 @@ def parts_of(
     footprint: Sequence[Shape],
     carried: Sequence[Sequence[Shape]] = (),
 ) -> tuple[Part, ...]:
-    """The vehicle's own body, and its other parts where its model says.
-
-    Parameters
-    ----------
-    automaton : Automaton
-    footprint : sequence of shapes
-        Body of the vehicle, in the frame of its pose.
-    carried : sequence of sequences of shapes
-        Body of each part that the model places by its reduced state, in the frame of the part.
+    """The vehicle's own body, and its other parts where its model says, each in its own frame.
 
     Raises
     ------
     ValueError
-        If the model carries another number of parts.
+        If the model carries another number of parts than `carried` has bodies.
     """
     model = automaton.model
     if len(carried) != len(model.part_names):
@@ -173,20 +165,10 @@ def pieces_of(
     All courses at once: spans that are not followed closely are halved, until they are or lie
     between two samples.
 
-    Parameters
-    ----------
-    courses : sequence of (n, 3) and (n,) arrays
-        Poses of the part and their times.
-    ends : (k, 2, 3) array
-        Twists of the part in the trims before and after each.
-    reach : float
-        Farthest point of the body from the part's pose [m].
-    close : float
-        Deviation [m] that a piece may have beside that between two samples.
-    timed : bool
-        Whether it matters when the part is where, not only where it comes along.
-    stepwise : bool
-        Whether one twist leads from each sample to the next, so that nothing is unknown between.
+    `courses`: poses (n, 3) of the part and their times; `ends`: twists (k, 2, 3) in the trims
+    before and after each; `reach` [m] of the farthest point of the body; `close` [m]: what a piece
+    may be off beside between two samples; `timed`: it matters when the part is where; `stepwise`:
+    one twist leads from each sample to the next, so that nothing is unknown between.
     """
     if not courses:
         none, nowhere = np.zeros(0, dtype=np.int64), np.zeros((0, 3))

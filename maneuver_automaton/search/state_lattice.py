@@ -197,11 +197,7 @@ def _followed(library: LatticeLibrary, cost: Cost) -> LatticeLibrary:
 def _states(
     library: LatticeLibrary, fine: LatticeLibrary, problem: Problem
 ) -> tuple[StateLattice, list[IntArray], float] | None:
-    """The graph of a library, the states of each of its trims, and the price of a switch.
-
-    Where changes of direction have a price, a heading is three states: the direction of the last
-    motion is ahead, in reverse, or none yet. None if an end is beside its cell or heading.
-    """
+    """Graph (three states a heading where directions are priced), states of trims, switch price."""
     arrays, automaton, cost = library.arrays, library.priced.automaton, problem.cost
     model = automaton.lattice
     assert isinstance(model, OnLattice)

@@ -22,16 +22,8 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     In the plane of speed and turn rate, each divided by its greatest, some directions are taken;
     for each the trim that is the cheapest for what it covers, of equal ones the nearest to the
     direction, then the fastest. Where nothing turns on the spot, the sharpest turns too, and the
-    cheapest straight motions aside.
-
-    Parameters
-    ----------
-    twists : (m, 3) or (m, 4) array
-        Body velocities [m/s, m/s, rad/s(, m/s)].
-    rates : (m,) array
-        Cost per second.
-    directions : int
-        A multiple of eight.
+    cheapest straight motions aside. Twists are (m, 3) or (m, 4), rates (m,) are costs per second,
+    and the number of directions is a multiple of eight.
 
     Examples
     --------
@@ -120,19 +112,8 @@ def paced_trims(
 
     Time gets a price. The costlier it is, the faster are the `coarse_trims`; so there is a least
     one at which the word, driven by those of its own directions, ends in time. The trims for the
-    step below, and those for it: between the two paces words fill the time.
-
-    Parameters
-    ----------
-    twists : (m, 3) or (m, 4) array
-    rates : (m,) array
-        Cost per second.
-    word : (n,) array
-        Rows of the trims of a word that ends in time.
-    durations : (n,) array
-        [s].
-    most_time : float
-        [s].
+    step below, and those for it: between the two paces words fill the time. `word` (n,) are the
+    rows of the trims of a word that ends in time.
 
     Examples
     --------
@@ -182,18 +163,7 @@ def at_two_paces(
 
     Slow ahead as long as the time allows, then fast. Rows of trims and how long they last [s]; None
     where no trim of a pace leads along the path of one of the word, or the fast ones are too slow.
-
-    Parameters
-    ----------
-    twists : (m, 3) or (m, 4) array
-    word : (n,) array
-        Rows of the trims of the word.
-    durations : (n,) array
-        [s].
-    paces : two (k,) arrays
-        Rows of the slow and of the fast trims.
-    most_time : float
-        [s].
+    `word` (n,) and the two `paces` (k,), the slow one first, are rows of trims.
 
     Examples
     --------

@@ -67,10 +67,7 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
 def _with_fewer_rests(
     query: LatticeQuery, parts: list[tuple[int, float]], rest: int
 ) -> list[tuple[int, float]]:
-    """The same arrival with rests together, where they stood apart: it may have fewer switches.
-
-    Each rest, the last first, is taken at an earlier one or at the start, if that is free.
-    """
+    """The same arrival with rests put together where that is free: it may have fewer switches."""
     at = len(parts) - 1
     while at > 0:
         if parts[at][0] == rest:
@@ -139,11 +136,7 @@ def _arrival(query: LatticeQuery, path: PathArrays, rest: int) -> int:
 
 
 def _inside(window: Array, poses: Array, twists: Array, durations: Array) -> bool:
-    """Whether motions stay inside a window (9,), as in `_kernels_window`; some near its rim do not.
-
-    They are looked at in short pieces: where both ends are inside by the bulge of the arc between
-    them, so is the arc. Without bounds the window is far from everything.
-    """
+    """Whether motions stay inside a window (9,), in short pieces; some near its rim do not."""
     turns = np.abs(twists[:, 2]) * durations
     counts = np.maximum(1, np.ceil(turns / SHORT_TURN).astype(int))
     times, steps = np.repeat(durations / counts, counts), np.repeat(np.arange(len(counts)), counts)

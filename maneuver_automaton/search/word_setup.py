@@ -336,10 +336,7 @@ def _library(
     steers: bool,
     useful: tuple[int, ...] | None,
 ) -> tuple[tuple[int, ...], Library]:
-    """Trims that words are made of, and the transitions; words to be steered along on demand.
-
-    Where only some trims are `useful`, the others, which lead nowhere, are not among them.
-    """
+    """Trims that words are made of, of the `useful` ones, the transitions, and words to steer."""
     library = _transitions(automaton, cost, waiting)
     twists = library.arrays.twists[: library.arrays.n_trims]
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
