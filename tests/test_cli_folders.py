@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from maneuver_automaton.cli import folder_runs, folders, mpc_command, plan_command, run
+from maneuver_automaton.cli import folder_runs, mpc_command, plan_command, run
 from tests.scenario.files import SCENARIO, but
 
 LOOP = SCENARIO + "receding_horizon: {step_s: 1.0, steps: 12}\n"
@@ -114,7 +114,7 @@ def test_loops_run_several_at_a_time(folder, capsys):
 @pytest.mark.parametrize("command", ["plan", "mpc"])
 def test_a_wrong_address_is_told(folder, monkeypatch, capsys, command):
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: True)
-    monkeypatch.setattr(folders, "problems_in", None)  # no file is read before
+    monkeypatch.setattr(folder_runs, "problems_in", None)  # no file is read before
     assert run([command, "many", *QUICK, "--dask", "nowhere"]) == 2
     assert capsys.readouterr().err == (
         "--dask: got 'nowhere', need an address such as tcp://host:8786, or local\n"

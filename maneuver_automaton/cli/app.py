@@ -178,9 +178,9 @@ def compile_all(
     ] = None,
 ) -> int:
     """Compile all kernels now; an installation that is not editable brings them."""
-    from maneuver_automaton.cli import compile_command
+    from maneuver_automaton.cli import cache_command
 
-    return compile_command.run(jobs=jobs)
+    return cache_command.compile_all(jobs=jobs)
 
 
 @contextlib.contextmanager
@@ -228,8 +228,7 @@ def plan(
     """
     from maneuver_automaton.cli import plan_command
     from maneuver_automaton.cli.inputs import Parts
-    from maneuver_automaton.cli.looks import LookOptions
-    from maneuver_automaton.cli.plan_settings import Settings
+    from maneuver_automaton.cli.plan_settings import LookOptions, Settings
 
     settings = Settings(
         time_limit=time_limit,
@@ -301,8 +300,7 @@ def mpc(
     """
     from maneuver_automaton.cli import mpc_command
     from maneuver_automaton.cli.inputs import Parts
-    from maneuver_automaton.cli.looks import LookOptions
-    from maneuver_automaton.cli.plan_settings import Settings
+    from maneuver_automaton.cli.plan_settings import LookOptions, Settings
 
     Settings(time_limit=time_limit, gap=gap)  # checked alike
     if alternatives:
@@ -443,7 +441,7 @@ def automaton_draw(
     maneuvers stands beside it, its name ending in _maneuvers.
     """
     from maneuver_automaton.cli import automaton_command
-    from maneuver_automaton.cli.looks import LookOptions
+    from maneuver_automaton.cli.plan_settings import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
     return automaton_command.draw(file, out, look=look, model_text=model)
@@ -514,7 +512,7 @@ def plot(
     closed loop alone is drawn as an arc from step to step.
     """
     from maneuver_automaton.cli import convert_command
-    from maneuver_automaton.cli.looks import LookOptions
+    from maneuver_automaton.cli.plan_settings import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
     return convert_command.plot(file, out, animate=animate, html=html, look=look, beside=with_file)

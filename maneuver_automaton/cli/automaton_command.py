@@ -20,7 +20,7 @@ from maneuver_automaton.cli.inputs import (
     not_written,
     target,
 )
-from maneuver_automaton.cli.looks import LookOptions
+from maneuver_automaton.cli.plan_settings import LookOptions
 from maneuver_automaton.cli.progress import Advance, progress_bar, waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
@@ -119,7 +119,7 @@ def show(file: Path, *, coverage: bool = False, model_text: str | None = None) -
     automaton = automaton_of(file, model_text)
     model, out = automaton.model, console()
     columns = ["", "trim", *model.reduced_names, *model.control_names]
-    columns += _velocity_names(model.group.dof)
+    columns += ["v_x [m/s]", "v_y [m/s]", "turn rate [rad/s]", "v_z [m/s]"][: model.group.dof]
     rows = [
         [
             str(k + 1),
@@ -230,7 +230,3 @@ def few(names: tuple[str, ...]) -> str:
 def _count(automaton: Automaton) -> str:
     counts = {"trim": len(automaton), "maneuver": len(automaton.maneuvers)}
     return ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
-
-
-def _velocity_names(dof: int) -> list[str]:
-    return ["v_x [m/s]", "v_y [m/s]", "turn rate [rad/s]", "v_z [m/s]"][:dof]

@@ -1,24 +1,28 @@
-"""`cache show` and `cache clear`: files that can be made again."""
+"""`cache show`, `cache clear`: files that can be made again; `compile`: kernels made now."""
 
 from __future__ import annotations
 
 import contextlib
 import shutil
+import time
 from pathlib import Path
 
 from maneuver_automaton._cache_files import files_of
+from maneuver_automaton._compile_all import compile_missing
 from maneuver_automaton._kernel_folders import (
     KERNELS,
     kernel_base,
     kernel_folder,
     user_cache_folder,
 )
-from maneuver_automaton.cli.guard import FOUND
+from maneuver_automaton._kernel_list import listed
+from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain
 from maneuver_automaton.cli.inputs import not_written
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.search.cost_to_go import FOLDER, MOST_BYTES
 
 MEGABYTE = 1e6  # [bytes]
+CACHE = "MANEUVER_AUTOMATON_CACHE_DIR"
 
 
 def show() -> int:
@@ -63,3 +67,18 @@ def _what(folder: Path, now: Path | None) -> str:
     if folder.name == FOLDER:
         return f"tables of the cost to go, at most {MOST_BYTES / MEGABYTE:g} MB"
     return "compiled kernels" if folder == now else "compiled kernels of another version"
+
+
+def compile_all(*, jobs: int | None) -> int:
+    """Compile what is missing in the user's cache, and say where it lies."""
+    began = time.perf_counter()
+    failed = compile_missing(jobs=jobs)
+    if failed is None:
+        complain(f"compile: no folder can be written; {CACHE} names another one")
+        return BAD_INPUT
+    for failure in failed:
+        complain(failure)
+    took = time.perf_counter() - began
+    line = f"{len(listed()) - len(failed)} kernels are compiled, after {took:.1f} s: "
+    console().print(f"{line}{kernel_folder()}", soft_wrap=True)
+    return BAD_INPUT if failed else FOUND

@@ -17,10 +17,9 @@ from maneuver_automaton.analysis.report import listed
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.cli.automaton_command import few, report_lines
-from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, problem_of
-from maneuver_automaton.cli.progress import waiting
+from maneuver_automaton.cli.progress import announced, waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.surroundings import parts_of

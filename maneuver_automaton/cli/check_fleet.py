@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from maneuver_automaton.cli.check_command import Finding, of_ends, of_vehicle
-from maneuver_automaton.cli.compiling import announced
-from maneuver_automaton.cli.progress import waiting
+from maneuver_automaton.cli.progress import announced, waiting
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.formats.fleet_json import reason_of
 from maneuver_automaton.problem import Problem

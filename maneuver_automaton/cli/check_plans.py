@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from maneuver_automaton.cli import check_loops
+import numpy as np
+
 from maneuver_automaton.cli.check_command import Finding
-from maneuver_automaton.cli.compiling import announced
+from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.planned import fleet_planned
+from maneuver_automaton.cli.progress import announced
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.fleet import Closest, verify_fleet
+from maneuver_automaton.fleet import Closest, DrivenVerdict, FleetLog, verify_driven, verify_fleet
+from maneuver_automaton.fleet.driven import FINE
 from maneuver_automaton.formats.driven_json import read_closed_loop_document
-from maneuver_automaton.formats.fleet_loop_reading import read_fleet_loop_document
+from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop, read_fleet_loop_document
 from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,
@@ -24,9 +28,13 @@ from maneuver_automaton.formats.plan_json import (
     read_plan_document,
 )
 from maneuver_automaton.planning.verdict import Verdict, verify
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon import within
 
 ENDING = ".json"
 AGREES = 1e-9  # share by which a cost may differ from that of the file
+THERE = 1e-9  # [m, rad] between a start and where a vehicle begins
+NEARER = 1e-6  # [m] by which a distance may be below that of the file
 
 
 def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
@@ -42,7 +50,7 @@ def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
     if path.suffix.lower() != ENDING:
         return None
     if (driven := read_fleet_loop_document(path)) is not None:
-        return check_loops.findings(path, driven, parts)
+        return loop_findings(path, driven, parts)
     document = read_fleet_document(path)
     if document is not None:
         return _of_fleet(path, document, parts)
@@ -128,3 +136,123 @@ def _of_this(path: Path) -> Iterator[None]:
         yield
     except ValueError as error:
         raise InvalidScenario(f"{path}: {error}") from error
+
+
+def loop_findings(
+    path: Path, document: Mapping[str, Any], parts: Parts
+) -> tuple[str, Iterator[Finding]]:
+    """The name of what was driven, and what holds of it.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file is damaged, or the scenario is not that of the loop.
+    """
+    scenario = fleet_planned(path, document, parts)
+    log = load_fleet_loop(path, scenario.fleet)
+    try:
+        with announced():
+            verdict = verify_driven(log)
+        rows = [
+            one
+            for name, problem in zip(log.problem.names, log.problem.problems, strict=True)
+            for one in _vehicle(log, verdict, name, problem, document["vehicles"][name])
+        ]
+        rows += _together(log, verdict, document)
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{path}: {said}") from error
+    return scenario.name, iter(rows)
+
+
+def _vehicle(
+    log: FleetLog, verdict: DrivenVerdict, name: str, problem: Problem, stated: Mapping[str, Any]
+) -> Iterator[Finding]:
+    """Whether it begins and ends where the file says, drove as its model does, and hit nothing."""
+    pieces = list(log.pieces_of(name).values())
+    if not pieces:
+        claims = name in log.arrived_s
+        words = "it was never there" + (", but the file says that it arrived" if claims else "")
+        yield Finding(what=f"{name}: driven", holds=False if claims else None, words=words)
+        return
+    cost = math.fsum(log.costs_of(name).values())
+    off = float(np.abs(pieces[0].start - problem.start).max())
+    clearance = verdict.clearances_m[name]
+    jump = verdict.jumps_m[name]
+    beside = f", moved by disturbances, by {jump:.3g} m at most" if jump > THERE else ""
+    wrong = [
+        said
+        for bad, said in (
+            (off > THERE, f"it begins {off:.3g} beside its start"),
+            (name in verdict.defects, verdict.defects.get(name, "")),
+            (clearance <= 0.0, "an obstacle is hit"),
+            (not _agrees(stated.get("cost"), cost), f"but the file says {stated.get('cost')}"),
+        )
+        if bad
+    ]
+    yield Finding(
+        what=f"{name}: driven",
+        holds=not wrong,
+        worst=None if math.isinf(clearance) else clearance,
+        words="; ".join([f"cost {cost:.9g}{beside}", *wrong]),
+    )
+    yield _ended(log, name, problem, stated)
+
+
+def _ended(log: FleetLog, name: str, problem: Problem, stated: Mapping[str, Any]) -> Finding:
+    """Whether it is at a goal, if the file says so."""
+    pose = np.array(stated["steps"][-1]["vehicle_pose"], dtype=np.float64)
+    driven = next(reversed(log.pieces_of(name).values())).end
+    there = any(within(pose, goal) for goal in problem.goals)
+    what, arrived = f"{name}: goal", log.arrived_s.get(name)
+    if arrived is None:
+        broken = name in log.broken_down
+        return Finding(what=what, holds=None if broken else False, words=str(stated["status"]))
+    off = float(np.abs(pose - driven).max())
+    if off > THERE and not any(within(driven, goal) for goal in problem.goals):
+        return Finding(what=what, holds=False, worst=off, words="what was driven ends elsewhere")
+    words = f"reached at {arrived:.6g} s" if there else "the file says so, but it is elsewhere"
+    return Finding(what=what, holds=there, words=words)
+
+
+def _together(
+    log: FleetLog, verdict: DrivenVerdict, document: Mapping[str, Any]
+) -> Iterator[Finding]:
+    """Whether any two kept apart, and the file says what was measured."""
+    calm = max(verdict.jumps_m.values(), default=0.0) <= THERE
+    near = [row for row in verdict.closest if row.distance_m < log.problem.margin - 2.0 * FINE]
+    for row in near:
+        # Disturbances may use up what plans keep, but not more.
+        yield Finding(
+            what=f"{' and '.join(row.pair)}: apart",
+            holds=False if calm or row.distance_m <= 0.0 else None,
+            worst=row.distance_m,
+            words=f"{row.distance_m:.6g} m at {row.time_s:.5g} s, plans keep "
+            f"{log.problem.margin:g} m",
+        )
+    if not near:
+        nearest = verdict.closest[:1]
+        yield Finding(
+            what="every pair: apart",
+            holds=True,
+            worst=nearest[0].distance_m if nearest else None,
+            words=pair_text(nearest[0]) if nearest else "there is none that comes near",
+        )
+    stated = document["clearance_m"]["between"]
+    if verdict.distance_m < (math.inf if stated is None else stated) - NEARER:
+        yield Finding(
+            what="least distance: as the file says",
+            holds=False,
+            worst=verdict.distance_m,
+            words=f"but the file says {stated}",
+        )
+    broken = len({number for number, _ in log.violations})
+    yield Finding(
+        what="guarantees: as the file says",
+        holds=not broken,
+        words=f"broken in {broken} steps" if broken else "hold in every step",
+    )
+
+
+def _agrees(stated: Any, cost: float) -> bool:
+    return isinstance(stated, int | float) and abs(stated - cost) <= AGREES * max(1.0, abs(cost))

@@ -21,8 +21,8 @@ from maneuver_automaton.cli.inputs import (
     problem_of,
     scenario_of,
 )
-from maneuver_automaton.cli.looks import LookOptions
 from maneuver_automaton.cli.pictures import skip_documentation
+from maneuver_automaton.cli.plan_settings import LookOptions
 from maneuver_automaton.cli.tables import console, print_written
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario

@@ -40,9 +40,12 @@ def design(
     if plot:
         _draw(designed, path.with_suffix(".png"), quiet=quiet)
     if not designed.holds:
+        remedy = "allow longer words (max_trims)"
+        if designed.any_length > designed.within:
+            remedy = "allow more trims (most), or more candidates"
         complain(
             f"{file}: asked for a factor within {designed.within:g}, proven is "
-            f"{designed.factor:.4g}: {_remedy(designed)}"
+            f"{designed.factor:.4g}: {remedy}"
         )
     return FOUND if designed.holds else NO_PLAN
 
@@ -137,10 +140,3 @@ def _of_words(proof: WordsProof) -> list[str]:
         f"goals within {proof.radius:.6g} m, at all headings, to which the shortest path is at "
         f"least {proof.least:.6g} m long",
     ]
-
-
-def _remedy(designed: DesignedLibrary) -> str:
-    """What would help."""
-    if designed.any_length > designed.within:
-        return "allow more trims (most), or more candidates"
-    return "allow longer words (max_trims)"

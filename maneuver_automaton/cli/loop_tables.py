@@ -48,7 +48,9 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
     if disturbed:
         facts["under noise"] = _under_noise(loop, disturbed)
     if loop.problem.obstacles:
-        facts |= {"least clearance": _clearance(loop), "collisions": _collisions(loop)}
+        hits = len({number for number, _ in loop.collisions})
+        said = f"in {hits} step{'' if hits == 1 else 's'}" if hits else "none"
+        facts |= {"least clearance": _clearance(loop), "collisions": said}
     if missing := left_out(loop.problem):
         facts["left out"] = "; ".join(missing)
     facts["written to"] = folder
@@ -101,11 +103,6 @@ def _clearance(loop: ClosedLoop) -> str:
     if least is None:
         return "nothing was driven"
     return f"{least:.4g} m{kept_text(least, loop.problem.margin) if least > 0.0 else ''}"
-
-
-def _collisions(loop: ClosedLoop) -> str:
-    hits = len({number for number, _ in loop.collisions})
-    return f"in {hits} step{'' if hits == 1 else 's'}" if hits else "none"
 
 
 def print_statistics(name: str, statistics: Statistics, *, folder: str) -> None:

@@ -13,17 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command
-from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, problem_of
-from maneuver_automaton.cli.looks import LookOptions
-from maneuver_automaton.cli.progress import progress_bar
+from maneuver_automaton.cli.plan_settings import LookOptions
+from maneuver_automaton.cli.progress import announced, progress_bar
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
     from maneuver_automaton.cli.folder_runs import Row
     from maneuver_automaton.fleet import FleetLog
-    from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance, Statistics
+    from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance
     from maneuver_automaton.scenario import Scenario
     from maneuver_automaton.scenario.schema import Disturbance as DisturbancePart
 
@@ -104,8 +103,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
 
 def drive_folder(folder: Path, out: Path, *, settings: Settings, parts: Parts) -> int:
     """Close the loop of every problem of a folder that has one, each into `out`/STEM."""
-    from maneuver_automaton.cli.folder_runs import check_address, run_folder
-    from maneuver_automaton.cli.folders import problems_in
+    from maneuver_automaton.cli.folder_runs import check_address, problems_in, run_folder
     from maneuver_automaton.cli.plan_command import compile_first
 
     if settings.resume is not None:
@@ -257,12 +255,8 @@ def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -
         from maneuver_automaton.cli.loop_tables import print_statistics
 
         print_statistics(scenario.name, statistics, folder=str(out))
-    return FOUND if _all_well(statistics) else NO_PLAN
-
-
-def _all_well(statistics: Statistics) -> bool:
-    """Whether every loop reached the goal, and none collided."""
-    return all(one.reached and not any(one.collisions) for one in statistics.outcomes)
+    well = all(one.reached and not any(one.collisions) for one in statistics.outcomes)
+    return FOUND if well else NO_PLAN
 
 
 def _in_file(path: Path, error: ValueError) -> InvalidScenario:

@@ -10,13 +10,12 @@ from pathlib import Path
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli import road_command, road_fleets
 from maneuver_automaton.cli.answers import Answer, PlanTask, Task
-from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.folder_runs import Row, check_address, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, problem_of
 from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, skip_documentation
 from maneuver_automaton.cli.plan_settings import Settings
-from maneuver_automaton.cli.progress import waiting
+from maneuver_automaton.cli.progress import announced, waiting
 from maneuver_automaton.errors import InvalidScenario
 
 PICTURES = (
@@ -113,7 +112,7 @@ def plan_folder(
     scheduler: str | None = None,
 ) -> int:
     """Plan every problem of a folder into `out`/STEM, print a table, return the exit code."""
-    from maneuver_automaton.cli.folders import problems_in
+    from maneuver_automaton.cli.folder_runs import problems_in
 
     check_address(scheduler)
     problems = problems_in(folder, parts)

@@ -1,4 +1,4 @@
-"""A bar or a clock on a terminal, nothing elsewhere; never two of them."""
+"""A bar or a clock on a terminal, nothing elsewhere; and why nothing happens for a while."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
+from maneuver_automaton._interrupts import compiler_began, compiler_ended
+from maneuver_automaton.cli.guard import complain
+
 _shown: list[Any] = []  # what rich shows on the terminal: one bar at most
+COMPILING = "compiling kernels, once after installation: this may take a minute ..."
 
 
 class Advance(Protocol):
@@ -96,4 +100,36 @@ def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> 
     clock = Progress(*columns, console=Console(stderr=True), transient=True)
     with _live(clock):
         clock.add_task(what, total=None)
+        yield
+
+
+@contextlib.contextmanager
+def announced(*, quiet: bool = False) -> Iterator[None]:
+    """Print one line when the compiler starts to work inside; loading from the cache is silent.
+
+    The compiler asks for no time limit: while it is at work a signal breaks off. It may show a bar
+    of its own: that of the command is gone meanwhile.
+    """
+    from numba.core import event
+
+    class Announcement(event.Listener):  # type: ignore[misc]
+        said = quiet
+        depth = 0
+
+        def on_start(self, event: Any) -> None:
+            compiler_began()
+            self.depth += 1
+            if self.depth == 1:
+                make_room()
+            if not self.said:
+                complain(COMPILING)
+            self.said = True
+
+        def on_end(self, event: Any) -> None:
+            compiler_ended()
+            self.depth -= 1
+            if self.depth == 0:
+                come_back()
+
+    with event.install_listener("numba:compile", Announcement()):
         yield

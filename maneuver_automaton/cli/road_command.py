@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from maneuver_automaton._interrupts import patient, stopped
-from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
-from maneuver_automaton.cli.progress import progress_bar, waiting
+from maneuver_automaton.cli.progress import announced, progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:

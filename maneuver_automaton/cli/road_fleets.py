@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton.cli.compiling import announced
 from maneuver_automaton.cli.folder_runs import Row
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
 from maneuver_automaton.cli.plan_settings import Settings
-from maneuver_automaton.cli.progress import progress_bar, waiting
+from maneuver_automaton.cli.progress import announced, progress_bar, waiting
 from maneuver_automaton.cli.road_command import TIME_LIMIT
 from maneuver_automaton.errors import InvalidScenario
 

@@ -20,11 +20,10 @@ from rich.text import Text
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from maneuver_automaton.automaton import Plan, Primitive
+    from maneuver_automaton.automaton import Primitive
     from maneuver_automaton.models import Model
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.primitives import Maneuver
-    from maneuver_automaton.problem import Problem
 
 STRAIGHT = 0.01  # [1/m, rad/s] of curvature, or turning on the spot, that is called straight
 TIGHT_M = 1e-3  # [m] a clearance that is smaller is remarked on
@@ -97,6 +96,9 @@ def print_result(name: str, result: PlanResult, *, folder: str, share: bool = Fa
     plan, error = result.plan, result.terminal_error
     if plan is None or result.cost is None or error is None:
         return
+    from maneuver_automaton.costs import Cost
+
+    by_changes = replace(result.problem, cost=Cost(direction_change=1.0))  # what they are alone
     out, automaton = console(), result.problem.automaton
     known = {one.name for one in automaton.maneuvers}
     rows = [
@@ -116,7 +118,7 @@ def print_result(name: str, result: PlanResult, *, folder: str, share: bool = Fa
     facts = {
         "cost": f"{result.cost:.9g}{_bound(result, share=share)}",
         "duration": f"{plan.duration:.9g} s",
-        "turning points": f"{_direction_changes(result.problem, plan)} between forward and reverse",
+        "turning points": f"{round(by_changes.cost_of(plan))} between forward and reverse",
         "clearance": _clearance(result),
         "terminal error": f"{error.position_m:.2g} m, {error.heading_rad:.2g} rad",
         "timing": ", ".join(f"{spoken(k)} {v:.3f} s" for k, v in result.timing_s.items()),
@@ -127,16 +129,12 @@ def print_result(name: str, result: PlanResult, *, folder: str, share: bool = Fa
     print_facts(facts)
     if result.alternatives:
         out.print()
-        _print_alternatives(out, result)
-
-
-def _print_alternatives(out: Console, result: PlanResult) -> None:
-    rows = [
-        [str(k + 1), f"{one.cost:.6g}", f"{one.plan.duration:.6g}", _word(one.plan.word)]
-        for k, one in enumerate(result.alternatives)
-    ]
-    columns = ["", "cost", "duration [s]", "word"]
-    out.print(table("Alternatives", columns, rows, numbers=(0, 1, 2)))
+        rows = [
+            [str(k + 1), f"{one.cost:.6g}", f"{one.plan.duration:.6g}", _word(one.plan.word)]
+            for k, one in enumerate(result.alternatives)
+        ]
+        columns = ["", "cost", "duration [s]", "word"]
+        out.print(table("Alternatives", columns, rows, numbers=(0, 1, 2)))
 
 
 def _bound(result: PlanResult, *, share: bool) -> str:
@@ -247,13 +245,6 @@ def _motion(ahead: float, aside: float, turn: float) -> str:
     if abs(bend) <= STRAIGHT:
         return "at rest" if speed < AT_REST else where
     return f"{where}, {'left' if bend > 0.0 else 'right'}"
-
-
-def _direction_changes(problem: Problem, plan: Plan) -> int:
-    """How often the plan changes between ahead and back: its price, where that is all."""
-    from maneuver_automaton.costs import Cost
-
-    return round(replace(problem, cost=Cost(direction_change=1.0)).cost_of(plan))
 
 
 def spoken(name: str) -> str:
