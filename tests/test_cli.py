@@ -479,7 +479,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def plan(problem: object, *, time_limit: float, alternatives: int, **more: Any) -> PlanResult:
         assert (time_limit, alternatives) == (0.25, 2)
-        assert more == {"gap": None, "watch": None, "on_better": None}
+        assert more == {"gap": None, "watch": None, "on_better": None, "leave": False}
         return PlanResult(
             problem=problem,  # type: ignore[arg-type]
             status=PlanStatus.OUT_OF_BUDGET,
