@@ -26,8 +26,8 @@ from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.trajectory import Trajectory
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
-from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 from maneuver_automaton.search.inside import stays_inside
+from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
 CONTACT = 1e-9  # [m] what is closer touches: places are rounded
