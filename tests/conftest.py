@@ -19,6 +19,7 @@ _kept = Path(__file__).parent.parent / ".pytest_cache"
 _kernels = kernel_folder()
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_kernels.parent if _kernels else _kept / "kernels"))
 os.environ.setdefault("HYPOTHESIS_STORAGE_DIRECTORY", str(_kept / "hypothesis"))
+os.environ.pop("COLUMNS", None)  # pytest's readline sets it for the processes of its workers
 if _kernels is None:  # the user's cache cannot be written, or not be trusted
     kernel_folder.cache_clear()
 

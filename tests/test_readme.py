@@ -177,7 +177,8 @@ def test_commands_run(clone):
 
 
 def test_the_yaml_is_that_of_the_scenario():
-    text, obstacles = blocks("yaml")
+    page = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
+    text, obstacles = blocks("yaml", page)
     assert (ROOT / "scenarios" / "parking.yaml").read_text(encoding="utf-8").endswith(text)
     assert len(scenario_of_text(text + obstacles, name="README").problem.obstacles) == 4
 

@@ -76,12 +76,12 @@ def test_first_plans_keep_room():
     assert turn <= 0.125 + 1e-9
 
 
-def beside_its_goal(by=HERE, *, tolerance=0.2, gap=0.65):
+def beside_its_goal(by=HERE, *, tolerance=0.2, gap=0.65, stays=0.1):
     """One robot stands so near to the goal of another that this may not end there exactly."""
     going = problem_of([0, 0, 0], [4, 0, 0], tolerance=tolerance, margin=TUBE)
     place = [4.0 + gap, 0, 0]
-    stays = problem_of(place, place, tolerance=0.1, margin=TUBE)
-    return FleetProblem([going, stays], names=("a", "b"), margin=0.1).moved(by)
+    standing = problem_of(place, place, tolerance=stays, margin=TUBE)
+    return FleetProblem([going, standing], names=("a", "b"), margin=0.1).moved(by)
 
 
 def test_a_plan_ends_beside_who_stands_at_its_goal():
@@ -104,8 +104,15 @@ def test_a_moved_fleet_ends_beside_the_moved_one():
 
 @pytest.mark.parametrize(("tolerance", "gap"), [(0.0, 0.65), (0.05, 0.6)])
 def test_where_no_place_is_left_there_is_no_plan(tolerance, gap):
-    fleet = beside_its_goal(tolerance=tolerance, gap=gap)
+    fleet = beside_its_goal(tolerance=tolerance, gap=gap, stays=0.0)
     assert "a" not in plan_fleet(fleet, time_limit=60.0, max_rounds=0).plans
+
+
+def test_who_stands_makes_room_within_its_tolerance():
+    fleet = beside_its_goal(tolerance=0.0)
+    plans = plan_fleet(fleet, time_limit=60.0, max_rounds=0).plans
+    assert within(plans["b"].end, fleet.problems[1].goals[0])
+    assert np.hypot(*(plans["b"].end - plans["a"].end)[:2]) >= 0.7
 
 
 def test_noise_at_a_goal_beside_another():
