@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -76,8 +77,11 @@ def rounded(number: float) -> float:
 
 
 def answer(scene: Scene) -> PlanResult:
-    """The plan of a scene."""
-    return ma.plan(scene.problem, time_limit=scene.time_limit)
+    """The plan of a scene, short trims included, as they were when it was recorded."""
+    problem, horizon = scene.problem, scene.problem.horizon
+    if not horizon.min_coast:
+        problem = replace(problem, horizon=replace(horizon, min_coast=0.0))
+    return ma.plan(problem, time_limit=scene.time_limit)
 
 
 @functools.cache
