@@ -52,6 +52,8 @@ def test_parts_heights_and_trims_reach_the_problem():
 @pytest.mark.slow
 def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
     """Each has its own map and body: none makes anything twice, however many there are."""
+    # What all planners load is made before anything is counted.
+    Planner(scenes.differential_robot(1.0, 1.5), obstacles=[Disc(0.5, [6.0, 2.0])])
     made = []
 
     def counted(module, name):
