@@ -102,7 +102,7 @@ class Horizon:
 
     time: float | None = None  # [s] exactly this long; None: free
     max_trims: int | None = None  # rest included; None: no limit
-    min_coast: float = UNSTATED  # [s] of every trim but rest; unstated: 0.02 where hardly dearer
+    min_coast: float = UNSTATED  # [s] of every trim but rest; unstated: 0.02 where hardly costlier
     max_time: float | None = None  # [s] at most, with a free final time
     stay: bool = False  # at the goal for ever, where nothing may pass later, with a free final time
 

@@ -333,7 +333,15 @@ def mpc(
 
 @app.command(epilog=ending("check"))
 @exits
-def check(file: File, with_file: With = None, case: Case = None, model: OwnModel = None) -> int:
+def check(
+    file: File,
+    with_file: With = None,
+    case: Case = None,
+    model: OwnModel = None,
+    leave: Annotated[
+        bool, typer.Option("--leave", help="The plan of one vehicle leaves a start in contact.")
+    ] = False,
+) -> int:
     """Report symmetry, consistency and feasibility, without a plan.
 
     FILE may be a plan.json: its plans are proven again, in the world of the file that they were
@@ -344,7 +352,7 @@ def check(file: File, with_file: With = None, case: Case = None, model: OwnModel
     from maneuver_automaton.cli.inputs import Parts
 
     parts = Parts(beside=with_file, case=case, model=model)
-    return check_command.check_file(file, parts=parts)
+    return check_command.check_file(file, parts=parts, leave=leave)
 
 
 @automaton_app.command("build", epilog=ending("automaton build"))

@@ -43,12 +43,12 @@ class Finding:
     words: str
 
 
-def check_file(path: Path, *, parts: Parts) -> int:
+def check_file(path: Path, *, parts: Parts, leave: bool = False) -> int:
     """Print the report of a problem, of a fleet, or of plans, and return the exit code."""
     from maneuver_automaton.cli import check_fleet, check_plans
     from maneuver_automaton.scenario import Scenario
 
-    if (proven := check_plans.findings(path, parts)) is not None:
+    if (proven := check_plans.findings(path, parts, leave=leave)) is not None:
         return reported(*proven)
     scenario = problem_of(path, parts)
     if not isinstance(scenario, Scenario):

@@ -37,10 +37,13 @@ THERE = 1e-9  # [m, rad] between a start and where a vehicle begins
 NEARER = 1e-6  # [m] by which a distance may be below that of the file
 
 
-def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
+def findings(
+    path: Path, parts: Parts, *, leave: bool = False
+) -> tuple[str, Iterator[Finding]] | None:
     """The name of what was planned, and what holds of the plans of a file; None of no plans.
 
-    The plan of one vehicle needs the file of --with; plans of several name theirs.
+    The plan of one vehicle needs the file of --with, and may `leave` a start in contact; plans of
+    several name theirs.
 
     Raises
     ------
@@ -71,7 +74,7 @@ def findings(path: Path, parts: Parts) -> tuple[str, Iterator[Finding]] | None:
     plan, stated = load_plan(path), read_plan_document(path)
     scenario = scenario_of(parts.beside, replace(parts, beside=None))
     with announced(), _of_this(path):
-        verdict = verify(scenario.problem, plan)
+        verdict = verify(scenario.problem, plan, leave=leave)
     return scenario.name, iter([_plan("plan", verdict, stated.get("cost"))])
 
 

@@ -23,6 +23,8 @@ from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.lattice_goals import nearest_on_lattice
 from maneuver_automaton.search.lattice_worlds import CLEARLY, ends_of, world_around
 
+LEAVES = "`plan --leave`, or plan(problem, leave=True), drives out of what a start touches first"
+
 
 def blocked_ends(problem: Problem) -> PlanResult | None:
     """The verdict, if the start or every goal is out of bounds or touches an obstacle.
@@ -30,16 +32,18 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     Exact, for bodies of any shape; goals are poses, or places of any heading: tolerances are left
     out, and whoever has them must ask again.
     """
-    reason = outside(problem.start, problem.bounds)
+    reason, notes = outside(problem.start, problem.bounds), tuple[str, ...]()
     sure = _surely_free(problem)
     if reason:
         reason = f"the start is outside the bounds: {reason}"
     elif problem.obstacles and not sure[0]:
         said = where_touched(problem, problem.start, problem.start_time)
         said = said or _part_touched(problem, problem.start_trim, problem.start, problem.start_time)
-        reason = f"at the start {said}" if said else ""
+        reason, notes = (f"at the start {said}", (LEAVES,)) if said else ("", ())
     if reason:
-        return PlanResult(problem=problem, status=PlanStatus.START_BLOCKED, reason=reason)
+        return PlanResult(
+            problem=problem, status=PlanStatus.START_BLOCKED, reason=reason, notes=notes
+        )
     reasons = [
         why_goal_blocked(problem, goal, free=free)
         for goal, free in zip(problem.goals, sure[1:], strict=True)

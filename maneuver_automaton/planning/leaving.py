@@ -16,14 +16,14 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import joined
+from maneuver_automaton.automaton.cutting import joined, tail_of
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, runs_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.blocked import where_touched
-from maneuver_automaton.planning.checking import check_plan
+from maneuver_automaton.planning.checking import Checked, Condition, check_plan
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
@@ -43,11 +43,7 @@ def plan_leaving(
 ) -> PlanResult:
     """The plan of a problem whose start touches something, by `plan` from where it is left."""
     deadline = time.perf_counter() + time_limit
-    touched = {
-        k: one
-        for k, one in enumerate(problem.obstacles)
-        if where_touched(replace(problem, obstacles=(one,)), problem.start, problem.start_time)
-    }
+    touched = _touched_at_start(problem)
     if not touched or outside(problem.start, problem.bounds):
         return plan(problem, time_limit=time_limit)
     refused = [
@@ -76,11 +72,9 @@ def plan_leaving(
         if last.plan is None or last.goal_index is None:
             continue
         whole = joined(first, last.plan) if last.plan.trims else first
-        checked = check_plan(others, whole, problem.goals[last.goal_index])
+        checked = check_leaving(problem, whole, problem.goals[last.goal_index])
         if checked.audit is None or not checked.passed:
             continue
-        both = (last.clearance_m, checked.audit.min_clearance_m)
-        apart = min((one for one in both if one is not None), default=None)
         names = [one.name or f"obstacle {k}" for k, one in touched.items()]
         note = (
             f"left the start, which touches {' and '.join(names)} ({contact.depth:.3g} m deep, the "
@@ -97,8 +91,8 @@ def plan_leaving(
             gap=None,
             bound=None,
             certificate=None,
-            clearance_m=apart,
-            audit=replace(checked.audit, min_clearance_m=apart),
+            clearance_m=checked.audit.min_clearance_m,
+            audit=checked.audit,
             improvements=(),
             notes=(*last.notes, note),
         )
@@ -109,6 +103,48 @@ def plan_leaving(
     kept = none.status in (PlanStatus.GOAL_BLOCKED, PlanStatus.OUT_OF_BUDGET)
     status = none.status if kept else PlanStatus.NO_PLAN
     return PlanResult(problem=problem, status=status, reason=said, notes=none.notes)
+
+
+def _touched_at_start(problem: Problem) -> dict[int, AnyObstacle]:
+    return {
+        k: one
+        for k, one in enumerate(problem.obstacles)
+        if where_touched(replace(problem, obstacles=(one,)), problem.start, problem.start_time)
+    }
+
+
+def check_leaving(problem: Problem, plan: Plan, goal: Goal) -> Checked:
+    """As `check_plan`; what is touched at the start may be, until the body is out, never deeper."""
+    touched = _touched_at_start(problem)
+    if not touched or plan.maneuvers or problem.moves or problem.start.size > 3 or problem.parts:
+        return check_plan(problem, plan, goal)
+    rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in touched)
+    checked = check_plan(replace(problem, obstacles=rest), plan, goal)
+    if not checked.passed:
+        return checked
+    begin, out, clear = problem.start, 0.0, False
+    contact = _Contact(problem, [*touched.values()])
+    for trim, lasting in zip(plan.trims, plan.durations.tolist(), strict=True):
+        steps = [(0.0, 0.0, begin, False)]
+        for step in contact.coast(trim, begin, until=lasting):
+            steps.append(step)
+            if step[3]:
+                break
+        after, _, begin, clear = steps[-1]
+        out += after
+        if clear or after < lasting:
+            break
+    if not clear:
+        reason = f"what is touched at the start is touched deeper, or still, {out:.3g} s later"
+        return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
+    at = plan.start_time + out
+    left = replace(problem, start=begin, start_time=at, start_trim=None, horizon=Horizon())
+    later = check_plan(left, tail_of(plan, out), goal)
+    if not later.passed or later.audit is None or checked.audit is None:
+        return later
+    apart = later.audit.min_clearance_m, checked.audit.min_clearance_m
+    least = min((one for one in apart if one is not None), default=None)
+    return replace(checked, audit=replace(checked.audit, min_clearance_m=least))
 
 
 def _blocked(problem: Problem, why: str) -> PlanResult:
@@ -177,7 +213,9 @@ class _Contact:
             found.append(aside or -float(shapely.distance(area.boundary, point)))
         return np.clip(found, -within, within)
 
-    def coast(self, trim: Trim, begin: Array) -> Iterator[tuple[float, float, Array, bool]]:
+    def coast(
+        self, trim: Trim, begin: Array, until: float = math.inf
+    ) -> Iterator[tuple[float, float, Array, bool]]:
         """Time, way of the fastest point, pose, and whether that is clear: while no deeper."""
         speed = float(fastest_point(self.parts, trim.body_velocity[None])[0])
         turn = abs(float(trim.body_velocity[2]))
@@ -185,8 +223,9 @@ class _Contact:
             return
         lasting = min(trim.max_duration, self.within / speed, math.tau / max(turn, TURNS))
         before = self.off(begin, within=self.within)
-        for n in range(1, int(lasting * speed / self.step) + 1):
-            after = n * self.step / speed
+        samples = int(min(lasting, until) * speed / self.step)
+        times = [n * self.step / speed for n in range(1, samples + 1)]
+        for after in [*times, until] if until <= lasting else times:
             here = trim.coast(SE2(begin), after).pose
             off = self.off(here, within=max(-float(before.min()), self.clear) + self.step)
             if (off < np.minimum(before, self.clear) - DEEPER).any():

@@ -11,6 +11,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Audit, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.checking import check_plan
+from maneuver_automaton.planning.leaving import check_leaving
 from maneuver_automaton.problem import Problem
 
 START_TOLERANCE = 1e-9  # [m, rad] between the first pose of the plan and the start, as the audit's
@@ -29,7 +30,7 @@ class Verdict:
     __repr__ = brief
 
 
-def verify(problem: Problem, plan: Plan) -> Verdict:
+def verify(problem: Problem, plan: Plan, *, leave: bool = False) -> Verdict:
     """Check a plan, say of another planner, as `plan` checks its own before it returns one.
 
     In this order, and the first that fails ends it: the start, the horizon and the number of trims,
@@ -43,6 +44,9 @@ def verify(problem: Problem, plan: Plan) -> Verdict:
         Start, goals, body, obstacles, margin, limits, cost.
     plan : Plan
         A word of trims and maneuvers with their durations [s].
+    leave : bool
+        Whether what the start touches may be touched until the body is out of it, never deeper;
+        clearance counts from there. For plans of ``plan(problem, leave=True)``.
 
     Returns
     -------
@@ -83,9 +87,10 @@ def verify(problem: Problem, plan: Plan) -> Verdict:
             f"{problem.start.round(6).tolist()}"
         )
         return Verdict(passed=False, reason=reason, cost=cost, goal_index=nearest[0], audit=None)
+    check = check_leaving if leave else check_plan
     verdicts = []
     for index in nearest:
-        checked = check_plan(problem, plan, problem.goals[index])
+        checked = check(problem, plan, problem.goals[index])
         verdict = Verdict(
             passed=checked.passed,
             reason=checked.reason,

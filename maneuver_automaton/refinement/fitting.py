@@ -27,7 +27,7 @@ CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least
 RESTARTS = 2
 NEAR = 2  # trims on either side of a short one
 SHORT = 0.02  # [s] that a trim lasts, unless the horizon says otherwise ...
-DEARER = 1e-3  # ... or the plan would become dearer by more than this share of its cost
+COSTLIER = 1e-3  # ... or the plan would become costlier by more than this share of its cost
 CLOSED = 1e-12  # [m, rad, s] that an exact end may miss
 
 
@@ -76,7 +76,7 @@ def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:
 def with_lasting_coasts(
     problem: Problem, plan: Plan, goal: Goal, *, is_free: Callable[[Plan], bool]
 ) -> Plan:
-    """The plan without trims of less than 20 ms, as far as that is free and hardly dearer.
+    """The plan without trims of less than 20 ms, as far as that is free and hardly costlier.
 
     Such a trim is left out, or lasts so long; others change as little as they can: all of them,
     those near it, after it, or before it, whatever is free. Where the horizon states a least time,
@@ -94,7 +94,7 @@ def with_lasting_coasts(
     """
     if not isinstance(problem.horizon.min_coast, Unstated):
         return plan
-    most, failed = problem.cost_of(plan) * (1.0 + DEARER), 0
+    most, failed = problem.cost_of(plan) * (1.0 + COSTLIER), 0
     while failed < len(short := _short(plan)):
         away = np.arange(plan.durations.size) - short[failed]
         times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))

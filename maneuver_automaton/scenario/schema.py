@@ -215,7 +215,7 @@ class HorizonPart(Part):
     time_s: Seconds = Field("free", description="exactly this long, or free")
     max_trims: Count | None = Field(None, description="largest number of trims, rest included")
     min_coast_s: NotNegative | None = Field(
-        None, description="shortest time in a trim; omitted: 0.02, unless the plan gets dearer"
+        None, description="shortest time in a trim; omitted: 0.02, unless the plan gets costlier"
     )
     max_time_s: Positive | None = Field(None, description="longest time, when time_s is free")
     stay: bool = Field(

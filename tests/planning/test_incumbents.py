@@ -21,7 +21,7 @@ from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
 from maneuver_automaton.planning.result import LowerBound, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.refinement.fitting import DEARER, SHORT, with_lasting_coasts
+from maneuver_automaton.refinement.fitting import COSTLIER, SHORT, with_lasting_coasts
 
 ROBOT = Automaton.of_controls(
     Unicycle(),
@@ -223,7 +223,7 @@ def test_plans_among_obstacles_have_no_short_trims(seed: int) -> None:
     assert result.plan is not None
     assert before.cost is not None
     assert result.cost is not None
-    assert result.cost <= before.cost * (1.0 + DEARER)
+    assert result.cost <= before.cost * (1.0 + COSTLIER)
     if any(0.0 < time < SHORT for time in result.plan.durations.tolist()):
         # Without it the plan is dear, or misses the goal, or hits something.
         goal = problem.goals[0]

@@ -49,10 +49,16 @@ def left_after(result):
 
 def test_a_start_in_contact_is_left_backwards():
     problem = problem_of(POST)
-    assert ma.plan(problem).status is PlanStatus.START_BLOCKED
+    blocked = ma.plan(problem)
+    assert blocked.status is PlanStatus.START_BLOCKED
+    assert "--leave" in blocked.notes[0]
     result = ma.plan(problem, leave=True)
     assert result.status is PlanStatus.FOUND
     assert result.plan.word[0] == "back"
+    assert not ma.verify(problem, result.plan).passed
+    verdict = ma.verify(problem, result.plan, leave=True)
+    assert verdict.passed
+    assert verdict.audit.min_clearance_m == result.clearance_m
     (note,) = result.notes
     assert note.startswith("left the start, which touches post (0.1 m deep, the margin included), ")
     assert result.audit.passed
@@ -61,6 +67,19 @@ def test_a_start_in_contact_is_left_backwards():
     assert result.terminal_error.position_m < 1e-9
     _, rest = driven(result.plan, left_after(result) + 1e-3)
     assert overlaps(problem, rest)[1].min() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("word", "times"),
+    [(("ahead", "back"), (0.05, 3.0)), (("rest",), (1.0,)), (("back",), (0.05,))],
+    ids=["deeper first", "stays", "not yet out"],
+)
+def test_what_gets_deeper_or_stays_is_refused(word, times):
+    trims = {trim.name: trim for trim in ROBOT.trims}
+    plan = ma.Plan([0.2, 0.0, 0.0], [trims[name] for name in word], durations=times)
+    verdict = ma.verify(problem_of(POST, goal=plan.end), plan, leave=True)
+    assert not verdict.passed
+    assert verdict.reason.startswith("what is touched at the start is touched deeper, or still, ")
 
 
 def test_a_thin_wall_is_not_driven_through():
@@ -188,6 +207,8 @@ def test_a_start_in_a_keep_out_mask_on_the_command_line(tmp_path, capsys):
     assert note in " ".join(capsys.readouterr().out.split())  # it is folded
     assert [one["name"] for one in document["primitives"]] == ["back"]
     assert document["audit"]["passed"] is True
+    check = ["check", str(tmp_path / "out" / "plan.json"), "--with", str(tmp_path / "scene.yaml")]
+    assert (run(check), run([*check, "--leave"])) == (1, 0)
 
 
 @pytest.mark.parametrize("name", ["fleets/airfield.yaml", "road.xml"])

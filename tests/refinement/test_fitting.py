@@ -12,7 +12,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Car
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
-from maneuver_automaton.refinement.fitting import DEARER, SHORT, fitted_plans, with_lasting_coasts
+from maneuver_automaton.refinement.fitting import COSTLIER, SHORT, fitted_plans, with_lasting_coasts
 from maneuver_automaton.search.insertion import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
@@ -93,7 +93,7 @@ def test_a_trim_of_less_than_a_control_period_is_left_out_or_lasts(seed, short, 
         better = with_lasting_coasts(problem, plan, problem.goals[0], is_free=lambda _plan: True)
         assert not any(0.0 < time < SHORT for time in better.durations.tolist())
         assert max(problem.goals[0].off(better.end)) < 1e-9
-        assert problem.cost_of(better) <= problem.cost_of(plan) * (1.0 + DEARER)
+        assert problem.cost_of(better) <= problem.cost_of(plan) * (1.0 + COSTLIER)
         assert not broken_condition(problem, better)
         plans.append(better)
     assert plans[0].word == plans[1].word
