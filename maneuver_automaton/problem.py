@@ -32,6 +32,7 @@ from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.primitives import Maneuver, Trim
 
 _Element: TypeAlias = SE2 | SE2xR | Translations
+MOST_KNOWN = 1 << 14  # maneuvers of a library whose costs are kept
 STANDING = 1e-3  # [m/s] slower is no direction of travel
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
@@ -446,6 +447,8 @@ class Problem:
             return self.cost_of_trims(plan.trims, plan.durations)
         coasting = float(self.rates_of(plan) @ plan.durations)
         maneuvers = sum(self.maneuver_cost(one) for one in plan.maneuvers if one)
+        if not prices_switches(self.cost):
+            return coasting + maneuvers
         driven = [self.velocities_along(one) for one in plan.primitives]
         return coasting + maneuvers + self.cost.switching(np.concatenate(driven))
 
@@ -472,12 +475,19 @@ class Problem:
             return 0.0
         if course is None:
             raise ValueError(f"maneuver {maneuver.name!r}: has no course, so its cost is not known")
-        controls = course.control[:-1]
-        ends = [
-            self.cost.rates(controls, model.body_velocity(states, controls))
-            for states in (course.reduced_state[:-1], course.reduced_state[1:])
-        ]
-        return maneuver.cost_multiplier * float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
+        known = _known_costs(self.automaton, self.cost)
+        entry = known.get(maneuver.name)
+        if entry is None or entry[0] is not maneuver:
+            controls = course.control[:-1]
+            ends = [
+                self.cost.rates(controls, model.body_velocity(states, controls))
+                for states in (course.reduced_state[:-1], course.reduced_state[1:])
+            ]
+            rate = float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
+            entry = maneuver, maneuver.cost_multiplier * rate
+            if len(known) < MOST_KNOWN or maneuver.name in known:
+                known[maneuver.name] = entry
+        return entry[1]
 
     def velocities_along(self, primitive: Primitive) -> Array:
         """Body velocities (n, dof) of a primitive, one for every stretch in one direction."""
@@ -640,6 +650,13 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
     return {
         trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
     }
+
+
+@kept_by_first
+def _known_costs(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Maneuver, float]]:
+    """Maneuvers that were priced, by name; a plan of a library is priced several times."""
+    del automaton, cost  # whoever asks keeps one for each
+    return {}
 
 
 def _as_parts(

@@ -28,18 +28,9 @@ def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Int
     >>> trims_between(library, 0, [1]).tolist()
     [0, 1]
     """
-    from scipy.sparse import csr_array
-
-    classes = automaton.trim_classes  # trims of one class switch at will: a class is a node
-    n = int(classes.max()) + 1
-    ends = [
-        (classes[automaton.index_of(one.source)], classes[automaton.index_of(one.target)])
-        for one in automaton.maneuvers
-    ]
-    sources, targets = np.array(ends, dtype=np.int64).reshape(-1, 2).T
-    graph = csr_array((np.ones(len(ends), dtype=np.int8), (sources, targets)), shape=(n, n))
+    classes, (graph, against) = automaton.trim_classes, _graphs(automaton)
     ahead = _reached(graph, [int(classes[start])])
-    back = _reached(graph.T.tocsr(), sorted({int(classes[goal]) for goal in goals}))
+    back = _reached(against, sorted({int(classes[goal]) for goal in goals}))
     return np.flatnonzero((ahead & back)[classes])
 
 
@@ -51,6 +42,25 @@ def part_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Auto
     goals = sorted(set(goals))
     kept = {start, *goals, *trims_between(automaton, start, goals).tolist()}
     return automaton if len(kept) == len(automaton) else _part(automaton, tuple(sorted(kept)))
+
+
+@kept_by_first
+def _graphs(automaton: Automaton) -> tuple[csr_array, csr_array]:
+    """Which classes of trims maneuvers link, along them and against them.
+
+    Trims of one class switch at will.
+    """
+    from scipy.sparse import csr_array
+
+    classes = automaton.trim_classes
+    n = int(classes.max()) + 1
+    ends = [
+        (classes[automaton.index_of(one.source)], classes[automaton.index_of(one.target)])
+        for one in automaton.maneuvers
+    ]
+    sources, targets = np.array(ends, dtype=np.int64).reshape(-1, 2).T
+    graph = csr_array((np.ones(len(ends), dtype=np.int8), (sources, targets)), shape=(n, n))
+    return graph, graph.T.tocsr()
 
 
 @kept_by_first

@@ -13,8 +13,7 @@ from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice import expanded
-from maneuver_automaton.search.lattice_memory import give_back
+from maneuver_automaton.search.lattice import in_frame_of_problem
 from maneuver_automaton.search.lattice_task import WEIGHT
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.state_lattice import Graph, GraphSearch, graph_of
@@ -33,7 +32,9 @@ def load_state_lattice(problem: Problem, workspace: Workspace) -> bool:
         return True  # which is told without a search
     graph = graph_of(problem, range(len(problem.goals)), workspace.prepared)
     if graph is not None:
-        GraphSearch.of(graph, weight=1.0, budget=UNLIMITED).run(1, 0.0)
+        one = GraphSearch.of(graph, weight=1.0, budget=UNLIMITED)
+        one.run(1, 0.0)
+        one.look_ahead(Budget.from_now(0.0))
     return graph is not None
 
 
@@ -49,10 +50,9 @@ def plan_on_state_lattice(
     open_ends = any(goal.tolerance_m > 0.0 for goal in problem.goals)
     if blocked is not None and (blocked.status is PlanStatus.START_BLOCKED or not open_ends):
         return blocked
-    off = goals_off_lattice(problem)
-    if off is not None:
-        return off
     goals = [k for k, goal in enumerate(problem.goals) if not why_off_lattice(problem, goal)]
+    if not goals:
+        return goals_off_lattice(problem)
     graph = graph_of(problem, goals, workspace.prepared)
     if graph is None:
         return None
@@ -79,7 +79,7 @@ def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, s
     while True:
         exact = _best(found, graph)
         if found.problem.search.show_nodes:
-            nodes = expanded(graph.query, [exact.arrays])
+            nodes = in_frame_of_problem(graph.query, exact.nodes)
         if exact.alive:  # the time, or the number of expansions, is over
             spent = f"{found.budget.seconds:.4g} s and {found.counts['expansions']} expansions"
             late = found.why_unchecked or f"no plan within {spent}"
@@ -128,8 +128,6 @@ def _best(found: Incumbents, graph: Graph) -> GraphSearch:
         chunk = min(2 * chunk, MOST_CHUNK)
         if len(turns) == 1 and settings.improve and not found.plans:
             turns.append(GraphSearch.of(graph, weight=weight, budget=budget))
-    for one in turns:
-        give_back(graph.query.prepared, graph.query.library, one.arrays)
     return exact
 
 

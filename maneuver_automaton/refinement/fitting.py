@@ -92,7 +92,7 @@ def with_lasting_coasts(
     >>> with_lasting_coasts(problem, plan, problem.goals[0], is_free=bool).durations.tolist()
     [2.0]
     """
-    if not isinstance(problem.horizon.min_coast, Unstated):
+    if not isinstance(problem.horizon.min_coast, Unstated) or not _short(plan):
         return plan
     most, failed = problem.cost_of(plan) * (1.0 + COSTLIER), 0
     while failed < len(short := _short(plan)):

@@ -1,12 +1,31 @@
 """A* on a state lattice: nodes are whole numbers, so that no two of them are taken for one.
 
 A node is a column, a row and a state, which is a heading, and the direction of travel where
-changes of it have a price. Rows of nodes are those of `_kernels_nodes`, with the state, the column
-and the row in place of the trim, the gear and the count.
+changes of it have a price. The arrays of a search, `GraphArrays`:
+
+    table (4 p, 2)     hash table of places, as in `_kernels_nodes`: key, 1 << 31 and the place
+    node, least (p, S) of each state at a place: the node, or UNKNOWN, REFUSED (a motion to it hits
+                       something) or SOLID (its pose does); cost of the cheapest motion to it
+    cost, clearance,   (n,), (n,), (n, 5) of each node that was expanded: the cost from a root, the
+    links              clearance of its pose; COLUMN, ROW, STATE, PARENT (-1 for a root), and EDGE,
+                       the number of the root for a root
+    heap_key, heap_item (m,) the open list, a binary heap of motions: the node they begin at times
+                       2^32, and their edge; -1 - r for root r
+    state, found       the numbers named below; `found` holds the least cost of a plan that leaves
+                       the window
+
+The search is lazy: the open list holds motions that were not tested, by the cost to where they end
+and the weighted bound of the cost to go. What is taken from it is tested, and gives a node if it is
+free. So one motion is tested for most nodes, and none for those that are never expanded. Motions
+that are no cheaper than one to the same node are left out, until one to it hits something: then all
+of them are listed.
 
 With a weight of 1 the estimate is consistent, so a node that is expanded has its least cost, and
 the first aim that is expanded the least of all plans. What rests on more than the motions that were
-tested is kept in `found`: the least cost that a plan outside of the window may have.
+tested is kept in `found`.
+
+Source: Cohen, Phillips, Likhachev (2014), *Planning single-arm manipulations with n-arm robots*,
+RSS, for lazy A*; Likhachev, Ferguson (2009) for costs without obstacles as a bound.
 """
 
 from __future__ import annotations
@@ -14,70 +33,78 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._compile import bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_maneuver import edge_inside, edge_proven
-from maneuver_automaton.search._kernels_nodes import (
-    BEGUN,
-    CLEARANCE,
-    CLOSED,
-    COST,
-    COUNT,
-    EXPANSIONS,
-    FOUND,
-    GEAR,
-    GENERATION,
-    GOAL,
-    HEADING,
-    HEAP,
-    N_NODES,
-    NODE,
-    QUERIES,
-    ROOTED,
-    TRIM,
-    X,
-    Y,
-    add_node,
-    node_in,
-    slot_of,
-)
+from maneuver_automaton.search._kernels_nodes import node_in, slot_of
 
 if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.search.lattice_memory import SearchArrays
-    from maneuver_automaton.search.state_lattice import Aims, StateLattice, Tested
+    from maneuver_automaton._arrays import Array, IntArray
+    from maneuver_automaton.search.free_costs import FreeCosts
+    from maneuver_automaton.search.state_lattice import Aims, GraphArrays, StateLattice, Tested
 
-STATE_BITS, ROW_BITS, SHIFT = 8, 22, 40  # of the number of a node, and where its column begins
-MASK = (1 << ROW_BITS) - 1
-FREE, SOLID, RIM = range(3)  # what an edge meets
-CUT = 1  # place in `found` of the least cost of a plan that leaves the window
+ROW_BITS = 32  # of the number of a place; its column is above them
+ITEM_BITS = 32  # of an entry of the open list: its edge; above them its node
+EDGES = (1 << ITEM_BITS) - 1
+SEARCH = 1  # number of each search in its hash table, which no other one uses
+FREE, BLOCKED, RIM = range(3)  # what an edge meets
+UNKNOWN, REFUSED, SOLID = -1, -2, -3  # in place of a node
+COLUMN, ROW, STATE, PARENT, EDGE = range(5)
+(
+    N_NODES,  # nodes expanded
+    N_PLACES,  # places in use
+    HEAP,  # entries of the open list
+    QUERIES,  # motions that were tested
+    FOUND,  # 1 once the last node is an aim, ...
+    AIM,  # this one
+    BEGUN,  # 1 once the roots are pushed
+) = range(7)
 
 
 @inlined_kernel
-def number_of(column: int, row: int, state: int) -> int:
-    """Number of a node; columns and rows 2^22 apart share theirs, farther than any search gets.
-
-    `first_slot` folds its high digits onto the low ones: the gap between row and column keeps those
-    of a neighbourhood apart, which would share rows of the hash table otherwise.
-    """
-    return ((column & MASK) << SHIFT) | ((row & MASK) << STATE_BITS) | state
+def place_in(table: IntArray, column: int, row: int) -> tuple[int, int, int]:
+    """Number of a place, -1 if it has none; its row of the hash table, and its key there."""
+    key = ((column & 0x3FFFFFFF) << ROW_BITS) | (row & 0x3FFFFFFF)
+    slot = slot_of(table, SEARCH, key)
+    return node_in(table, SEARCH, slot), slot, key
 
 
 @inlined_kernel
-def least_to_go(aims: Aims, x: float, y: float, state: int) -> float:
-    """Lower bound of the cost from a place of the lattice [m], in a state, to the nearest aim.
+def place_of(search: GraphArrays, column: int, row: int) -> int:
+    """Number of a place, a new one if it has none."""
+    place, slot, key = place_in(search.table, column, row)
+    if place < 0:
+        place = search.state[N_PLACES]
+        search.state[N_PLACES] += 1
+        search.table[slot, 0], search.table[slot, 1] = key, (SEARCH << 31) | place
+        for k in range(search.node.shape[1]):
+            search.node[place, k], search.least[place, k] = UNKNOWN, math.inf
+    return place
 
-    Each edge costs its displacement at the least price, and a surplus: the least sum of surpluses
+
+@inlined_kernel
+def least_to_go(
+    aims: Aims, free: FreeCosts, cell: float, column: int, row: int, state: int
+) -> float:
+    """Lower bound of the cost from a node to the nearest aim.
+
+    It is the least cost without obstacles where that is known, which is all below `free.most`. Else
+    each edge costs its displacement at the least price, and a surplus: the least sum of surpluses
     from state to state adds to the straight line. So no edge lowers the bound by more than it
     costs.
     """
-    least = math.inf
+    i, j = column - free.column, row - free.row
+    if 0 <= i < free.value.shape[0] and 0 <= j < free.value.shape[1]:
+        known = free.value[i, j, state]
+        if known <= free.most:
+            return known
+    x, y, least = column * cell, row * cell, math.inf
     for g in range(aims.place.shape[0]):
         d_x, d_y = aims.place[g, 0] - x, aims.place[g, 1] - y
         least = min(least, math.sqrt(d_x * d_x + d_y * d_y) - aims.within[g])
-    return float(max(least, 0.0) * aims.per_metre + aims.surplus[state])
+    return max(max(least, 0.0) * aims.per_metre + aims.surplus[state], free.most)
 
 
 @inlined_kernel
@@ -126,7 +153,7 @@ def met_along(
     near: float,
     travel: float,
 ) -> int:
-    """What an edge meets: FREE, a SOLID, or the RIM of the window.
+    """What an edge meets: FREE, BLOCKED, or the RIM of the window.
 
     All of it is at least `near` from any static obstacle, and its path no longer than `travel`. A
     few pieces of its course prove most other edges. Where they do not, all of them are looked at,
@@ -146,111 +173,207 @@ def met_along(
             return FREE
     elif not edge_inside(fine.scene, fine.lib, edge, pose):
         return RIM
-    return FREE if edge_proven(fine.scene, fine.lib, edge, pose, 0.0) >= 0.0 else SOLID
+    return FREE if edge_proven(fine.scene, fine.lib, edge, pose, 0.0) >= 0.0 else BLOCKED
+
+
+@inlined_kernel
+def pose_of(
+    lattice: StateLattice, column: int, row: int, state: int
+) -> tuple[float, float, float, float]:
+    """Pose of a node: it follows from the numbers alone, so that no error adds up along a plan."""
+    u, v, (x, y, turn, c, s) = column * lattice.cell, row * lattice.cell, lattice.frame
+    return x + c * u - s * v, y + s * u + c * v, turn + lattice.heading[state], 0.0
+
+
+@inlined_kernel
+def end_of(
+    search: GraphArrays, lattice: StateLattice, item: int
+) -> tuple[int, int, int, int, int, float]:
+    """Node and edge of an entry of the open list, column, row, state and cost where it ends."""
+    if item < 0:
+        r = -1 - item
+        return -1, r, lattice.roots[r, 0], lattice.roots[r, 1], lattice.roots[r, 2], 0.0
+    node, e = item >> ITEM_BITS, item & EDGES
+    column = search.links[node, COLUMN] + lattice.step[e, 0]
+    row = search.links[node, ROW] + lattice.step[e, 1]
+    return node, e, column, row, lattice.target[e], search.cost[node] + lattice.cost[e]
 
 
 @bare_kernel
 def expand_lattice(
-    search: SearchArrays,
+    search: GraphArrays,
     lattice: StateLattice,
     aims: Aims,
+    free: FreeCosts,
     coarse: Tested,
     fine: Tested,
     weight: float,
     n: int,
     upper_bound: float,
 ) -> int:
-    """Expand up to `n` nodes in the order of their cost and the weighted bound of the cost to go.
+    """Take up to `n` motions in the order of their cost and the weighted bound of the cost to go.
 
     Returns whether it may go on: 1, or 0 once an aim is found or nothing is left that leads to a
     plan cheaper than `upper_bound`.
     """
-    nodes, links, state = search.nodes, search.links, search.state
-    generation = state[GENERATION]
-    c, s = lattice.frame[3], lattice.frame[4]
-    room = nodes.shape[0] - lattice.most_children - 1  # so that one expansion always fits
+    links, state, cell = search.links, search.state, lattice.cell
     if state[BEGUN] == 0:
         state[BEGUN] = 1
-        search.found[CUT] = math.inf
         for r in range(lattice.roots.shape[0]):
             column, row, at = lattice.roots[r, 0], lattice.roots[r, 1], lattice.roots[r, 2]
-            u, v = column * lattice.cell, row * lattice.cell
-            x, y = lattice.frame[0] + c * u - s * v, lattice.frame[1] + s * u + c * v
-            key = number_of(column, row, at)
-            slot = slot_of(search.table, generation, key)
-            ahead = least_to_go(aims, u, v, at)
-            if ahead == math.inf or node_in(search.table, generation, slot) >= 0:
-                continue
-            turn = lattice.frame[2] + lattice.heading[at]
-            # Its clearance, which is not asked for, is 0: nothing rests on that.
-            values = (x, y, turn, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            link = (-1, at, column, row, r, ROOTED)
-            add_node(search, weight, slot, key, values, link, ahead)
+            ahead = least_to_go(aims, free, cell, column, row, at)
+            place = place_of(search, column, row)
+            if ahead < math.inf and search.least[place, at] == math.inf:
+                search.least[place, at] = 0.0
+                push(search.heap_key, search.heap_item, state[HEAP], weight * ahead, -1 - r)
+                state[HEAP] += 1
     for _ in range(n):
-        # The most promising node that is open; one that was reached at less cost since is closed.
-        node = -1
-        while node < 0 and state[HEAP] > 0:
-            # With a weight above 1 the key is no bound, and each node has to be looked at.
-            if weight == 1.0 and search.heap_key[0] >= upper_bound:
-                return 0
-            node = pop(search.heap_key, search.heap_node, state[HEAP])
-            state[HEAP] -= 1
-            if links[node, CLOSED]:
-                node = -1
-        if node < 0:
+        # With a weight above 1 the key is no bound, and each motion has to be looked at.
+        if state[HEAP] == 0 or (weight == 1.0 and search.heap_key[0] >= upper_bound):
             return 0
-        if state[N_NODES] > room:  # the caller widens the arrays, and comes back
-            push(search.heap_key, search.heap_node, state[HEAP], -1.0, node)
-            state[HEAP] += 1
+        # One node always fits: where it might not, the caller widens the arrays, and comes back.
+        if (
+            state[N_NODES] == search.cost.shape[0]
+            or state[N_PLACES] + lattice.most_links > search.node.shape[0]
+            or state[HEAP] + lattice.most_links > search.heap_key.shape[0]
+        ):
             return 1
-        links[node, CLOSED] = 1
-        state[EXPANSIONS] += 1
-        at, column, row = int(links[node, TRIM]), int(links[node, GEAR]), int(links[node, COUNT])
-        aim = aim_at(aims, column * lattice.cell, row * lattice.cell, at)
-        if aim >= 0:
-            state[FOUND], state[NODE], state[GOAL] = 1, node, aim
-            search.found[0] = nodes[node, COST]
-            return 0
-        pose = (nodes[node, X], nodes[node, Y], nodes[node, HEADING], 0.0)
-        for e in range(lattice.first[at], lattice.first[at + 1]):
-            cost, edge = nodes[node, COST] + lattice.cost[e], lattice.edge[e]
-            n_column, n_row = column + lattice.step[e, 0], row + lattice.step[e, 1]
-            target = lattice.target[e]
-            # The order of the tests is that of their price: duplicates, the bound, the motion.
-            key = number_of(n_column, n_row, target)
-            slot = slot_of(search.table, generation, key)
-            old = node_in(search.table, generation, slot)
-            if old >= 0 and (links[old, CLOSED] or nodes[old, COST] <= cost):
-                continue
-            u, v = n_column * lattice.cell, n_row * lattice.cell
-            ahead = least_to_go(aims, u, v, target)
-            if cost + ahead >= upper_bound:
-                continue
-            # The pose follows from the numbers alone: no error adds up along a plan.
-            x, y = lattice.frame[0] + c * u - s * v, lattice.frame[1] + s * u + c * v
-            there = (x, y, lattice.frame[2] + lattice.heading[target], 0.0)
-            # A pose that touches something ends no edge: it is looked at once, and left closed.
-            clearance = nodes[old, CLEARANCE] if old >= 0 else clearance_at(fine, there)
+        item = pop(search.heap_key, search.heap_item, state[HEAP])
+        state[HEAP] -= 1
+        parent, e, column, row, at, cost = end_of(search, lattice, item)
+        place = place_of(search, column, row)
+        known = search.node[place, at]
+        if known >= 0 or known == SOLID:
+            continue  # a cheaper motion led there, or none can
+        clearance = 0.0  # that of a root is not asked for: nothing rests on it
+        if item >= 0:
+            there = pose_of(lattice, column, row, at)
+            clearance = clearance_at(fine, there)
             if clearance <= fine.scene.margin:
-                node_new = state[N_NODES]
-                nodes[node_new, COST], links[node_new, CLOSED] = -math.inf, 1
-                search.table[slot, 0], search.table[slot, 1] = key, (generation << 31) | node_new
-                state[N_NODES] += 1
+                search.node[place, at] = SOLID
                 continue
             # No point of the body moves farther than `edge_reach`: where it has moved by t of that,
             # its clearance is at least the first less t, and the last less the rest.
-            first, reach = nodes[node, CLEARANCE], coarse.lib.edge_reach[edge]
+            edge, first = lattice.edge[e], search.clearance[parent]
+            reach = coarse.lib.edge_reach[edge]
             near = max(0.5 * (first + clearance - reach), max(first, clearance) - reach)
+            begin = there
+            if lattice.sign > 0:
+                begin = pose_of(
+                    lattice, links[parent, COLUMN], links[parent, ROW], links[parent, STATE]
+                )
             state[QUERIES] += 1
-            begin = pose if lattice.sign > 0 else there
             met = met_along(coarse, fine, edge, begin, near, lattice.travel[e])
-            if met == RIM:
-                search.found[CUT] = min(search.found[CUT], cost + ahead)
             if met != FREE:
+                ahead = least_to_go(aims, free, cell, column, row, at)
+                if met == RIM:
+                    search.found[0] = min(search.found[0], cost + ahead)
+                if known == UNKNOWN:
+                    search.node[place, at] = REFUSED
+                    push_others(search, lattice, weight, item, column, row, at, ahead)
                 continue
-            if old >= 0:
-                links[old, CLOSED] = 1
-            values = (x, y, there[2], 0.0, cost, 0.0, 0.0, 0.0, clearance)
-            link = (node, target, n_column, n_row, 0, e)
-            add_node(search, weight, slot, key, values, link, ahead)
+        node = state[N_NODES]
+        state[N_NODES] += 1
+        search.node[place, at] = node
+        search.cost[node], search.clearance[node] = cost, clearance
+        links[node, COLUMN], links[node, ROW], links[node, STATE] = column, row, at
+        links[node, PARENT], links[node, EDGE] = parent, e
+        aim = aim_at(aims, column * cell, row * cell, at)
+        if aim >= 0:
+            state[FOUND], state[AIM] = 1, aim
+            return 0
+        for e in range(lattice.first[at], lattice.first[at + 1]):
+            n_cost, target = cost + lattice.cost[e], lattice.target[e]
+            n_column, n_row = column + lattice.step[e, 0], row + lattice.step[e, 1]
+            place = place_of(search, n_column, n_row)
+            known = search.node[place, target]
+            if known >= 0 or known == SOLID:
+                continue
+            if known == UNKNOWN and n_cost >= search.least[place, target]:
+                continue
+            ahead = least_to_go(aims, free, cell, n_column, n_row, target)
+            if n_cost + ahead >= upper_bound:
+                continue
+            search.least[place, target] = n_cost
+            key = n_cost + weight * ahead
+            push(search.heap_key, search.heap_item, state[HEAP], key, (node << ITEM_BITS) | e)
+            state[HEAP] += 1
     return 1
+
+
+@bare_inner_kernel
+def push_others(
+    search: GraphArrays,
+    lattice: StateLattice,
+    weight: float,
+    item: int,
+    column: int,
+    row: int,
+    at: int,
+    ahead: float,
+) -> None:
+    """List all motions from nodes that were expanded to one, but for one of them."""
+    # Some of them are listed already. To test these once more costs little.
+    for k in range(lattice.into_first[at], lattice.into_first[at + 1]):
+        e = lattice.into_edge[k]
+        place, _, _ = place_in(search.table, column - lattice.step[e, 0], row - lattice.step[e, 1])
+        if place < 0:
+            continue
+        node = search.node[place, lattice.source[e]]
+        other = (node << ITEM_BITS) | e
+        if node >= 0 and other != item:
+            key = search.cost[node] + lattice.cost[e] + weight * ahead
+            push(search.heap_key, search.heap_item, search.state[HEAP], key, other)
+            search.state[HEAP] += 1
+
+
+@bare_kernel
+def rank_anew(
+    search: GraphArrays, lattice: StateLattice, aims: Aims, free: FreeCosts, weight: float
+) -> None:
+    """Order the open list by another bound of the cost to go."""
+    # What was expanded has its least cost by the former bound, which was consistent too.
+    for k in range(search.state[HEAP]):
+        item = search.heap_item[k]
+        _, _, column, row, at, cost = end_of(search, lattice, item)
+        key = cost + weight * least_to_go(aims, free, lattice.cell, column, row, at)
+        push(search.heap_key, search.heap_item, k, key, item)  # the first k are in order
+
+
+@bare_kernel
+def grow_free_costs(
+    lattice: StateLattice,
+    free: FreeCosts,
+    heap_key: Array,
+    heap_item: IntArray,
+    state: IntArray,
+    most: float,
+    n: int,
+) -> None:
+    """Settle up to `n` nodes whose least cost to the sources without obstacles is at most `most`.
+
+    Dijkstra against the edges. Entries of the heap are places in `free.value`, `state` (2,) is how
+    many there are, and how many nodes are settled. The caller widens a heap that is full.
+    """
+    columns, rows, states = free.value.shape
+    for _ in range(n):
+        if state[0] == 0 or heap_key[0] > most or state[0] + lattice.most_links > len(heap_key):
+            return
+        spent = heap_key[0]
+        item = pop(heap_key, heap_item, state[0])
+        state[0] -= 1
+        at, place = item % states, item // states
+        i, j = place // rows, place % rows
+        if spent > free.value[i, j, at]:
+            continue
+        state[1] += 1
+        for k in range(lattice.into_first[at], lattice.into_first[at + 1]):
+            e = lattice.into_edge[k]
+            a, b = i - lattice.step[e, 0], j - lattice.step[e, 1]
+            if not (0 <= a < columns and 0 <= b < rows):
+                continue
+            source, cost = lattice.source[e], spent + lattice.cost[e]
+            if cost < free.value[a, b, source]:
+                free.value[a, b, source] = cost
+                push(heap_key, heap_item, state[0], cost, (a * rows + b) * states + source)
+                state[0] += 1

@@ -8,6 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import group_of
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Bounds
 
@@ -25,11 +26,12 @@ def stays_inside(plan: Plan, bounds: Bounds) -> bool:
     """Whether every pose of a plan is inside the bounds, extreme points of arcs included."""
     if bounds.x is None and bounds.y is None and bounds.z is None:
         return True
-    times = [plan.switching_times]
+    times, begins, along = list[Array](), list[Array](), list[Array]()
     for k, primitive in enumerate(plan.primitives):
         if isinstance(primitive, Maneuver):
             if primitive.course is not None:
-                times.append(plan.switching_times[k] + primitive.course.time)
+                along.append(primitive.course.pose)
+                begins.append(np.tile(plan.switching_poses[k], (len(along[-1]), 1)))
             continue
         v_x, v_y, turn_rate = primitive.body_velocity[:3]
         duration = plan.primitive_durations[k]
@@ -40,7 +42,13 @@ def stays_inside(plan: Plan, bounds: Bounds) -> bool:
             last = math.floor(max(heading, heading + turn_rate * duration) / quarter)
             angles = np.arange(first, last + 1) * quarter
             times.append(plan.switching_times[k] + (angles - heading) / turn_rate)
-    poses = plan.pose_at(np.concatenate(times))
+    known = [plan.switching_poses]
+    if along:  # all courses at once
+        group = group_of(plan.start.size)
+        known.append((group(np.concatenate(begins)) @ group(np.concatenate(along))).pose)
+    if times:
+        known.append(plan.pose_at(np.concatenate(times)))
+    poses = np.concatenate(known)
     slack = 1e-9 * (1.0 + float(np.abs(poses).max()))
     for index, pair in ((0, bounds.x), (1, bounds.y), (3, bounds.z)):
         if pair is not None and index < poses.shape[1]:

@@ -238,7 +238,11 @@ def expanded(query: LatticeQuery, searches: Iterable[SearchArrays]) -> Array:
         closed = (one.links[:n, layout.CLOSED] == 1) & np.isfinite(one.nodes[:n, layout.COST])
         shown = [layout.X, layout.Y, layout.HEADING, layout.COST]
         rows.append(one.nodes[:n][closed][:, shown])
-    nodes = np.concatenate(rows)
+    return in_frame_of_problem(query, np.concatenate(rows))
+
+
+def in_frame_of_problem(query: LatticeQuery, nodes: Array) -> Array:
+    """Poses and costs (n, 4) seen from the world's frame, with poses as the problem sees them."""
     turned = SE2(np.array([0.0, 0.0, query.world.frame[2]])) @ SE2(nodes[:, :3])
     poses = turned.pose.copy()
     poses[:, :2] += query.world.frame[:2]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
@@ -87,13 +87,22 @@ def nodes_within(problem: Problem, goal: Goal) -> list[Goal]:
     if nearest is None or not headings:
         return []
     turn = float(problem.start[2]) - model.heading(problem.first_trim.reduced_state)
-    most = math.ceil(goal.tolerance_m / model.resolution) + 1
-    steps = np.stack(np.meshgrid(*[np.arange(-most, most + 1.0)] * 2), axis=-1).reshape(-1, 2)
-    places = nearest.pose[:2] + np.asarray(SE2(facing(turn)).act(steps * model.resolution))
-    off = np.hypot(*(places - goal.pose[:2]).T)
+    lattice = SE2(np.append(problem.start[:2], turn))
+    place = (lattice.inverse() @ SE2(goal.pose)).pose[:2]
     slack = EXACT * (1.0 + float(np.abs(goal.pose[:2]).max()))
-    order = [k for k in np.argsort(off, kind="stable") if off[k] <= goal.tolerance_m + slack]
+    cells = cells_within(place, goal.tolerance_m + slack, model.resolution)
+    places = np.asarray(lattice.act(cells * model.resolution))
+    order = np.argsort(np.hypot(*(places - goal.pose[:2]).T), kind="stable").tolist()
     return [replace(one, pose=np.append(places[k], one.pose[2])) for k in order for one in headings]
+
+
+def cells_within(place: Array, within: float, cell: float) -> IntArray:
+    """Columns and rows (n, 2) of a lattice, seen from its frame, within a distance of a place."""
+    low, high = np.ceil((place - within) / cell), np.floor((place + within) / cell)
+    columns, rows = (np.arange(a, b + 1.0) for a, b in zip(low, high, strict=True))
+    grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
+    near: IntArray = grid[np.hypot(*(grid * cell - place).T) <= within].astype(np.int64)
+    return near
 
 
 def poses_aimed_at(problem: Problem, goal: Goal) -> Array:

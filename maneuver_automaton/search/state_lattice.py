@@ -26,15 +26,11 @@ from maneuver_automaton.models import OnLattice
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
+from maneuver_automaton.search.free_costs import UNKNOWN, FreeCosts, FreeTable
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, LatticeLibrary
-from maneuver_automaton.search.lattice_goals import EXACT, at_headings, facing
+from maneuver_automaton.search.lattice_goals import EXACT, at_headings, cells_within, facing
 from maneuver_automaton.search.lattice_library import library_of_trims
-from maneuver_automaton.search.lattice_memory import (
-    SearchArrays,
-    arrays_for,
-    room_takes,
-    with_room,
-)
+from maneuver_automaton.search.lattice_memory import GROWN_S
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.prepared import Prepared
@@ -45,9 +41,13 @@ from maneuver_automaton.words.word import Word
 CLOSE = 1e-6  # [half widths of the body] by which pieces of courses may be off
 MARGIN = 2e-5  # [m] what is nearer to a solid touches it; as fine as the checks of a plan
 MOST_ROOTS = 1 << 16  # nodes at the goals that a search begins from
-MOST_STATES = 256  # of which nodes have numbers of their own
-FIRST_CHUNK = 64  # expansions
-USUAL_CHILDREN = 4  # of a node: where there are more, the arrays are widened again
+MOST_STATES = 256  # at a place, which has room for all of them
+FIRST_CHUNK = 512  # motions
+SMALLEST = 2048  # nodes and places, and eight times as many motions
+MOST_TABLES = 64  # of costs without obstacles, of one library
+# Expansions after which costs without obstacles are looked up, and of how many nodes at most. To
+# know many takes as long as a search, so that they have to wait until it is long.
+STAGES = (1 << 10, 1 << 14), (1 << 12, 1 << 16), (1 << 14, 1 << 18)
 
 
 class StateLattice(NamedTuple):
@@ -63,8 +63,26 @@ class StateLattice(NamedTuple):
     cost: Array  # (E,)
     edge: IntArray  # (E,) in the arrays of the library
     travel: Array  # (E,) [m] length of the path of the pose, or more
-    most_children: int
+    source: IntArray  # (E,)
+    into_first: IntArray  # (S + 1,) where the edges that lead to each state begin ...
+    into_edge: IntArray  # (E,) ... in this list of them
+    most_links: int  # edges of a state that lead away, or those that lead to it
     roots: IntArray  # (R, 3) column, row, state
+
+
+class GraphArrays(NamedTuple):
+    """Arrays of a search, as in `_kernels_state_lattice`."""
+
+    table: IntArray  # (4 p, 2)
+    node: NDArray[np.int32]  # (p, S)
+    least: Array  # (p, S)
+    cost: Array  # (n,)
+    clearance: Array  # (n,)
+    links: NDArray[np.int32]  # (n, 5)
+    heap_key: Array  # (m,)
+    heap_item: IntArray  # (m,)
+    state: IntArray  # (7,)
+    found: Array  # (1,)
 
 
 class Aims(NamedTuple):
@@ -94,6 +112,7 @@ class Graph:
     coarse: Tested
     fine: Tested
     goal_index: tuple[int, ...]  # (G,) which of the problem's goals the aims are
+    tables: dict[tuple[int, bytes], FreeTable]  # of costs without obstacles, by sign and aims
     surcharge: float  # that each edge has and a plan has once less: the price of a switch
 
     def widened(self) -> Graph:
@@ -111,24 +130,24 @@ class Graph:
     def backwards(self) -> Graph | None:
         """The search from the goals to the start; None if they hold too many nodes to list."""
         ahead, aims = self.lattice, self.aims
-        source = np.repeat(np.arange(len(ahead.heading)), np.diff(ahead.first))
-        order = np.argsort(ahead.target, kind="stable")
-        counts = np.bincount(ahead.target, minlength=len(ahead.heading))
-        roots = _nodes_within(aims, ahead.cell)
+        roots = nodes_within(aims, ahead.cell)
         if roots is None:
             return None
-        at = ahead.roots[0]
+        at, order = ahead.roots[0], ahead.into_edge
         admits = np.zeros((1, len(ahead.heading)), dtype=np.bool_)
         admits[0, at[2]] = True
+        into_first, into_edge = _by_state(ahead.source[order], len(ahead.heading))
         lattice = ahead._replace(
             sign=-1,
-            first=np.concatenate([[0], np.cumsum(counts)]),
-            target=source[order],
+            first=ahead.into_first,
+            target=ahead.source[order],
             step=-ahead.step[order],
             cost=ahead.cost[order],
             edge=ahead.edge[order],
             travel=ahead.travel[order],
-            most_children=int(counts.max(initial=0)),
+            source=ahead.target[order],
+            into_first=into_first,
+            into_edge=into_edge,
             roots=roots[:, :3].copy(),
         )
         start = Aims(
@@ -167,7 +186,7 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
     states = prepared.once(_states, query.library, fine, problem.setting)
     if states is None:
         return None
-    lattice, of_trim, surcharge = states
+    lattice, of_trim, surcharge, tables = states
     begun = query.start_trim
     turn = float(query.start[2]) - float(lattice.heading[of_trim[begun][0]])
     x, y = query.start[:2].tolist()
@@ -184,6 +203,7 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
         coarse=Tested(query.library.arrays, query.around),
         fine=Tested(fine.arrays, scene),
         goal_index=tuple(goals),
+        tables=tables,
         surcharge=surcharge,
     )
 
@@ -196,8 +216,11 @@ def _followed(library: LatticeLibrary, cost: Cost) -> LatticeLibrary:
 
 def _states(
     library: LatticeLibrary, fine: LatticeLibrary, problem: Problem
-) -> tuple[StateLattice, list[IntArray], float] | None:
-    """Graph (three states a heading where directions are priced), states of trims, switch price."""
+) -> tuple[StateLattice, list[IntArray], float, dict[tuple[int, bytes], FreeTable]] | None:
+    """Graph (three states a heading where directions are priced), states of trims, switch price.
+
+    And where tables of costs without obstacles are kept.
+    """
     arrays, automaton, cost = library.arrays, library.priced.automaton, problem.cost
     model = automaton.lattice
     assert isinstance(model, OnLattice)
@@ -229,7 +252,8 @@ def _states(
             )
     rows.sort(key=lambda row: row[:1])
     begins, targets, edges = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
-    counts = np.bincount(begins, minlength=directed * len(heading))
+    first, _ = _by_state(begins, directed * len(heading))
+    into_first, into_edge = _by_state(targets, directed * len(heading))
     along = fine.arrays
     lengths = along.piece_speed * along.piece_time + 2.0 * along.piece_error
     pose_pieces = along.first_piece[along.n_parts * len(along.edge_cost) : -1]
@@ -238,17 +262,26 @@ def _states(
         frame=(0.0, 0.0, 0.0, 1.0, 0.0),
         sign=1,
         heading=np.repeat(heading, directed),
-        first=np.concatenate([[0], np.cumsum(counts)]),
+        first=first,
         target=np.ascontiguousarray(targets),
         step=step[edges].astype(np.int64),
         cost=np.array([row[3] for row in rows], dtype=np.float64),
         edge=np.ascontiguousarray(edges),
         travel=np.add.reduceat(np.append(lengths, 0.0), pose_pieces)[edges],
-        most_children=int(counts.max(initial=0)),
+        source=np.ascontiguousarray(begins),
+        into_first=into_first,
+        into_edge=into_edge,
+        most_links=int(max(np.diff(first).max(), np.diff(into_first).max())),
         roots=np.zeros((0, 3), dtype=np.int64),
     )
     of_trim = [np.arange(directed) + directed * k for k in range(len(heading))]
-    return lattice, of_trim, float(cost.switch)
+    return lattice, of_trim, float(cost.switch), {}
+
+
+def _by_state(state: IntArray, n: int) -> tuple[IntArray, IntArray]:
+    """Where the edges of each state begin (n + 1,) in a list (E,) of all, which is the second."""
+    counts = np.bincount(state, minlength=n)
+    return np.concatenate([[0], np.cumsum(counts)]), np.argsort(state, kind="stable")
 
 
 def _aims(problem: Problem, goals: Sequence[int], world: SE2, lattice: StateLattice) -> Aims:
@@ -281,29 +314,25 @@ def _aims(problem: Problem, goals: Sequence[int], world: SE2, lattice: StateLatt
 
 def _surplus(lattice: StateLattice, per_metre: float, admits: NDArray[np.bool_]) -> Array:
     """Least sum (S,) of what edges cost beyond their displacement, from each state to an aim's."""
-    source = np.repeat(np.arange(len(lattice.heading)), np.diff(lattice.first))
     moved = lattice.cell * np.hypot(*lattice.step.T)
     beyond = np.maximum(lattice.cost - per_metre * moved, 0.0)
     least = np.where(admits.any(axis=0), 0.0, np.inf)
     for _ in range(len(least)):
         before = least.copy()
-        np.minimum.at(least, source, beyond + least[lattice.target])
+        np.minimum.at(least, lattice.source, beyond + least[lattice.target])
         if np.array_equal(before, least):
             break
     return least
 
 
-def _nodes_within(aims: Aims, cell: float) -> IntArray | None:
+def nodes_within(aims: Aims, cell: float) -> IntArray | None:
     """Nodes (R, 4) that aims hold, and the number of the aim; None if there are too many."""
     found = []
     for g, (place, within) in enumerate(zip(aims.place, aims.within.tolist(), strict=True)):
-        low, high = np.ceil((place - within) / cell), np.floor((place + within) / cell)
-        if np.prod(np.maximum(high - low + 1.0, 0.0)) * aims.admits.shape[1] > MOST_ROOTS:
-            return None
-        columns, rows = (np.arange(a, b + 1.0) for a, b in zip(low, high, strict=True))
-        grid = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-        near = grid[np.hypot(*(grid * cell - place).T) <= within].astype(np.int64)
         states = np.flatnonzero(aims.admits[g])
+        if (2.0 * within / cell + 1.0) ** 2 * len(states) > MOST_ROOTS:
+            return None
+        near = cells_within(place, within, cell)
         aim = np.full(len(near) * len(states), g)
         rows_of = np.repeat(near, len(states), axis=0)
         found.append(np.column_stack([rows_of, np.tile(states, len(near)), aim]))
@@ -316,35 +345,51 @@ class GraphSearch:
 
     graph: Graph
     weight: float
-    arrays: SearchArrays
+    arrays: GraphArrays
     pace: Pace
+    free: FreeCosts = UNKNOWN
+    stage: int = 0  # of those in which more of these costs are known
     alive: bool = True
     is_late: bool = False  # no time is left to make room for more nodes
 
     @classmethod
     def of(cls, graph: Graph, *, weight: float, budget: Budget) -> GraphSearch:
         """A search that is ready to run."""
-        room = len(graph.lattice.roots) + graph.lattice.most_children + 2
-        arrays = arrays_for(graph.query.prepared, graph.query.library, room)
+        n = SMALLEST
+        while n < len(graph.lattice.roots) + graph.lattice.most_links:
+            n *= 2
+        states = len(graph.lattice.heading)
+        arrays = GraphArrays(
+            table=np.zeros((4 * n, 2), dtype=np.int64),
+            node=np.empty((n, states), dtype=np.int32),
+            least=np.empty((n, states)),
+            cost=np.empty(n),
+            clearance=np.empty(n),
+            links=np.empty((n, 5), dtype=np.int32),
+            heap_key=np.empty(8 * n),
+            heap_item=np.empty(8 * n, dtype=np.int64),
+            state=np.zeros(7, dtype=np.int64),
+            found=np.full(1, np.inf),
+        )
         return cls(graph, weight, arrays, Pace(budget, FIRST_CHUNK))
 
     @property
     def expansions(self) -> int:
         """Nodes expanded so far."""
-        return int(self.arrays.state[layout.EXPANSIONS])
+        return int(self.arrays.state[kernels.N_NODES])
 
     @property
     def queries(self) -> int:
         """Motions that were tested."""
-        return int(self.arrays.state[layout.QUERIES])
+        return int(self.arrays.state[kernels.QUERIES])
 
     @property
     def cost(self) -> float:
         """Cost of the path that was found; inf if none is."""
-        found = bool(self.arrays.state[layout.FOUND])
-        nodes = self.arrays.nodes[self.arrays.state[layout.NODE]]
-        price = self.graph.surcharge if found and nodes[layout.COST] > 0.0 else 0.0
-        return float(self.arrays.found[0]) - price if found else math.inf
+        if not self.arrays.state[kernels.FOUND]:
+            return math.inf
+        cost = float(self.arrays.cost[self.expansions - 1])
+        return cost - self.graph.surcharge if cost > 0.0 else cost
 
     @property
     def cut(self) -> float:
@@ -352,52 +397,106 @@ class GraphSearch:
         bounds = self.graph.query.problem.bounds
         if bounds.x is not None or bounds.y is not None:
             return math.inf
-        return float(self.arrays.found[kernels.CUT]) - self.graph.surcharge
+        return float(self.arrays.found[0]) - self.graph.surcharge
 
     @property
     def least_open(self) -> float:
         """No plan costs less, of a search with the weight 1 that has not come to its end."""
-        begun = self.arrays.state[layout.BEGUN] and self.arrays.state[layout.HEAP]
+        begun = self.arrays.state[kernels.BEGUN] and self.arrays.state[kernels.HEAP]
         return max(float(self.arrays.heap_key[0]) - self.graph.surcharge, 0.0) if begun else 0.0
+
+    @property
+    def nodes(self) -> Array:
+        """Poses (n, 4) of the nodes that were expanded, seen from the world's frame, and costs."""
+        lattice, n = self.graph.lattice, self.expansions
+        column, row, state = self.arrays.links[:n, :3].T
+        flat = np.column_stack([column * lattice.cell, row * lattice.cell, lattice.heading[state]])
+        poses = (SE2(np.array(lattice.frame[:3])) @ SE2(flat)).pose
+        return np.column_stack([poses, self.arrays.cost[:n]])
 
     def run(self, n: int, upper_bound: float) -> None:
         """Expand up to `n` more nodes, as long as they lead to less than a cost."""
         last = self.expansions + n
-        upper_bound += self.graph.surcharge
+        graph = self.graph
         self.pace.go_on(self.pace.budget)
-        while self.alive and (step := self.pace.take(last - self.expansions)):
-            used = int(self.arrays.state[layout.N_NODES])
-            most = used + USUAL_CHILDREN * step + self.graph.lattice.most_children + 2
-            self.is_late = room_takes(self.arrays, most) > self.pace.budget.left
-            if self.is_late:
+        while self.alive and self.expansions < last:
+            until = STAGES[self.stage][0] if self.stage < len(STAGES) else last
+            if self.expansions >= until:
+                self.look_ahead(self.pace.budget)
+                continue
+            step = self.pace.take(min(until, last) - self.expansions)
+            if not step or not self._makes_room():
                 return
-            self.arrays = with_room(self.arrays, most)
-            graph = self.graph
             self.alive = bool(
                 kernels.expand_lattice(
                     self.arrays,
                     graph.lattice,
                     graph.aims,
+                    self.free,
                     graph.coarse,
                     graph.fine,
                     self.weight,
                     step,
-                    upper_bound,
+                    upper_bound + graph.surcharge,
                 )
             )
-            if self.expansions >= last:
-                return
+
+    def look_ahead(self, budget: Budget) -> None:
+        """Find more of the costs without obstacles, and order the open list by them."""
+        graph, most = self.graph, STAGES[self.stage][1]
+        self.stage += 1
+        nodes = nodes_within(graph.aims, graph.lattice.cell)
+        if nodes is None or not (len(nodes) and graph.aims.per_metre):
+            return
+        # By symmetry the table of an aim is that of all that look like it.
+        base = nodes[0, :2].copy()
+        nodes[:, :2] -= base
+        sources = np.ascontiguousarray(nodes[:, :3])
+        key = graph.lattice.sign, sources.tobytes()
+        if key not in graph.tables:
+            while len(graph.tables) >= MOST_TABLES:
+                graph.tables.pop(next(iter(graph.tables)), None)
+            graph.tables[key] = FreeTable(graph.lattice, sources, graph.aims.per_metre)
+        roots = graph.lattice.roots.copy()
+        roots[:, :2] -= base
+        self.free = graph.tables[key].around(roots, base, most, budget)
+        kernels.rank_anew(self.arrays, graph.lattice, graph.aims, self.free, self.weight)
+
+    def _makes_room(self) -> bool:
+        """Widen the arrays that are full; whether there is time to do so."""
+        one, most = self.arrays, self.graph.lattice.most_links
+        nodes, places, queued = one.state[: kernels.HEAP + 1].tolist()
+        wider = {}
+        n, p, m = len(one.cost), len(one.node), len(one.heap_key)
+        if n == nodes:
+            self.is_late = GROWN_S * n > self.pace.budget.left
+            wider |= {"cost": 2 * n, "clearance": 2 * n, "links": 2 * n}
+        if p < places + most:
+            wider |= {"node": 2 * p, "least": 2 * p}
+            table = np.zeros((8 * p, 2), dtype=np.int64)
+            layout.rehash(one.table, kernels.SEARCH, table)
+            self.arrays = self.arrays._replace(table=table)
+        if m < queued + most:
+            wider |= {"heap_key": 2 * m, "heap_item": 2 * m}
+        if self.is_late:
+            return False
+        for name, size in wider.items():
+            array = getattr(one, name)
+            room = np.empty((size, *array.shape[1:]), dtype=array.dtype)
+            room[: len(array)] = array
+            self.arrays = self.arrays._replace(**{name: room})
+        return True
 
     def word(self) -> tuple[Word, int]:
         """The path that was found, as a word, and the number of the goal where it ends."""
-        graph, links, state = self.graph, self.arrays.links, self.arrays.state
+        graph, links = self.graph, self.arrays.links
         library, forwards = graph.query.library, graph.lattice.sign > 0
         edges: list[int] = []
-        node = int(state[layout.NODE])
-        while links[node, layout.PARENT] >= 0:
-            edges.append(int(graph.lattice.edge[links[node, layout.EDGE]]))
-            node = int(links[node, layout.PARENT])
-        aim = int(state[layout.GOAL]) if forwards else int(links[node, layout.ROOT])
+        node = self.expansions - 1
+        while links[node, kernels.PARENT] >= 0:
+            edges.append(int(graph.lattice.edge[links[node, kernels.EDGE]]))
+            node = int(links[node, kernels.PARENT])
+        aim = int(self.arrays.state[kernels.AIM]) if forwards else int(links[node, kernels.EDGE])
         at = graph.query.start_trim
         steps = [(SWITCH, int(library.trims[at]), 0.0)]
         for edge in edges[::-1] if forwards else edges:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -12,19 +13,25 @@ import pytest
 import shapely
 from shapely.affinity import rotate, translate
 
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.lattice import Lattice, Move, automaton_of_lattice
 from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.planning.planner import Planner
 from maneuver_automaton.problem import Bounds, Goal, Problem, SearchSettings
+from maneuver_automaton.search import state_lattice
+from maneuver_automaton.search.free_costs import FreeTable
+from maneuver_automaton.search.prepared import Prepared
 from tests.formats.outside import DATA, needs_data
 from tests.planning.test_off_lattice import CELL, QUARTER, library, moves
 
 BODY = Box([0.5, 0.3], center=[0.1, 0.0])
 BOUNDS = Bounds(x=(-2.0, 4.0), y=(-3.0, 3.0))
 WORK = SearchSettings(max_expansions=200_000)
+SOON = (2, 40), (8, 200), (32, 10_000)  # expansions, nodes of which costs are known
 THICK = 2e-3  # [m] by which solids grow for the search that is surely too careful
 
 
@@ -182,10 +189,53 @@ def test_a_plan_is_a_shortest_path_whatever_its_goal_and_prices(seed):
     assert back.cost == pytest.approx(result.cost, rel=1e-12)
 
 
+@pytest.fixture
+def looks_ahead(monkeypatch):
+    """Searches look up the costs without obstacles at once; these scenes are too small for it."""
+    monkeypatch.setattr(state_lattice, "STAGES", SOON)
+
+
+@pytest.mark.parametrize("seed", range(12, 18))
+def test_costs_without_obstacles_hide_no_cheaper_plan(seed, looks_ahead):
+    test_a_plan_is_a_shortest_path_whatever_its_goal_and_prices(seed)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12, 200))
-def test_many_plans_are_shortest_paths(seed):
+@pytest.mark.parametrize("seed", range(18, 200, 7))
+def test_many_plans_are_shortest_paths(seed, looks_ahead):
+    """Seeds of all kinds; `python -m tests.planning.test_on_state_lattice 18 200` tries others."""
     check(drawn(seed, with_reverse() if seed % 2 else library()))
+
+
+def test_what_was_asked_before_changes_nothing(looks_ahead):
+    """Tables of costs stay with the library and grow; each answer is that of a first question."""
+    scene = drawn(5, with_reverse())
+    automaton, goals = scene.automaton, [[0.5 * k, 0.5 * (k % 3), 0.0] for k in (-2, 1, 6, 3)]
+    map_ = {"obstacles": scene.obstacles, "footprint": BODY, "bounds": BOUNDS}
+    alone = [plan(Problem(automaton, [0, 0, 0], goal, **map_)) for goal in goals]
+    planner = Planner(with_reverse(), **map_)
+    for one, goal in [*zip(alone, goals, strict=True), *zip(alone, goals, strict=True)]:
+        other = planner.plan([0, 0, 0], goal)
+        assert (other.status, other.cost, other.counts) == (one.status, one.cost, one.counts)
+        assert one.plan is None or other.plan.word == one.plan.word
+
+
+def test_a_table_holds_the_costs_of_plain_dijkstra():
+    automaton = with_reverse()
+    known = dijkstra(automaton, 7.0)
+    problem = Problem(automaton, [0, 0, 0], [2 * CELL, CELL, QUARTER], footprint=BODY)
+    graph = state_lattice.graph_of(problem, [0], Prepared())
+    names = [automaton.trims[k].name for k in graph.query.library.trims]
+    for (i, j, trim), cost in known.items():
+        if (i, j) not in ((2, 1), (-1, 3), (4, 0), (0, 0)):
+            continue
+        source = np.array([[0, 0, names.index(trim)]])
+        table = FreeTable(graph.lattice, source, graph.aims.per_metre)
+        roots = np.array([[-i, -j, names.index(automaton.trim_names[0])]])
+        free = table.around(roots, np.zeros(2, dtype=np.int64), 10_000, UNLIMITED)
+        at = -i - free.column, -j - free.row, roots[0, 2]
+        assert free.value[at] == pytest.approx(cost, rel=1e-12)
+        assert cost <= free.most
 
 
 def test_a_moved_problem_has_the_moved_plan():
@@ -278,3 +328,9 @@ def test_primitives_of_a_car_reach_the_least_cost(backwards):
     result = plan(problem, time_limit=60.0)
     assert result.cost == pytest.approx(9.86127818874, rel=1e-9)
     assert (result.bound.kind, result.gap) == ("exhaustive", 0.0)
+
+
+if __name__ == "__main__":
+    state_lattice.STAGES = SOON
+    for number in range(*map(int, sys.argv[1:])):
+        check(drawn(number, with_reverse() if number % 2 else library()))
