@@ -12,3 +12,4 @@ from maneuver_automaton.bounds.separation import Narrowest as Narrowest
 from maneuver_automaton.bounds.separation import Separation as Separation
 from maneuver_automaton.bounds.separation import goals_blocked as goals_blocked
 from maneuver_automaton.bounds.separation import separation as separation
+from maneuver_automaton.bounds.separation import widest_path as widest_path

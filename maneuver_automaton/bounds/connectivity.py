@@ -77,7 +77,7 @@ class Connectivity:
     answer: Connection
     boxes: int  # that were tested
     reached: Array  # (n, 4, 2) corners of the places of boxes that may be reached, of a separation
-    path: Array  # (n, 3) poses of a way through free boxes, from the start to a goal
+    path: Array  # (n, 3) poses of a way through free boxes, also on what two of them share
 
 
 def connectivity(
@@ -101,7 +101,7 @@ def connectivity(
     bounds : Bounds, optional
         Those of the scene's problem.
     give : float
-        [m] by which all obstacles draw back.
+        [m] by which all obstacles draw back; if negative they come nearer, which proves nothing.
     most_boxes : int
         Work that is allowed; the answer is the same at every call that is not out of time.
     deadline : float
@@ -156,7 +156,7 @@ def connectivity(
         answer=answer,
         boxes=used,
         reached=_places(scene, grid, cells, np.flatnonzero(known & separated)),
-        path=_poses(scene, _middles(grid, cells, path)),
+        path=_path(scene, grid, cells, path),
     )
 
 
@@ -222,9 +222,22 @@ def _middles(grid: Grid, cells: Cells, chosen: IntArray) -> Array:
     return np.asarray(origin + at * steps, dtype=np.float64)
 
 
-def _poses(scene: PoseScene, seen: Array) -> Array:
-    """Poses (n, 3) of the scene's frame in the coordinates of the problem."""
-    return (SE2(scene.world.frame) @ SE2(seen)).pose
+def _path(scene: PoseScene, grid: Grid, cells: Cells, chosen: IntArray) -> Array:
+    """Middles of boxes that touch one another and of the faces between, as the problem sees them.
+
+    From a pose of one box to the next straight lines stay inside of the boxes.
+    """
+    middles = _middles(grid, cells, chosen)
+    middles[:, 2] = np.unwrap(middles[:, 2])
+    level = cells.level[chosen]
+    halves = np.column_stack(
+        [0.5 * grid.size[level], 0.5 * grid.size[level], grid.half_turn[level]]
+    )
+    low, high = middles - halves, middles + halves
+    faces = 0.5 * (np.maximum(low[:-1], low[1:]) + np.minimum(high[:-1], high[1:]))
+    poses = np.empty((max(2 * len(chosen) - 1, 0), 3))
+    poses[::2], poses[1::2] = middles, faces
+    return (SE2(scene.world.frame) @ SE2(poses)).pose
 
 
 def _places(scene: PoseScene, grid: Grid, cells: Cells, chosen: IntArray) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from dataclasses import dataclass
@@ -85,9 +86,7 @@ def separation(
     """
     if not lasting_obstacles(problem):
         return None
-    scene = pose_scene(problem)
-    start = _seen(scene, problem.start)
-    goals = np.concatenate([_box_of(scene, goal) for goal in problem.goals])
+    scene, start, goals = _asked(problem)
     proof = connectivity(
         scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
     )
@@ -95,6 +94,40 @@ def separation(
         return None
     narrowest = _narrowest(problem, scene, start, goals, deadline)
     return Separation(boxes=proof.boxes, reached=proof.reached, narrowest=narrowest)
+
+
+def widest_path(
+    problem: Problem, *, first: float, most_boxes: int = MOST_BOXES, deadline: float = math.inf
+) -> tuple[Connection, Array, float]:
+    """Whether a path leads to a goal, its poses (n, 3), and how far it stays from all [m].
+
+    The path that is found with the most room, of some that are tried: `first` [m] at first. It
+    knows nothing of what moves, as the proof of `separation` does not.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Box, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
+    >>> walls = [Box([1.0, 8.0], [4.0, 5.2]), Box([1.0, 8.0], [4.0, -5.2])]
+    >>> problem = Problem(robot, [0, 0, 0], [8, 0, 0], obstacles=walls, footprint=Box([3.0, 2.0]))
+    >>> answer, path, apart = widest_path(problem, first=0.1)  # the walls leave 2.4 m
+    >>> answer.value, len(path) > 2, 0.1 <= apart < 0.2
+    ('connected', True, True)
+    """
+    scene, start, goals = _asked(problem)
+    ask = functools.partial(
+        connectivity, scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes
+    )
+    found, kept, apart = ask(deadline=deadline), 0.0, first
+    for _ in range(TRIES if found.answer is Connection.CONNECTED else 0):
+        if time.monotonic() > deadline or apart - kept <= ROUGHLY * kept / 2.0:
+            break
+        wider = ask(give=-apart, price=1.0, deadline=deadline)
+        if wider.answer is Connection.CONNECTED:
+            found, kept, apart = wider, apart, (1.0 + ROUGHLY) * apart
+        else:
+            apart = 0.5 * (kept + apart)
+    return found.answer, found.path, kept
 
 
 def goals_blocked(problem: Problem, *, most_boxes: int, deadline: float = math.inf) -> bool:
@@ -111,6 +144,13 @@ def goals_blocked(problem: Problem, *, most_boxes: int, deadline: float = math.i
         if proof.answer is not Connection.SEPARATED:
             return False
     return True
+
+
+def _asked(problem: Problem) -> tuple[PoseScene, Array, Array]:
+    """The scene of a problem, and boxes (n, 6) of its start and of all goals."""
+    scene = pose_scene(problem)
+    goals = np.concatenate([_box_of(scene, goal) for goal in problem.goals])
+    return scene, _seen(scene, problem.start), goals
 
 
 def _seen(scene: PoseScene, pose: Array) -> Array:

@@ -20,6 +20,7 @@ from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.free_path import along_free_path
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.no_way import before_proof
@@ -134,12 +135,12 @@ class LatticeWords:
         budget: Budget,
         *,
         most: int | None = None,
-        begun: Begun | None = None,
+        **more: Any,
     ) -> FirstPlan:
         """A first plan for a query, its expansions counted."""
         limits = [one for one in (most, budget.expansions) if one is not None]
         counted = replace(budget, expansions=min(limits, default=None))
-        found = first_plan(query, budget=counted, table=self.table, begun=begun)
+        found = first_plan(query, budget=counted, table=self.table, **more)
         self._count(found.expansions, found.queries, searches=1)
         return found
 
@@ -209,7 +210,8 @@ def _first(lattice: LatticeWords, begun: Begun | None = None) -> FirstPlan | Non
         if timed is not None:
             lattice.gained(timed)
             return first
-    first = lattice.first_plan(query, limit, begun=begun)
+    aside = along_free_path(query, lattice.table)
+    first = lattice.first_plan(query, limit, begun=begun, aside=aside)
     if first.word is not None:
         lattice.gained(first.word)
     return first

@@ -41,7 +41,7 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
     from maneuver_automaton.bounds import separation
 
     left = budget.left
-    _load()  # the compiler's time is not the budget's
+    load_proof()  # the compiler's time is not the budget's
     proof = separation(
         result.problem, most_boxes=MOST_BOXES, deadline=Budget.from_now(left).deadline
     )
@@ -62,7 +62,7 @@ def proven_blocked(problem: Problem, budget: Budget) -> bool:
     from maneuver_automaton.bounds import goals_blocked
 
     left = budget.left
-    _load()
+    load_proof()
     deadline = Budget.from_now(left).deadline
     return left >= FIRST_BOXES and goals_blocked(
         problem, most_boxes=MOST_AT_GOALS, deadline=deadline
@@ -101,7 +101,7 @@ def too_long(problem: Problem, budget: Budget) -> str:
 
 
 @functools.cache
-def _load() -> None:
+def load_proof() -> None:
     """Compile or load what a proof needs."""
     from maneuver_automaton.automaton import Automaton
     from maneuver_automaton.bounds import pose_scene, separation

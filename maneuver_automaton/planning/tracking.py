@@ -16,6 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.blocked import open_goals
+from maneuver_automaton.planning.free_path import along_free_path
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
@@ -170,7 +171,8 @@ def track(
     expansions = queries = 0
     if word is None:
         most = max_expansions or problem.search.max_expansions
-        found = first_plan(query, budget=replace(budget, expansions=most), table=table)
+        counted, aside = replace(budget, expansions=most), along_free_path(query, table)
+        found = first_plan(query, budget=counted, table=table, aside=aside)
         word, expansions, queries = found.word, found.expansions, found.queries
         if word is None:
             return Tracked(

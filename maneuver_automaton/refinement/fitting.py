@@ -26,6 +26,7 @@ from maneuver_automaton.words.conjugation import conjugated
 CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least coasting time
 RESTARTS = 2
 NEAR = 2  # trims on either side of a short one
+LOOKED_AT = 1000  # trims of plans in which short ones in a row stay, before no more are tried
 SHORT = 0.02  # [s] that a trim lasts, unless the horizon says otherwise ...
 COSTLIER = 1e-3  # ... or the plan would become costlier by more than this share of its cost
 CLOSED = 1e-12  # [m, rad, s] that an exact end may miss
@@ -92,10 +93,10 @@ def with_lasting_coasts(
     >>> with_lasting_coasts(problem, plan, problem.goals[0], is_free=bool).durations.tolist()
     [2.0]
     """
-    if not isinstance(problem.horizon.min_coast, Unstated) or not _short(plan):
+    if not isinstance(problem.horizon.min_coast, Unstated):
         return plan
     most, failed = problem.cost_of(plan) * (1.0 + COSTLIER), 0
-    while failed < len(short := _short(plan)):
+    while failed < min(len(short := _short(plan)), LOOKED_AT // max(len(plan.trims), 1)):
         away = np.arange(plan.durations.size) - short[failed]
         times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))
         changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)

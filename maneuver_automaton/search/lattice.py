@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,6 +27,8 @@ from maneuver_automaton.search.lattice_task import (
 )
 from maneuver_automaton.search.reversal import forward_word, reversed_query, to_reverse
 from maneuver_automaton.words.word import Word
+
+ASIDE = 12_000  # expansions until something else is tried
 
 Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
 
@@ -51,12 +53,14 @@ def first_plan(
     table: CostTable = NO_TABLE,
     grids: Grids | None = None,
     begun: Begun | None = None,
+    aside: Callable[[Budget], FirstPlan] | None = None,
 ) -> FirstPlan:
     """The first connection from start to a goal, at the first resolution that has one.
 
     The library of the query says which resolutions are tried, and when; expansions of the `budget`
     are those of all searches together. `grids` are those of fine cells, and `begun` is the first
-    search of the schedule, if they are known.
+    search of the schedule, if they are known. What finds words otherwise is asked `aside`, once,
+    where this takes long or ends without one; if that is exhausted, so is all.
     """
     schedule = schedule_of(query.library)
     guides = _Guides(query, table, grids)
@@ -67,7 +71,7 @@ def first_plan(
         turns[0].begun = begun.search_of(query)
         if not begun.is_found:
             guides.coarse_grids[turns[0].sign] = turns[0].begun.grid
-    word, proof, total, left_out = None, "", 0, False
+    word, proof, total, left_out, other = None, "", 0, False, None
     while word is None:
         for one in turns:
             if not one.may_expand or total >= room or budget.is_over:
@@ -86,6 +90,12 @@ def first_plan(
         closed = not alive or any(one.is_closed for one in turns)
         proof = _enclosed(query, guides.fine) if word is None and closed else ""
         late = alive and not any(one.may_expand for one in turns)
+        ends = not (alive or stages)
+        if aside and word is None and not proof and ASIDE * (not ends) <= total < room:
+            other, aside = aside(replace(budget, expansions=room - total)), None
+            word, total = other.word, total + other.expansions
+            if other.exhausted:
+                break
         if word is not None or total >= room or budget.is_over or proof or late:
             break
         if stages and (not alive or total >= stages[0][0]):
@@ -101,7 +111,7 @@ def first_plan(
     found = FirstPlan(
         word=word,
         expansions=total,
-        queries=sum(one.queries for one in passes),
+        queries=sum(one.queries for one in passes) + (other.queries if other else 0),
         exhausted=word is None and not alive and not left_out,
         enclosed=proof,
         nearest=min(ahead, default=(math.inf, math.inf)),
