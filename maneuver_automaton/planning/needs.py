@@ -17,9 +17,9 @@ def has_inertia(problem: Problem) -> bool:
 def uses_lattice(problem: Problem) -> bool:
     """Whether the lattice plans: it was asked for, or there is something in the way.
 
-    In the plane it needs trims of which one turns, or two that lead to different sides where none
-    does and the heading never changes; and a rest where the time is fixed. Otherwise words are
-    searched, and those that meet obstacles are refused.
+    In the plane it needs two trims that move, one of which turns or leads to another side; and a
+    rest where the time is fixed. Otherwise words are searched, and those that meet obstacles are
+    refused.
     """
     return _uses_lattice(problem.setting)
 
@@ -30,9 +30,7 @@ def _uses_lattice(problem: Problem) -> bool:
         return True
     velocities = problem.automaton.body_velocities
     moving = velocities[velocities.any(axis=1)]
-    turns = bool(moving[:, 2].any())
-    keeps_heading = problem.automaton.translated is not None and not has_inertia(problem)
-    sides = turns or (keeps_heading and np.linalg.matrix_rank(moving[:, :2]) == 2)
+    sides = moving[:, 2].any() or np.linalg.matrix_rank(moving[:, :2]) == 2
     steers = len(moving) > 1 and sides and velocities.shape[1] == 3
     if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
         return False

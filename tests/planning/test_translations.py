@@ -9,7 +9,9 @@ import pytest
 import shapely
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import Box
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import Omnidirectional
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import simulate
@@ -103,3 +105,47 @@ def test_a_loop_of_a_boat_goes_on_within_a_maneuver():
     ended = simulate(there, step=0.6, time_limit=5.0, last=begun.steps[-1])
     assert ended.reached
     np.testing.assert_allclose(ended.poses[-1], [6, 2, np.pi / 4], atol=1e-8)
+
+
+def _heading_kept(directions: int) -> Automaton:
+    """A platform of three freedoms whose library has no trim that turns."""
+    angles = np.arange(directions) * (2.0 * np.pi / directions)
+    controls = {f"{k}": (np.cos(a), np.sin(a), 0.0) for k, a in enumerate(angles)}
+    return Automaton.of_controls(Omnidirectional(), controls)
+
+
+@pytest.mark.parametrize("moved", [(0.0, 0.0, 0.0), (20.0, -7.0, 2.0)])
+@pytest.mark.parametrize(("directions", "least"), [(3, 4.0 + 2 * 1.85 * np.sqrt(3.0)), (4, 7.7)])
+def test_a_library_that_keeps_its_heading_goes_around_a_wall(directions, least, moved):
+    """By hand: 1.85 m up and down along the axes, and back by half of what two of three lead."""
+    frame = SE2(moved)
+    wall = Box([0.2, 3.0], (frame @ SE2([2.0, 0.0, 0.0])).pose[:2], heading=moved[2])
+    goal = Goal(pose=(frame @ SE2([4.0, 0.0, 0.0])).pose)
+    library = _heading_kept(directions)
+    problem = Problem(library, moved, goal, obstacles=wall, footprint=Disc(0.35), search=SEARCH)
+    result = plan(problem, time_limit=20.0)
+    assert least <= result.cost <= 1.003 * least
+    poses = result.plan.sample(max_step_m=0.005).pose
+    solid = shapely.Polygon(wall.corners)
+    assert min(shapely.Point(pose[:2]).distance(solid) for pose in poses) > 0.35
+    beside = replace(problem, goals=(replace(goal, tolerance_m=0.3),))
+    assert plan(beside, time_limit=20.0).cost < result.cost
+
+
+def test_a_library_that_keeps_its_heading_goes_around_maps_and_carts():
+    """The wall as cells of a map, and a cart that comes along it."""
+    cells = np.zeros((40, 50), dtype=bool)
+    cells[5:35, 19:21] = True
+    world = OccupancyMap(cells, resolution=0.1, origin=[0.0, -2.0, 0.0])
+    cart = Obstacle(Disc(0.4), motion=Motion([0, 6], [[4.0, -3.0, 0], [4.0, 3.0, 0]]))
+    problem = Problem(
+        _heading_kept(8),
+        [0, 0, 0],
+        [4, 0, 0],
+        obstacles=[world, cart],
+        footprint=Disc(0.3),
+        search=SEARCH,
+    )
+    result = plan(problem, time_limit=20.0)
+    assert result.audit.passed
+    assert result.cost >= 4.0
