@@ -1,9 +1,11 @@
-"""Array aliases, and the two checks every value makes of its arrays."""
+"""Array aliases, and how every value takes the numbers that it is given."""
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -29,7 +31,7 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
     Returns
     -------
     array
-        A float64 array; `value` itself if it is one.
+        A float64 array in the order of C; `value` itself if it is one.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
     array([0., 1., 2.])
     """
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.asarray(value, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: got {value!r}, need numbers") from error
     if last is not None:
@@ -67,6 +69,62 @@ def freeze(instance: Any, name: str, *, last: int | Sequence[int] | None = None)
     array = np.array(as_array(name, getattr(instance, name), last=last))
     array.setflags(write=False)
     object.__setattr__(instance, name, array)
+
+
+def plain_numbers(instance: Any) -> None:
+    """Replace the numbers in the fields of a frozen dataclass by Python's own.
+
+    Kernels are compiled for float64 and int64: for any other type, be it float32 or an integer
+    where a float is stated, they would be compiled anew, and round otherwise. Fields that state
+    arrays are for `freeze`.
+
+    Raises
+    ------
+    ValueError
+        If a field holds anything else.
+    """
+    for name, (convert, need) in _numbers_of(type(instance)):
+        value = getattr(instance, name)
+        if value is not None:
+            try:
+                object.__setattr__(instance, name, convert(value))
+            except (TypeError, ValueError, OverflowError) as error:
+                what = f"{type(instance).__name__}: {name}"
+                raise ValueError(f"{what}: got {value!r}, need {need}") from error
+
+
+@functools.cache
+def _numbers_of(kind: type) -> tuple[tuple[str, tuple[Callable[[Any], Any], str]], ...]:
+    """The fields of a dataclass that are numbers, what makes them so, and what they have to be."""
+    stated = ((one.name, str(one.type).removesuffix(" | None")) for one in fields(kind))
+    return tuple((name, NUMBERS[kind]) for name, kind in stated if kind in NUMBERS)
+
+
+def _float(value: Any) -> float:
+    if isinstance(value, float) and not isinstance(value, np.generic):
+        return value  # perhaps of a kind of its own, which says more than the number
+    if isinstance(value, str | bytes) or np.ndim(value):
+        raise TypeError
+    return float(value)
+
+
+def _int(value: Any) -> int:
+    number = int(value)
+    if number != value:  # nor is a text equal to it
+        raise ValueError
+    return number
+
+
+def _floats(values: Any) -> tuple[float, ...]:
+    return tuple(map(_float, values))
+
+
+NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
+    "float": (_float, "a number"),
+    "int": (_int, "a whole number"),
+    "tuple[float, float]": (_floats, "two numbers"),
+    "tuple[float, ...]": (_floats, "numbers"),
+}
 
 
 def wrapped(angle: ArrayLike) -> Array:

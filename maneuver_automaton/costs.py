@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, plain_numbers
 from maneuver_automaton._brief import brief
 
 NORM_ORDERS = (1.0, 2.0, math.inf)
@@ -56,6 +56,7 @@ class Cost:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         weights = {name: getattr(self, name) for name in WEIGHTS}
         for name, weight in weights.items():
             if not (math.isfinite(weight) and weight >= 0.0):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._limits import MOST_TURNS, check_heading, check_size
@@ -68,6 +68,7 @@ class Goal:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "pose", last=(2, 3, 4))
         if self.pose.ndim != 1:
             raise ValueError(f"goal: pose has shape {self.pose.shape}, need one pose")
@@ -108,6 +109,7 @@ class Horizon:
     stay: bool = False  # at the goal for ever, where nothing may pass later, with a free final time
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("time", "max_time"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
@@ -131,6 +133,7 @@ class Bounds:
     z: tuple[float, float] | None = None  # [m]
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("x", "y", "z"):
             pair = getattr(self, name)
             if pair is not None and not (len(pair) == 2 and pair[0] < pair[1]):
@@ -163,6 +166,7 @@ class SearchSettings:
     polish: bool = True  # plans with inertia, beyond what the library has
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         if self.method not in SEARCH_METHODS:
             raise ValueError(
                 f"search: method must be one of {', '.join(SEARCH_METHODS)}, got {self.method!r}"
@@ -275,6 +279,7 @@ class Problem:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         dof = self.automaton.model.group.dof
         object.__setattr__(self, "start", _pose_of(self.start))
         if type(self.cost).__hash__ is None:
@@ -533,7 +538,7 @@ class Problem:
         >>> later.start.tolist(), later.start_time, later.goals[0].pose.tolist()
         ([1.0, 1.0, 1.0], 0.5, [1.0, 1.0, 0.0])
         """
-        changed: dict[str, Any] = {"start": start, "start_time": time}
+        changed: dict[str, Any] = {"start": start, "start_time": float(time)}
         if goals is not None:
             changed["goals"] = goals
         if trim is not None:

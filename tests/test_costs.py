@@ -165,7 +165,7 @@ NONE_POSITIVE = (
          "cost: direction_change must be a number of at least 0, got nan"),
         ({}, NONE_POSITIVE),
         ({"effort": 0.0, "time": 0.0}, NONE_POSITIVE),
-        ({"norm": 1.0, "norm_order": 3}, "cost: norm_order must be 1, 2 or inf, got 3"),
+        ({"norm": 1.0, "norm_order": 3}, "cost: norm_order must be 1, 2 or inf, got 3.0"),
         ({"norm": 1.0, "norm_order": math.nan}, "cost: norm_order must be 1, 2 or inf, got nan"),
         ({"effort": 1.0, "effort_matrix": [1.0, 2.0]},
          "cost: effort_matrix has shape (2,), need a square matrix"),

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._arrays import Array, IntArray, plain_numbers, wrapped
 from maneuver_automaton.analysis.reach import (
     Reached,
     ReachSettings,
@@ -43,6 +43,7 @@ class CoverageSettings:
     reach: ReachSettings = field(default_factory=ReachSettings)
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("radius", "metres_per_radian", "samples", "pairs"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"coverage: {name} must be positive, got {getattr(self, name)}")

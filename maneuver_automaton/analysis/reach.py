@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array, IntArray, plain_numbers
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -32,6 +32,7 @@ class ReachSettings:
     most_nodes: int = 100_000
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         if self.measure not in MEASURES:
             raise ValueError(
                 f"reach: measure must be one of {', '.join(MEASURES)}, got {self.measure!r}"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton.errors import MissingExtra
@@ -72,6 +72,7 @@ class Plan:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "start", last=(3, 4))
         object.__setattr__(self, "trims", tuple(self.trims))
         object.__setattr__(self, "maneuvers", tuple(self.maneuvers))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import LARGEST_BODY, check_size
 from maneuver_automaton.collision.geometry import (
@@ -90,6 +90,7 @@ class Disc:
         def __init__(self, radius: float, center: ArrayLike = ...) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "center", last=2)
         if not (math.isfinite(self.radius) and self.radius > 0.0):
             raise ValueError(f"disc: radius must be positive, got {self.radius} m")
@@ -124,6 +125,7 @@ class Box:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "size", last=2)
         freeze(self, "center", last=2)
         if not (self.size > 0.0).all():
@@ -236,6 +238,7 @@ class Obstacle:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         object.__setattr__(self, "shape", as_shape("obstacle", self.shape))
         if self.height is not None and not (
             len(self.height) == 2
@@ -320,6 +323,7 @@ class OccupancyMap:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         given = np.asarray(self.blocked)
         if given.ndim != 2 or given.size == 0:
             raise ValueError(f"map: cells have shape {given.shape}, need (rows, columns)")
@@ -327,7 +331,7 @@ class OccupancyMap:
             raise ValueError(f"map: cells have the type {given.dtype}, need booleans or numbers")
         if given.dtype.kind == "f":
             as_array("map: cells", given)
-        cells = given.astype(np.bool_)
+        cells = given.astype(np.bool_, order="C")
         cells.setflags(write=False)
         object.__setattr__(self, "blocked", cells)
         freeze(self, "origin", last=3)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision.shapes import AnyShape, Shape, as_shape
 from maneuver_automaton.groups import LieGroup
@@ -56,6 +56,7 @@ class Zone:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         object.__setattr__(self, "shape", as_shape("zone", self.shape))
         for name in ("max_speed", "max_lateral_acceleration"):
             value = getattr(self, name)

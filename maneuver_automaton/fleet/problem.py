@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.collision.motion import planar
@@ -79,6 +80,7 @@ class FleetProblem:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         n = len(self.problems)
         if not n:
             raise ValueError("fleet: there is no vehicle, need at least one")

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, no_rates, on_arrays
 from maneuver_automaton.models._limits import check_positive, check_steering, symmetric_limits
@@ -53,6 +53,7 @@ class Car:
     part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         if not (math.isfinite(self.wheelbase) and self.wheelbase > 0.0):
             raise ValueError(f"car: wheelbase must be positive, got {self.wheelbase} m")
         check_positive(

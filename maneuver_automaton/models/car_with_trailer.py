@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, on_arrays
 from maneuver_automaton.models._limits import (
@@ -66,6 +66,7 @@ class CarWithTrailer:
     part_names: ClassVar[tuple[str, ...]] = ("trailer",)
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         check_positive(
             self.name,
             wheelbase=self.wheelbase,

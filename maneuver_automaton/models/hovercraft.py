@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, on_arrays
 from maneuver_automaton.models._limits import check_positive, speed_limits, symmetric_limits
@@ -62,6 +62,7 @@ class Hovercraft:
     part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         check_positive(
             self.name,
             mass=self.mass,

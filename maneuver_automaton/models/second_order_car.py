@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, on_arrays
 from maneuver_automaton.models._limits import (
@@ -71,6 +71,7 @@ class SecondOrderCar:
     part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         check_positive(
             self.name,
             wheelbase=self.wheelbase,

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, on_arrays
 from maneuver_automaton.models._limits import check_positive, speed_limits, symmetric_limits
@@ -55,6 +55,7 @@ class SecondOrderUnicycle:
     part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         check_positive(
             self.name,
             max_speed=self.max_speed,

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.groups import SE2, LieGroup
 from maneuver_automaton.models._components import Components, no_parts, no_rates, on_arrays
 from maneuver_automaton.models._limits import check_positive, symmetric_limits
@@ -43,6 +43,7 @@ class Unicycle:
     part_names: ClassVar[tuple[str, ...]] = ()
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         check_positive(self.name, max_speed=self.max_speed, max_turn_rate=self.max_turn_rate)
 
     @property

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
@@ -45,6 +45,7 @@ class ManeuverObjective:
     smoothness: float = 1e-3  # per change of a control by half its range, squared
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("time", "effort", "smoothness"):
             if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
                 raise ValueError(
@@ -72,6 +73,7 @@ class TransferSettings:
     )
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("intervals", "steps"):
             if getattr(self, name) < 1:
                 raise ValueError(f"maneuver: {name} must be at least 1, got {getattr(self, name)}")

@@ -18,7 +18,12 @@ from maneuver_automaton.planning.result import Alternative, LowerBound, PlanResu
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
-from maneuver_automaton.refinement.fitting import fitted_plans, padded, with_lasting_coasts
+from maneuver_automaton.refinement.fitting import (
+    fitted_plans,
+    nearly_met,
+    padded,
+    with_lasting_coasts,
+)
 from maneuver_automaton.search.inside import stays_inside
 
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
@@ -77,6 +82,12 @@ class Incumbents:
     least_cost: float = math.inf  # cost of the cheapest plan that a search took to be free
     checking: float = 0.0  # [s] that the checks took
     longest_check: float = CHECK_S  # [s] of all so far
+
+    def __post_init__(self) -> None:
+        """Begin with what meets a goal for the checks, however far an exact end is from it."""
+        for plan, goal_index in nearly_met(self.problem):
+            if self.offer(plan, goal_index, proven=False):
+                break
 
     @property
     def cost(self) -> float:

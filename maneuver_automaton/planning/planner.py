@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from maneuver_automaton._arrays import plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
@@ -86,6 +87,7 @@ class Planner:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
         object.__setattr__(self, "zones", tuple(self.zones))

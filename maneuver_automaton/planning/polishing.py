@@ -101,7 +101,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
     known = _worth_polishing(found, price)
     if budget.is_over or why_not_polished(problem):
         return
-    if known and not known[0][0].duration > 0.0:
+    if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
         return  # it is there already
     stage_cost = price.stage_cost(known[0][0] if known else None)
     solid = _without_passed(problem, known[0][0]) if known else problem

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.primitives.trajectory import Trajectory
 
@@ -42,6 +42,7 @@ class Maneuver:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "displacement", last=(2, 3, 4))
         if not self.duration >= 0.0:
             raise ValueError(

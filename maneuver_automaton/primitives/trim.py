@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup
@@ -40,6 +40,7 @@ class Trim:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "body_velocity", last=(2, 3, 4))
         freeze(self, "control")
         freeze(self, "reduced_state")

@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
 
@@ -38,6 +38,7 @@ class Disturbance:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from maneuver_automaton._arrays import plain_numbers
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.needs import climbs_among_obstacles, has_inertia
 from maneuver_automaton.primitives import Trim
@@ -32,6 +33,7 @@ class Settings:
     stand: float = 2.0  # [s] that the goal must stay free after arrival
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("step", "time_limit", "look_ahead"):
             value = getattr(self, name)
             if not value > 0.0:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, wrapped
+from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, plain_numbers, wrapped
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
@@ -43,6 +43,7 @@ class FixedHorizon:
     applied: int = 1
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         if not (math.isfinite(self.interval) and self.interval > 0.0):
             raise ValueError(f"fixed horizon: interval must be positive, got {self.interval} s")
         if not 1 <= self.applied <= self.intervals:
@@ -66,6 +67,7 @@ class HorizonSearch:
     same: float = 1e-3  # [m, rad] partial sequences that end this close count as one
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         if self.width < 1:
             raise ValueError(f"horizon search: width must be at least 1, got {self.width}")
         for name in ("growth", "same"):

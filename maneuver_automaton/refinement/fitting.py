@@ -7,16 +7,19 @@ the new times are collision-free is to be checked by whoever asked.
 
 from __future__ import annotations
 
+import cmath
 import itertools
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.words import TimesStatus, solve_switching_times
@@ -30,6 +33,9 @@ LOOKED_AT = 1000  # trims of plans in which short ones in a row stay, before no 
 SHORT = 0.02  # [s] that a trim lasts, unless the horizon says otherwise ...
 COSTLIER = 1e-3  # ... or the plan would become costlier by more than this share of its cost
 CLOSED = 1e-12  # [m, rad, s] that an exact end may miss
+MET = 1e-9  # [m, rad] from a goal, beyond its tolerance, where the checks take it to be met
+NONE = 1e-8  # [s, rad] of a coast that is none, or of one that misses a whole turn
+MOST_TRIMS = 40  # of a library, of which every two are tried
 
 
 def fitted_plans(
@@ -65,6 +71,78 @@ def fitted_plans(
         if not any(np.allclose(again.durations, one.durations, atol=1e-9) for one in found):
             found.append(again)
     yield from sorted(found, key=problem.cost_of)
+
+
+def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
+    """Plans of at most two trims that meet a goal for the checks, and the goal; cheapest first.
+
+    An exact end next to that of so short a word may need whole turns, or not exist: then the few
+    digits by which coordinates are rounded decide what a plan costs.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
+    >>> [plan.word for plan, _ in nearly_met(Problem(robot, [0, 0, 0], [2, 1e-10, 0]))]
+    [('ahead',)]
+    """
+    automaton, found = problem.automaton, list[tuple[Plan, int]]()
+    moving = [trim for trim in automaton.trims if not trim.is_rest]
+    for index, goal in enumerate(problem.goals):
+        distance, turn = goal.off(problem.start)
+        if distance <= goal.tolerance_m + MET and turn <= goal.tolerance_rad + MET:
+            resting = automaton.is_kinematic and automaton.rest is None
+            first = [] if resting else [problem.first_trim]
+            if automaton.is_kinematic or np.array_equal(
+                first[0].reduced_state, problem.last_trim(goal).reduced_state
+            ):
+                found.append((Plan(problem.start, first, durations=[0.0] * len(first)), index))
+        elif automaton.is_kinematic and not goal.free_heading and len(moving) <= MOST_TRIMS:
+            for trims, times in _short_words(problem, goal, moving):
+                found.append((Plan(problem.start, trims, durations=times), index))
+    yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
+
+
+def _short_words(
+    problem: Problem, goal: Goal, trims: list[Trim]
+) -> Iterator[tuple[list[Trim], list[float]]]:
+    """Words of at most two of these trims that end at a goal but for `MET`, with their times."""
+    rows = np.array([trim.body_velocity for trim in trims]).reshape(-1, problem.start.size)
+    way = goal.pose - problem.start
+    z, h = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
+    last = cmath.rect(1.0, h)
+    i, j = np.indices((len(trims), len(trims))).reshape(2, -1)
+    v, w = rows[:, 0] + 1j * rows[:, 1], rows[:, 2]
+    turns = w != 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        r = np.where(turns, -1j * v / w, 0.0)  # from the centre of a turn to the pose
+        centres = np.angle((z + r[i] - r[j] * last) / (r[i] - r[j]))  # of two turns decide
+        between = (
+            np.where(turns[j] & (r[i] != r[j]), centres, h) * turns[i]
+        )  # heading at the switch
+        left = z - r[i] * (np.exp(1j * between) - 1.0) - r[j] * (last - np.exp(1j * between))
+        first, second = v[i], v[j] * last  # straights, which have to cover what is left
+        area = (first.conj() * second).imag
+        times = np.array([(left.conj() * second).imag / area, (first.conj() * left).imag / area])
+        one = turns[i] | turns[j] | (np.abs(area) <= NONE * np.abs(first * second))
+        alone = [(left / first).real, np.where(turns[i], (left / second).real, 0.0)]
+        times = np.where(one, alone, times)
+        angles = np.array([between, h - between]) * np.sign(w[[i, j]])
+        angles = np.remainder(angles + NONE, math.tau) - NONE
+        times = np.where(turns[[i, j]], angles / np.abs(w[[i, j]]), times)
+    times[~(np.abs(times) > NONE)] = 0.0
+    group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
+    ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
+    off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
+    off[:, 2] = wrapped(off[:, 2])
+    off = np.abs(off).max(axis=1)
+    for k in np.flatnonzero((times >= 0.0).all(axis=0) & (off <= MET)).tolist():
+        word = [
+            (n, time) for n, time in zip((i[k], j[k]), times[:, k].tolist(), strict=True) if time
+        ]
+        if (numbers := tuple(int(n) for n, _ in word)) not in seen:
+            seen.add(numbers)
+            yield [trims[n] for n in numbers], [time for _, time in word]
 
 
 def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:

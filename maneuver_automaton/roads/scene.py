@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon, Shape
 from maneuver_automaton.groups import SE2
@@ -30,6 +30,7 @@ class RoadStart:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         freeze(self, "middle", last=3)
         for name in ("speed", "turn_rate", "time"):
             if not math.isfinite(value := getattr(self, name)):
@@ -75,6 +76,7 @@ class RoadScene:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         if not self.lanelets:
             raise ValueError(f"road scene {self.name!r}: got no lanelet, need at least one")
         if not self.goals:

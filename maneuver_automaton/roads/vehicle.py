@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2
@@ -63,6 +63,7 @@ class RoadVehicle:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        plain_numbers(self)
         for name in ("length", "width", "power_speed", "engine", "lateral", "friction"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):

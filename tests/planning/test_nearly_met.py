@@ -1,0 +1,82 @@
+"""Goals that the checks take for met, though an exact end is whole turns away, or nowhere."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+
+ROBOTS = {
+    "dubins": {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)},
+    "left only": {"ahead": (1, 0), "left": (1, 1)},
+    "both ways": {"ahead": (1, 0), "left": (1, 1), "right": (1, -1), "back": (-1, 0)},
+    "spin": {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)},
+}
+
+
+def robot(name):
+    return ma.Automaton.of_controls(ma.Unicycle(), ROBOTS[name])
+
+
+def near_misses(automaton, seed):
+    """A start, a goal beside the end of a word of at most two trims, and that word's plan."""
+    rng = random.Random(seed)
+    far = rng.choice([0.0, 10.0, 5e6])  # the last is as coordinates of UTM are
+    start = np.array([rng.uniform(-1, 1) * far, rng.uniform(-1, 1) * far, rng.uniform(-3, 3)])
+    trims = [trim for trim in automaton.trims if not trim.is_rest]
+    word = [rng.choice(trims) for _ in range(rng.choice([0, 0, 1, 2]))]
+    plan = ma.Plan(start, word, durations=[rng.uniform(0.3, 2.5) for _ in word])
+    size, way, turn = (
+        10 ** rng.uniform(-12, -9.05),
+        rng.uniform(-math.pi, math.pi),
+        rng.choice([-1, 0, 1]),
+    )
+    off = [size * math.cos(way), size * math.sin(way), turn * 10 ** rng.uniform(-12, -9.05)]
+    return start, plan.end + np.array(off), plan
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_passes_the_checks_is_found(name):
+    automaton = robot(name)
+    for seed in range(12):
+        start, goal, known = near_misses(automaton, seed)
+        problem = ma.Problem(automaton, start, goal)
+        if ma.verify(problem, known).passed:
+            result = ma.plan(problem)
+            assert result.cost is not None, seed
+            assert result.cost <= known.duration + 1e-6, seed
+            assert ma.verify(problem, result.plan).passed, seed
+
+
+def test_a_moved_problem_has_the_moved_plan():
+    problem = ma.Problem(robot("left only"), [0, 0, 0], [2.0, 4e-10, 0])
+    moved = problem.moved(ma.SE2([3.0, -1.0, 2.0]))
+    assert ma.plan(problem).plan.word == ma.plan(moved).plan.word == ("ahead",)
+
+
+@pytest.mark.parametrize("time", [None, 3.0])
+def test_a_vehicle_with_inertia_that_is_almost_there_stays(time):
+    model = ma.SecondOrderUnicycle(
+        max_speed=1, max_turn_rate=1, max_acceleration=1, max_angular_acceleration=1
+    )
+    trims = ma.trims_of(model, {"speed": [-1, 0, 1], "turn_rate": [0]}).trims
+    library = ma.build_library(model, trims).automaton
+    for off in (0.0, 5e-10):
+        stated = ma.Problem(library, [0, 0, 0], [0, off, 0], horizon=ma.Horizon(time=time))
+        result = ma.plan(stated)
+        assert result.plan.duration == (time or 0.0)
+        assert (result.plan.pose_at([0.0, 1.0, 2.0]) == 0.0).all()
+
+
+def test_an_obstacle_in_the_way_counts_as_ever():
+    wall = ma.Box([0.2, 0.2], [1.0, 0.0])
+    problem = ma.Problem(
+        robot("dubins"), [0, 0, 0], [2.0, 4e-10, 0], obstacles=wall, footprint=ma.Disc(0.1)
+    )
+    result = ma.plan(problem, time_limit=1.0)
+    assert result.cost > 2.05
+    assert result.audit.passed
