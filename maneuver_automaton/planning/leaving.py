@@ -1,13 +1,11 @@
 """Plans that begin in contact: the shortest coast out of it first, then a plan as any other.
 
-How deep the body is in an obstacle is how far it would have to be pushed at least: the distance of
-its position from the border of the Minkowski difference of obstacle and body. On its way out it
-gets no deeper into anything that it touched at the start, and touches nothing else.
+On its way out the body gets no deeper into anything that it touched at the start, and touches
+nothing else.
 """
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -17,11 +15,8 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined, tail_of
-from maneuver_automaton.collision import AnyObstacle, OccupancyMap
-from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.collision.surroundings import fastest_point, parts_of, runs_of
-from maneuver_automaton.groups import SE2
+from maneuver_automaton.collision import AnyObstacle
+from maneuver_automaton.collision.contact import Contact
 from maneuver_automaton.planning.blocked import where_touched
 from maneuver_automaton.planning.checking import Checked, Condition, check_plan
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
@@ -29,9 +24,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.inside import outside
 
-STEP, SLACK, LEAST = 0.04, 0.01, 1e-3  # of the body's radius: a sample, what it ends clear by; [m]
-FARTHEST = 12.0  # body radii that a coast out is long at most
-DEEPER, TURNS = 1e-9, 1e-9  # [m] of rounding; [rad/s] that are straight on
+LEAST = 1e-3  # [s] that are left to plan in, or to drive
 EVERY = 5  # samples of a first trim after which a second one is tried
 MOST_WAYS, MOST_MIDDLES, MOST_SECONDS = 4, 60, 12  # planned from; first coasts; trims after them
 
@@ -57,7 +50,7 @@ def plan_leaving(
         return _blocked(problem, f"no way out is looked for where {why}")
     rest = tuple(one for k, one in enumerate(problem.obstacles) if k not in touched)
     others = replace(problem, obstacles=rest)
-    contact, none, planned = _Contact(problem, [*touched.values()]), None, 0
+    contact, none, planned = _contact(problem, touched), None, 0
     for length, trims, times in _ways_out(problem, contact, deadline - 0.5 * time_limit):
         first = Plan(problem.start, trims, durations=times, start_time=problem.start_time)
         goal = Goal(pose=first.end)
@@ -123,10 +116,10 @@ def check_leaving(problem: Problem, plan: Plan, goal: Goal) -> Checked:
     if not checked.passed:
         return checked
     begin, out, clear = problem.start, 0.0, False
-    contact = _Contact(problem, [*touched.values()])
+    contact = _contact(problem, touched)
     for trim, lasting in zip(plan.trims, plan.durations.tolist(), strict=True):
         steps = [(0.0, 0.0, begin, False)]
-        for step in contact.coast(trim, begin, until=lasting):
+        for step in contact.coast(trim.body_velocity, begin, lasting):
             steps.append(step)
             if step[3]:
                 break
@@ -147,6 +140,10 @@ def check_leaving(problem: Problem, plan: Plan, goal: Goal) -> Checked:
     return replace(checked, audit=replace(checked.audit, min_clearance_m=least))
 
 
+def _contact(problem: Problem, touched: dict[int, AnyObstacle]) -> Contact:
+    return Contact(problem.footprint, problem.start, touched.values(), margin=problem.margin)
+
+
 def _blocked(problem: Problem, why: str) -> PlanResult:
     said = where_touched(problem, problem.start, problem.start_time)
     reason = f"at the start {said}; {why}"
@@ -163,78 +160,7 @@ def _after(problem: Problem, first: Plan) -> Problem:
     return replace(problem, start=first.end, start_time=begin, start_trim=None, horizon=horizon)
 
 
-class _Contact:
-    """What the body touches at the start of a problem, all seen from there, unturned."""
-
-    def __init__(self, problem: Problem, touched: list[AnyObstacle]) -> None:
-        import shapely
-
-        self.reach = body_of(problem.footprint).reach
-        self.step = max(STEP * self.reach, LEAST)
-        self.clear = problem.margin + max(SLACK * self.reach, LEAST)
-        self.parts, self.start = parts_of(problem.footprint), problem.start
-        self.body = [piece for shape in problem.footprint for piece in convex_pieces(shape)]
-        self.body = self.body or [(np.zeros((1, 2)), 0.0)]
-        away = SE2(np.array([-problem.start[0], -problem.start[1], 0.0]))
-        self.solids = [  # convex pieces (corners, rounding); of a map, its runs of cells
-            [(shapely.get_coordinates(run)[:-1], 0.0) for run in runs_of(one)]
-            if isinstance(one, OccupancyMap)
-            else convex_pieces(one.shape)
-            for one in (obstacle.moved(away) for obstacle in touched)
-        ]
-        self.boxes = [
-            np.array([[*(ring.min(axis=0) - r), *(ring.max(axis=0) + r)] for ring, r in pieces])
-            for pieces in self.solids
-        ]
-        self.within = FARTHEST * max(self.reach, self.clear)
-        self.depth = problem.margin - float(self.off(self.start, within=self.within).min())
-
-    def off(self, pose: Array, *, within: float) -> Array:
-        """Distance to each obstacle, the depth with a minus where it overlaps; clipped [m]."""
-        import shapely
-
-        place = pose[:2] - self.start[:2]
-        near = within + max(float(np.hypot(*one.middle)) + one.reach for one in self.parts)
-        turned = SE2(np.array([0.0, 0.0, pose[2]]))
-        found = []
-        for pieces, boxes in zip(self.solids, self.boxes, strict=True):
-            gaps = np.maximum(np.maximum(boxes[:, :2] - place, place - boxes[:, 2:]), 0.0)
-            area = shapely.union_all(
-                [
-                    shapely.MultiPoint(
-                        (pieces[k][0][:, None] - turned.act(ring)).reshape(-1, 2)
-                    ).convex_hull.buffer(r + pieces[k][1])
-                    for k in np.flatnonzero(np.hypot(*gaps.T) <= near).tolist()
-                    for ring, r in self.body
-                ]
-            )  # where the body overlaps
-            point = shapely.Point(place)
-            aside = within if area.is_empty else area.distance(point)
-            found.append(aside or -float(shapely.distance(area.boundary, point)))
-        return np.clip(found, -within, within)
-
-    def coast(
-        self, trim: Trim, begin: Array, until: float = math.inf
-    ) -> Iterator[tuple[float, float, Array, bool]]:
-        """Time, way of the fastest point, pose, and whether that is clear: while no deeper."""
-        speed = float(fastest_point(self.parts, trim.body_velocity[None])[0])
-        turn = abs(float(trim.body_velocity[2]))
-        if not speed > 0.0:
-            return
-        lasting = min(trim.max_duration, self.within / speed, math.tau / max(turn, TURNS))
-        before = self.off(begin, within=self.within)
-        samples = int(min(lasting, until) * speed / self.step)
-        times = [n * self.step / speed for n in range(1, samples + 1)]
-        for after in [*times, until] if until <= lasting else times:
-            here = trim.coast(SE2(begin), after).pose
-            off = self.off(here, within=max(-float(before.min()), self.clear) + self.step)
-            if (off < np.minimum(before, self.clear) - DEEPER).any():
-                return
-            yield after, speed * after, here, bool((off >= self.clear).all())
-            before = off
-
-
-def _ways_out(problem: Problem, contact: _Contact, deadline: float) -> Iterator[_Way]:
+def _ways_out(problem: Problem, contact: Contact, deadline: float) -> Iterator[_Way]:
     """Ways out of one trim, the shortest first, then those of two."""
     trims: Sequence[Trim] = problem.automaton.trims
     begun: list[tuple[_Way, Array]] = [((0.0, (), ()), problem.start)]
@@ -245,7 +171,9 @@ def _ways_out(problem: Problem, contact: _Contact, deadline: float) -> Iterator[
             if word and time.perf_counter() > deadline:
                 break
             for trim in trims:
-                for n, (after, length, pose, clear) in enumerate(contact.coast(trim, begin)):
+                for n, (after, length, pose, clear) in enumerate(
+                    contact.coast(trim.body_velocity, begin, trim.max_duration)
+                ):
                     longer = far + length, (*word, trim), (*times, after)
                     if after < problem.horizon.min_coast:
                         continue
