@@ -99,12 +99,12 @@ def least_to_go(
     if 0 <= i < free.value.shape[0] and 0 <= j < free.value.shape[1]:
         known = free.value[i, j, state]
         if known <= free.most:
-            return known
+            return float(known)
     x, y, least = column * cell, row * cell, math.inf
     for g in range(aims.place.shape[0]):
         d_x, d_y = aims.place[g, 0] - x, aims.place[g, 1] - y
         least = min(least, math.sqrt(d_x * d_x + d_y * d_y) - aims.within[g])
-    return max(max(least, 0.0) * aims.per_metre + aims.surplus[state], free.most)
+    return float(max(max(least, 0.0) * aims.per_metre + aims.surplus[state], free.most))
 
 
 @inlined_kernel

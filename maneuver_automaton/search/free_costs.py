@@ -123,9 +123,8 @@ class FreeTable:
             if late:
                 return float(self._key[0])
             if self._state[0] + self._lattice.most_links > len(self._key):
-                self._key, self._item = (
-                    np.append(one, np.zeros_like(one)) for one in (self._key, self._item)
-                )
+                self._key = np.append(self._key, np.zeros_like(self._key))
+                self._item = np.append(self._item, np.zeros_like(self._item))
             kernels.grow_free_costs(
                 self._lattice, self._as_far_as(0.0, np.zeros(2, dtype=np.int64)), self._key,
                 self._item, self._state, float(most), room,

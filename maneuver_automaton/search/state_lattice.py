@@ -466,23 +466,20 @@ class GraphSearch:
         """Widen the arrays that are full; whether there is time to do so."""
         one, most = self.arrays, self.graph.lattice.most_links
         nodes, places, queued = one.state[: kernels.HEAP + 1].tolist()
-        wider = {}
         n, p, m = len(one.cost), len(one.node), len(one.heap_key)
-        if n == nodes:
-            self.is_late = GROWN_S * n > self.pace.budget.left
-            wider |= {"cost": 2 * n, "clearance": 2 * n, "links": 2 * n}
+        self.is_late = n == nodes and GROWN_S * n > self.pace.budget.left
+        if self.is_late:
+            return False
+        full = [*one._fields[3:6]] if n == nodes else []
+        full += one._fields[6:8] if m < queued + most else []
         if p < places + most:
-            wider |= {"node": 2 * p, "least": 2 * p}
+            full += one._fields[1:3]
             table = np.zeros((8 * p, 2), dtype=np.int64)
             layout.rehash(one.table, kernels.SEARCH, table)
             self.arrays = self.arrays._replace(table=table)
-        if m < queued + most:
-            wider |= {"heap_key": 2 * m, "heap_item": 2 * m}
-        if self.is_late:
-            return False
-        for name, size in wider.items():
+        for name in full:
             array = getattr(one, name)
-            room = np.empty((size, *array.shape[1:]), dtype=array.dtype)
+            room = np.empty((2 * len(array), *array.shape[1:]), dtype=array.dtype)
             room[: len(array)] = array
             self.arrays = self.arrays._replace(**{name: room})
         return True
