@@ -260,6 +260,7 @@ def _print(result: RoadFleetResult, out: Path) -> None:
             "order": ", ".join(result.order),
             "searched": f"{result.search_s:.3g} s",
             "written to": str(out),
+            "notes": "; ".join(result.notes),
         }
     )
 
@@ -292,6 +293,7 @@ def _print_drive(drive: RoadFleetDrive, out: Path) -> None:
             else "",
             "planned before": f"{drive.before.search_s:.3g} s",
             "written to": str(out),
+            "notes": "; ".join(drive.notes),
         }
     )
 

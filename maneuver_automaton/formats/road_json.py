@@ -64,6 +64,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "timing_s": {"search": result.search_s},
         "counts": {},
         "improvements": [],
+        "notes": list(result.notes),
     }
 
 
@@ -88,6 +89,7 @@ def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> 
         "closest": _closest(result.pairs),
         "order": list(result.order),
         "timing_s": {"search": result.search_s},
+        "notes": list(result.notes),
         "vehicles": {
             name: road_plan_to_dict(one) | {"name": name} for name, one in result.results.items()
         },
@@ -120,6 +122,7 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> dict[str, Any]:
         },
         "closest": _closest(drive.pairs),
         "collisions": sum(one.verdict.collisions for one in rows),
+        "notes": list(drive.notes),
         "vehicles": vehicles,
     }
 
@@ -149,6 +152,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
             {"step": None, "guarantee": GUARANTEES[what], "reason": reason}
             for what, reason in verdict.faults
         ],
+        "notes": list(drive.notes),
         "steps": [
             *(
                 _step(drive.planner, step, float(cost))
