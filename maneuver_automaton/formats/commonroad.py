@@ -196,7 +196,7 @@ def _traffic(
         poses = [pose for one in states if (pose := _exact_pose(one, shapes)) is not None]
         if len(poses) < len(states):
             notes.append(f"{name} has uncertain states: it is kept clear of wherever it may be")
-        times = [tuple(step * time for time in _interval(one.need("time"))) for one in states]
+        times = step * np.array([_interval(one.need("time")) for one in states])
         try:
             if len(states) == 1:
                 for shape in _shapes_at(states[0], shapes, lanelets):
@@ -205,15 +205,16 @@ def _traffic(
                     else:
                         yield _there(shape, (times[0][0], times[0][1] + step), step, name)
             elif len(poses) == len(states):
-                pose = np.array(poses)
-                pose[:, 2] = unwrapped(pose[:, 2].tolist())
-                motion = Motion([begin for begin, _ in times], pose)
+                rows = np.array(poses)
+                rows[:, 2] = unwrapped(rows[:, 2].tolist())
+                motion = Motion(times[:, 0], rows)
                 yield from (Obstacle(shape, motion=motion, name=name) for shape in shapes)
             else:
-                sets = [_hull(_shapes_at(one, shapes, lanelets)) for one in states]
-                for k, (begin, end) in enumerate(itertools.pairwise(times)):
-                    there = Motion([begin[0], end[1]], np.zeros((2, 3)))
-                    yield Obstacle(_hull(sets[k : k + 2]), motion=there, name=name)
+                sets = [_shapes_at(one, shapes, lanelets) for one in states]
+                for k, (here, there) in enumerate(itertools.pairwise(sets)):
+                    between = _convex(np.concatenate([_corners(one) for one in here + there]))
+                    lasting = Motion([times[k, 0], times[k + 1, 1]], np.zeros((2, 3)))
+                    yield Obstacle(between, motion=lasting, name=name)
         except ValueError as error:
             raise _at(element, error) from error
         if predicted is not None and recorded is None:
@@ -278,11 +279,7 @@ def _corners(shape: Shape) -> Array:
     return np.asarray(shape.corners)
 
 
-def _hull(shapes: Sequence[Shape]) -> Shape:
-    return _convex(np.concatenate([_corners(one) for one in shapes]), 0.0)
-
-
-def _convex(points: Array, grown: float) -> Polygon:
+def _convex(points: Array, grown: float = 0.0) -> Polygon:
     import shapely
 
     hull = shapely.convex_hull(shapely.MultiPoint(points))

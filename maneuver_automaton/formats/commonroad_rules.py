@@ -24,15 +24,7 @@ STOPS = ("206", "r1-1", "r1-3", "r2")  # Germany; USA and Australia; USA, all wa
 YIELDS = ("205", "r1-2", "r1")  # Germany; Australia and USA; Spain
 # Whether a line is closed in a phase of a light.
 COLORS = {"red": True, "redYellow": True, "yellow": True, "green": False, "inactive": False}
-WAYS = {
-    "left": ("left",),
-    "straight": ("straight",),
-    "right": ("right",),
-    "leftStraight": ("left", "straight"),
-    "straightRight": ("straight", "right"),
-    "leftRight": ("left", "right"),
-    "all": ("left", "straight", "right"),
-}
+WAYS = ("left", "straight", "right", "leftStraight", "straightRight", "leftRight", "all")
 STRAIGHT = math.radians(30.0)  # to which a lanelet goes straight on from the one before it
 FALSE = ("false", "0")
 SIDES = ("leftBound", "rightBound")
@@ -168,7 +160,7 @@ def _onward(
     return tuple(
         k
         for k in lanelet.successors
-        if k in lanelets and (turns.get(k) or _way(lanelet, lanelets[k])) in WAYS[way]
+        if k in lanelets and (turns.get(k) or _way(lanelet, lanelets[k])) in way.casefold()
     )
 
 

@@ -117,19 +117,6 @@ class StopLine:
 
     __repr__ = brief
 
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            *,
-            name: str,
-            line: ArrayLike,
-            lanelet: int,
-            onward: tuple[int, ...] | None = ...,
-            phases: tuple[tuple[float, bool], ...] = ...,
-            offset: float = ...,
-        ) -> None: ...
-
     def __post_init__(self) -> None:
         freeze(self, "line", last=2)
         if self.line.shape != (2, 2) or not np.ptp(self.line, axis=0).any():

@@ -160,15 +160,11 @@ def _too_fast(
     import shapely
 
     places = shapely.points(middle[:, :2])
-    ahead = np.stack([np.cos(middle[:, 2]), np.sin(middle[:, 2])], axis=-1)
     allowed = np.full(len(times), -math.inf)
     for one in lanelets:
-        center = one.center
-        for k in np.flatnonzero(shapely.intersects(_union([one]), places)):
-            near = int(np.argmin(np.hypot(*(center[:-1] - middle[k, :2]).T)))
-            if (center[near + 1] - center[near]) @ ahead[k] > 0.0:
-                limit = math.inf if one.speed_limit is None else one.speed_limit
-                allowed[k] = max(allowed[k], limit)
+        limit = math.inf if one.speed_limit is None else one.speed_limit
+        inside = shapely.intersects(_union([one]), places)
+        allowed[inside] = np.maximum(allowed[inside], limit)
     over = np.where(np.isfinite(allowed), speed - allowed, 0.0)
     if over.max() > FASTER:
         worst = int(over.argmax())

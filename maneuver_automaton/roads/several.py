@@ -22,7 +22,6 @@ from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.collision.blocked import too_close
-from maneuver_automaton.roads.driving import RoadDrive
 from maneuver_automaton.roads.judge import judged
 from maneuver_automaton.roads.scene import RoadScene, presence_of
 from maneuver_automaton.roads.single_plan import RoadPlanResult, plan_road
@@ -67,11 +66,6 @@ class RoadFleetResult:
     def distance_m(self) -> float:
         """Least distance of any two [m]; inf if no two are there at once."""
         return min((one.distance_m for one in self.pairs), default=math.inf)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the file states and is not obeyed, or was read otherwise: a sentence each."""
-        return joint_notes(self.results)
 
     def player(self, *, title: str = "") -> Player:
         """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
@@ -150,17 +144,6 @@ def plan_roads(
         pairs=nearest_pairs(vehicle, {k: one.plan for k, one in checked.items() if one.plan}),
         order=last,
         search_s=time.perf_counter() - begin,
-    )
-
-
-def joint_notes(results: Mapping[str, RoadPlanResult | RoadDrive]) -> tuple[str, ...]:
-    """Notes of several vehicles: those on their file once, any others with the vehicle's name."""
-    return tuple(
-        dict.fromkeys(
-            note if note in one.planner.scene.notes else f"{name}: {note}"
-            for name, one in results.items()
-            for note in one.notes
-        )
     )
 
 

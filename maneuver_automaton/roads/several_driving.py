@@ -27,7 +27,6 @@ from maneuver_automaton.roads.several import (
     RoadFleetResult,
     RoadPair,
     driving,
-    joint_notes,
     nearest_pairs,
     plan_roads,
     seen_by_others,
@@ -73,11 +72,6 @@ class RoadFleetDrive:
     def distance_m(self) -> float:
         """Least distance of any two [m]; inf if no two were there at once."""
         return min((one.distance_m for one in self.pairs), default=math.inf)
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What the file states and is not obeyed, or was read otherwise: a sentence each."""
-        return joint_notes(self.results)
 
     def player(self, *, title: str = "") -> Player:
         """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.cli import run
+from maneuver_automaton.formats.road_json import joint_notes
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import RoadVehicle, drive_road, drive_roads, plan_road, plan_roads
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine
@@ -181,7 +182,7 @@ def test_several_vehicles_obey_each_for_itself(tmp_path):
         for one in found.results.values():
             times, middle, _ = driven_of(one)
             assert times[over(middle[:, 0])].min() >= 6.0
-        assert found.notes == ()
+        assert joint_notes(found) == []
 
 
 def test_notes_are_in_the_terminal_and_in_the_documents(tmp_path, monkeypatch, capsys):
