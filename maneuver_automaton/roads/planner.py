@@ -26,7 +26,7 @@ from maneuver_automaton.roads import (
 from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
 from maneuver_automaton.roads._kernels_free import Clearing
 from maneuver_automaton.roads.clearing import clearing_of
-from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
+from maneuver_automaton.roads.decision import AT_REST, RoadDecision, RoadSettings
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.polishing import ROUND, polished_controls
@@ -127,6 +127,12 @@ class RoadPlanner:
         more = tuple(moved_obstacle(one, back, digits=DIGITS) for one in others)
         local = replace(self.local, traffic=(*self.local.traffic, *more))
         return replace(self, scene=scene, local=local, kind=tuple(others))._cleared()
+
+    def until(self, tick: int) -> RoadPlanner:
+        """A planner like this one, all goals over at a tick at the latest."""
+        goals = self.horizon.goals
+        ticks = np.minimum(goals.tick, tick)
+        return replace(self, horizon=self.horizon._replace(goals=goals._replace(tick=ticks)))
 
     def opened(self, state: Array) -> RoadPlanner:
         """A planner like this one, those stop signs done before which it stands in a state (5,)."""
@@ -242,6 +248,7 @@ class RoadPlanner:
         library, settings = self.library, self.settings
         until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)
         x, y, heading, speed, steering = state.tolist()
+        speed = 0.0 if abs(speed) <= AT_REST else speed  # stops end with what rounding left
         if until <= tick or speed < 0.0:  # the library knows no motion from backward travel
             return None
         width = min(settings.narrow, settings.width) if narrow else settings.width

@@ -23,6 +23,7 @@ from maneuver_automaton.roads.polishing import ROUNDS
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
+SOONER = (4.0, 8.0, 12.0)  # [s] before a goal is over, by which it is to be reached but for a stop
 WIDTHS = (100, 400, 1600, 4000)
 LONGEST = 30.0  # [s] that a plan may last
 
@@ -145,14 +146,24 @@ def _searched(planner: RoadPlanner) -> RoadPlanResult:
 
 def _past_stops(planner: RoadPlanner, state: Array, tick: int) -> RoadDecision | None:
     """A plan from a state (5,) at a tick: to each stop sign on the way, and on from there."""
-    found = planner.search(state, tick=tick)
-    if found is None or found.reaches:
-        return found
-    for k, there in enumerate(found.states):
-        if (opened := planner.opened(there)) is not planner:
-            onward = _past_stops(opened, there, tick + k)
-            return found if onward is None else found.then(onward, after=k)
-    return found
+    best = found = planner.search(state, tick=tick)
+    for sooner in SOONER:
+        if found is None or found.reaches:
+            break
+        for k, there in enumerate(found.states):
+            if (opened := planner.opened(there)) is not planner:
+                onward = _past_stops(opened, there, tick + k)
+                best = found if onward is None else found.then(onward, after=k)
+                if best.reaches:
+                    return best
+                break
+        if all(one.stop_line.phases for one in planner.barriers):
+            break
+        # The search knows nothing of the way after the stop, so it is told to hurry.
+        found = planner.until(planner.last_tick - round(sooner / planner.tick)).search(
+            state, tick=tick
+        )
+    return best
 
 
 def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
