@@ -61,8 +61,9 @@ def plan_file(path: Path, out: Path, *, settings: PlanSettings, parts: Parts) ->
             result.player(title=settings.look.title or scene.name).save(out / "plan.html")
 
     _written(write, out)
-    if result.plan is not None and not settings.quiet:
-        _print(scene.name, _plan_facts(result, out))
+    if not settings.quiet and (result.plan is not None or result.notes):
+        facts = {} if result.plan is None else _plan_facts(result, out)
+        _print(scene.name, {**facts, "notes": "; ".join(result.notes)})
     return result
 
 
@@ -117,7 +118,8 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 
     _written(write, out)
     if not settings.quiet:
-        _print(scene.name, _drive_facts(drive, before, out))
+        facts = _drive_facts(drive, before, out)
+        _print(scene.name, {**facts, "notes": "; ".join(drive.notes)})
     if not drive.reached:
         complain(f"{path}: {drive.status}: {drive.reason}")
     return FOUND if drive.reached else NO_PLAN

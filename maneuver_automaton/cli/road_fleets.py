@@ -240,6 +240,7 @@ def _draw(
 
 def _print(result: RoadFleetResult, out: Path) -> None:
     from maneuver_automaton.cli.tables import console, print_facts, table
+    from maneuver_automaton.formats.road_json import joint_notes
 
     rows = [
         [
@@ -260,12 +261,14 @@ def _print(result: RoadFleetResult, out: Path) -> None:
             "order": ", ".join(result.order),
             "searched": f"{result.search_s:.3g} s",
             "written to": str(out),
+            "notes": "; ".join(joint_notes(result)),
         }
     )
 
 
 def _print_drive(drive: RoadFleetDrive, out: Path) -> None:
     from maneuver_automaton.cli.tables import console, print_facts, table
+    from maneuver_automaton.formats.road_json import joint_notes
 
     rows = [
         [
@@ -292,6 +295,7 @@ def _print_drive(drive: RoadFleetDrive, out: Path) -> None:
             else "",
             "planned before": f"{drive.before.search_s:.3g} s",
             "written to": str(out),
+            "notes": "; ".join(joint_notes(drive)),
         }
     )
 

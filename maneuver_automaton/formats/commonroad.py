@@ -1,8 +1,9 @@
-"""Scenarios of CommonRoad (XML, versions 2017a, 2018b and 2020a): roads, traffic, problems.
+"""Scenarios of CommonRoad (XML, versions 2017a to 2020a): roads, traffic, problems.
 
 Lanelets, obstacles with their recorded trajectories or sets of occupancies, and planning problems,
 each with an initial state and a goal: a region, a lanelet, intervals of heading, speed and time.
-Times are counted in steps of `timeStepSize`; positions are those of the middle of a vehicle.
+Times are counted in steps of `timeStepSize`; positions are those of the middle of a vehicle. Road
+users whose states are uncertain keep all places that they may be in.
 
 The file is read here and not by commonroad-io: release 2026.1 of that library reads the goals of
 2017a as goals without any condition, and silently; it needs protobuf 3 and eight more packages;
@@ -14,39 +15,57 @@ Roads*, IEEE Intelligent Vehicles Symposium, and the documentation of its XML fo
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._files import open_input
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Shape
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon, Shape
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.commonroad_rules import (
+    SIGN,
+    limits_of,
+    not_obeyed,
+    refs,
+    signs_of,
+    stop_lines,
+)
 from maneuver_automaton.formats.polygons import simple_polygon
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.xml_source import Element, read_xml
+from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag, tags_below_root
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import GoalRegion, Lanelet, RoadBenchmark, RoadScene, RoadStart
+from maneuver_automaton.roads.goal_region import outlines_of
 from maneuver_automaton.roads.scene import unwrapped
 
 FORMAT = "CommonRoad"
 MOST_BYTES = 50_000_000
-STEP = "timeStepSize"
+ROOT = "commonRoad"
+STEP, VERSION = "timeStepSize", "commonRoadVersion"
+VERSIONS = ("2017a", "2018a", "2018b", "2020a")
+ROAD_USERS = {
+    "obstacle": "obstacle",
+    "staticObstacle": "obstacle",
+    "dynamicObstacle": "obstacle",
+    "environmentObstacle": "environment",
+    "phantomObstacle": "phantom",
+}
+EXACT = ("orientation", "velocity", "velocityY", "yawRate", "time")
+TURN = 0.05  # [rad] between the headings of an interval that are looked at
 OPEN = 1e-3  # share of a step by which sets of occupancies are shorter at both ends
 
 
 def is_commonroad(path: Path) -> bool:
-    """Whether an XML file begins like a scenario of CommonRoad."""
-    with open_input(path) as stream:
-        return b"<commonRoad" in stream.read(4000)
+    """Whether the root of an XML file is that of a scenario of CommonRoad."""
+    return root_tag(path) == ROOT
 
 
 def n_problems(path: Path) -> int:
-    """How many planning problems a file states, by its text alone."""
-    with open_input(path) as stream:
-        return stream.read(MOST_BYTES).count(b"<planningProblem ")
+    """How many planning problems a file states, as far as it is valid XML."""
+    return tags_below_root(path)["planningProblem"]
 
 
 def read_commonroad(path: Path) -> tuple[Statement, ...]:
@@ -59,13 +78,18 @@ def read_commonroad(path: Path) -> tuple[Statement, ...]:
         missing or holds what it may not.
     """
     root = read_xml(path, what="a scenario of CommonRoad", most=MOST_BYTES)
-    if root.tag != "commonRoad":
-        raise root.error("is no scenario of CommonRoad, need the element commonRoad")
+    if root.tag != ROOT:
+        raise root.error(f"is no scenario of CommonRoad, need the element {ROOT}")
+    version = root.attributes.get(VERSION, "").strip()
+    if version and version not in VERSIONS:
+        raise root.error(f"{VERSION}: got {version!r}, need one of {', '.join(VERSIONS)}")
     step = float(root.attribute(STEP))
     if not 0.0 < step < math.inf:
         raise root.error(f"{STEP}: got {root.attributes[STEP]!r}, need a positive number")
     lanelets = _lanelets(root)
-    traffic = tuple(_traffic(root, step))
+    notes = list(not_obeyed(root))
+    traffic = tuple(_traffic(root, step, lanelets, notes))
+    lines = tuple(stop_lines(root, lanelets, step, notes))
     problems = list(root.all("planningProblem"))
     if not problems:
         raise root.error("holds no planningProblem, need at least one")
@@ -82,6 +106,8 @@ def read_commonroad(path: Path) -> tuple[Statement, ...]:
                 root.attributes[key] for key in ("author", "source") if root.attributes.get(key)
             ),
             benchmark=_benchmark(root, problem, name),
+            stop_lines=lines,
+            notes=tuple(dict.fromkeys(notes)),
         )
         for k, problem in enumerate(problems)
     ]
@@ -92,12 +118,12 @@ def _benchmark(root: Element, problem: Element, name: str) -> RoadBenchmark | No
     """What names a problem in solutions; none where it has no id."""
     if "id" not in problem.attributes:
         return None
-    version = root.attributes.get("commonRoadVersion", "")
+    version = root.attributes.get(VERSION, "")
     return RoadBenchmark(scenario=name, version=version, problem=problem.whole("id"))
 
 
 def _lanelets(root: Element) -> dict[int, Lanelet]:
-    limits = _signs(root)
+    signs = signs_of(root)
     lanelets: dict[int, Lanelet] = {}
     for element in root.all("lanelet"):
         number = element.whole("id")
@@ -106,7 +132,7 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
         sides = (element.get("adjacentLeft"), element.get("adjacentRight"))
         beside = [one for one in sides if one is not None]
         stated = element.get("speedLimit")
-        allowed = [limits[k] for k in _refs(element, "trafficSignRef") if k in limits]
+        allowed = [limit for k in refs(element, SIGN) for limit in limits_of(signs.get(k, []))]
         if stated is not None and stated.text.strip().lower() != "inf":
             allowed.append(stated.number())
         try:
@@ -114,7 +140,7 @@ def _lanelets(root: Element) -> dict[int, Lanelet]:
                 number,
                 _points(element.need("leftBound")),
                 _points(element.need("rightBound")),
-                successors=list(_refs(element, "successor")),
+                successors=list(refs(element, "successor")),
                 beside=[one.whole("ref") for one in beside if _runs(one, "same")],
                 against=[one.whole("ref") for one in beside if _runs(one, "opposite")],
                 speed_limit=min(allowed, default=None),
@@ -130,21 +156,6 @@ def _runs(neighbour: Element, direction: str) -> bool:
     return neighbour.attributes.get("drivingDir") == direction
 
 
-def _signs(root: Element) -> dict[int, float]:
-    """Speed limits of version 2020a: traffic signs with a number [m/s]."""
-    limits: dict[int, float] = {}
-    for sign in root.all("trafficSign"):
-        for part in sign.all("trafficSignElement"):
-            named, value = part.get("trafficSignID"), part.get("additionalValue")
-            if named is not None and value is not None and named.text.strip() in ("274", "R2-1"):
-                limits[sign.whole("id")] = value.number()
-    return limits
-
-
-def _refs(element: Element, tag: str) -> Iterator[int]:
-    return (one.whole("ref") for one in element.all(tag))
-
-
 def _points(element: Element) -> Array:
     points = [_point(one) for one in element.all("point")]
     if len(points) < 2:
@@ -156,36 +167,124 @@ def _point(element: Element) -> tuple[float, float]:
     return element.need("x").number(), element.need("y").number()
 
 
-def _traffic(root: Element, step: float) -> Iterator[Obstacle]:
+def _traffic(
+    root: Element, step: float, lanelets: Mapping[int, Lanelet], notes: list[str]
+) -> Iterator[Obstacle]:
     for element in root.children:
-        if element.tag not in ("obstacle", "staticObstacle", "dynamicObstacle"):
+        if element.tag not in ROAD_USERS:
             continue
-        name = (
-            f"{_text(element.get('type'), 'obstacle')} {element.attributes.get('id', '')}".strip()
-        )
+        kind = _text(element.get("type"), ROAD_USERS[element.tag])
+        name = f"{kind} {element.attributes.get('id', '')}".strip()
+        recorded, predicted = element.get("trajectory"), element.get("occupancySet")
+        if element.get("probabilityDistribution") is not None:
+            notes.append(f"not read: the probability distribution of {name}")
+        if element.tag == "phantomObstacle":
+            if predicted is None:
+                notes.append(f"{name} states no set of occupancies, and is nowhere")
+            else:
+                yield from _occupancies(predicted, step, name)
+            continue
         shapes = list(_shapes(element.need("shape")))
-        states = [element.need("initialState")]
-        if (recorded := element.get("trajectory")) is not None:
-            states += recorded.all("state")
-        elif (predicted := element.get("occupancySet")) is not None:
-            begin, pose = _time(states[0], step), SE2(np.array(_pose(states[0])))
-            for shape in shapes:
-                yield _there(shape.moved(pose), (begin, begin + step), step, name)
-            yield from _occupancies(predicted, step, name)
+        if element.tag == "environmentObstacle":
+            yield from (Obstacle(shape, name=name) for shape in shapes)
             continue
-        poses, times = (
-            np.array([_pose(one) for one in states]),
-            [_time(one, step) for one in states],
-        )
-        poses[:, 2] = unwrapped(poses[:, 2].tolist())
-        for shape in shapes:
+        states = [element.need("initialState")]
+        if recorded is not None:
+            states += recorded.all("state")
+        elif predicted is None and _moves(element, states[0]):
+            notes.append(f"{name} moves, but states no trajectory: it is taken to stay")
+        poses = [pose for one in states if (pose := _exact_pose(one, shapes)) is not None]
+        if len(poses) < len(states):
+            notes.append(f"{name} has uncertain states: it is kept clear of wherever it may be")
+        times = step * np.array([_interval(one.need("time")) for one in states])
+        try:
             if len(states) == 1:
-                yield Obstacle(shape.moved(SE2(poses[0])), name=name)
-                continue
-            try:
-                yield Obstacle(shape, motion=Motion(times, poses), name=name)
-            except ValueError as error:
-                raise _at(element, error) from error
+                for shape in _shapes_at(states[0], shapes, lanelets):
+                    if predicted is None:
+                        yield Obstacle(shape, name=name)
+                    else:
+                        yield _there(shape, (times[0][0], times[0][1] + step), step, name)
+            elif len(poses) == len(states):
+                rows = np.array(poses)
+                rows[:, 2] = unwrapped(rows[:, 2].tolist())
+                motion = Motion(times[:, 0], rows)
+                yield from (Obstacle(shape, motion=motion, name=name) for shape in shapes)
+            else:
+                sets = [_shapes_at(one, shapes, lanelets) for one in states]
+                for k, (here, there) in enumerate(itertools.pairwise(sets)):
+                    between = _convex(np.concatenate([_corners(one) for one in here + there]))
+                    lasting = Motion([times[k, 0], times[k + 1, 1]], np.zeros((2, 3)))
+                    yield Obstacle(between, motion=lasting, name=name)
+        except ValueError as error:
+            raise _at(element, error) from error
+        if predicted is not None and recorded is None:
+            yield from _occupancies(predicted, step, name)
+
+
+def _moves(element: Element, state: Element) -> bool:
+    """Whether somebody is said to be dynamic, and not to stand."""
+    dynamic = element.tag == "dynamicObstacle" or _text(element.get("role"), "") == "dynamic"
+    speed = state.get("velocity")
+    return dynamic and (speed is None or _interval(speed) != (0.0, 0.0))
+
+
+def _exact_pose(state: Element, shapes: Sequence[Shape]) -> tuple[float, float, float] | None:
+    """The pose of a state at one time; None if it is uncertain."""
+    (begin, end), (low, high) = _interval(state.need("time")), _headings(state, shapes)
+    point = state.need("position").get("point")
+    return None if point is None or begin != end or low != high else (*_point(point), low)
+
+
+def _headings(state: Element, shapes: Sequence[Shape]) -> tuple[float, float]:
+    """Least and greatest heading of a state [rad]; where none is stated, any that matters."""
+    if (stated := state.get("orientation")) is not None:
+        low, high = _interval(stated)
+        turn = high - low if low <= high else (high - low) % (2.0 * math.pi)
+        return low, low + min(turn, 2.0 * math.pi)
+    ahead, aside = state.get("velocity", "exact"), state.get("velocityY", "exact")
+    if ahead is not None and aside is not None and (ahead.number() or aside.number()):
+        heading = math.atan2(aside.number(), ahead.number())
+        return heading, heading
+    round_ones = all(isinstance(one, Disc) and not one.center.any() for one in shapes)
+    return 0.0, 0.0 if round_ones else 2.0 * math.pi
+
+
+def _shapes_at(
+    state: Element, shapes: Sequence[Shape], lanelets: Mapping[int, Lanelet]
+) -> list[Shape]:
+    """Shapes where a state has them; of an uncertain one, a shape that holds them everywhere."""
+    if (pose := _exact_pose(state, shapes)) is not None:
+        return [shape.moved(SE2(np.array(pose))) for shape in shapes]
+    low, high = _headings(state, shapes)
+    headings = np.linspace(low, high, math.ceil((high - low) / TURN) + 1)
+    corners = np.concatenate([_corners(one) for one in shapes])
+    poses = np.stack([0.0 * headings, 0.0 * headings, headings], axis=-1)
+    turned = np.asarray(SE2(poses[:, None]).act(corners)).reshape(-1, 2)
+    # Between two headings a corner leaves the chord by no more than this.
+    sagitta = np.hypot(*corners.T).max() * (1.0 - math.cos(0.5 * TURN))
+    position = state.need("position")
+    point = position.get("point")
+    places = (
+        np.array([_point(point)])
+        if point is not None
+        else np.concatenate([_corners(one) for one in _places(position, lanelets)])
+    )
+    return [_convex((places[:, None] + turned).reshape(-1, 2), sagitta)]
+
+
+def _corners(shape: Shape) -> Array:
+    """Corners (n, 2) whose convex hull holds a shape."""
+    if isinstance(shape, Disc):
+        return shape.center + outlines_of((Disc(shape.radius),))[0] / math.cos(math.pi / 64)
+    return np.asarray(shape.corners)
+
+
+def _convex(points: Array, grown: float = 0.0) -> Polygon:
+    import shapely
+
+    hull = shapely.convex_hull(shapely.MultiPoint(points))
+    outline = shapely.buffer(hull, grown, join_style="mitre") if grown else hull
+    return Polygon(shapely.get_coordinates(outline.exterior)[:-1])
 
 
 def _occupancies(predicted: Element, step: float, name: str) -> Iterator[Obstacle]:
@@ -240,26 +339,23 @@ def _shapes(element: Element) -> Iterator[Shape]:
 
 
 def _start(state: Element, step: float) -> RoadStart:
+    """The state that a plan begins at, which has to be exact, as the schema of the format says."""
+    for tag, exact in (("position", "point"), *((tag, "exact") for tag in EXACT)):
+        if (one := state.get(tag)) is not None and one.get(exact) is None and one.children:
+            raise one.error(f"is uncertain, need the element {exact}: a plan begins at one state")
+    speed, aside = state.need("velocity", "exact").number(), state.get("velocityY", "exact")
+    (heading, _), headed = _headings(state, ()), state.get("orientation", "exact")
+    if headed is None:
+        if aside is None:
+            state.need("orientation")
+        speed = math.hypot(speed, 0.0 if aside is None else aside.number())
     turn_rate = state.get("yawRate", "exact")
     return RoadStart(
-        middle=np.array(_pose(state)),
-        speed=_exact(state, "velocity"),
+        middle=np.array([*_point(state.need("position", "point")), heading]),
+        speed=speed,
         turn_rate=0.0 if turn_rate is None else turn_rate.number(),
-        time=_time(state, step),
+        time=step * state.need("time", "exact").number(),
     )
-
-
-def _pose(state: Element) -> tuple[float, float, float]:
-    return (*_point(state.need("position", "point")), _exact(state, "orientation"))
-
-
-def _time(state: Element, step: float) -> float:
-    """Time of a state [s]."""
-    return step * _exact(state, "time")
-
-
-def _exact(state: Element, tag: str) -> float:
-    return state.need(tag, "exact").number()
 
 
 def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> Iterator[GoalRegion]:
@@ -286,7 +382,7 @@ def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> It
                 heading=None if heading is None else _interval(heading),
                 speed=None if speed is None else _interval(speed),
                 time=(step * begin, step * end),
-                lanelets=() if position is None else tuple(_refs(position, "lanelet")),
+                lanelets=() if position is None else tuple(refs(position, "lanelet")),
             )
         except ValueError as error:
             raise _at(state, error) from error

@@ -23,12 +23,12 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray, freeze
-from maneuver_automaton._files import open_input, write_text_atomically
+from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton._limits import FASTEST, STEEPEST_STEERING
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.formats.levels import levels_of, nearest_level
-from maneuver_automaton.formats.xml_source import Element, read_xml
+from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive, drive_all
@@ -112,10 +112,8 @@ class Deviation:
 
 
 def is_commonroad_primitives(path: Path) -> bool:
-    """Whether an XML file begins like one of primitives."""
-    with open_input(path) as stream:
-        head = stream.read(4000)
-    return f"<{ROOT}".encode() in head or f"<{OLDER_ROOT}".encode() in head
+    """Whether the root of an XML file is that of primitives."""
+    return root_tag(path) in (ROOT, OLDER_ROOT)
 
 
 def read_commonroad_primitives(path: Path) -> RoadPrimitives:

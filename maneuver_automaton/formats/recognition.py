@@ -15,6 +15,7 @@ SBPL_ENDINGS = (".cfg", ".env", ".nav2d", ".nav3d")
 PRIMITIVES = "motion primitives, need a file that states a problem (see automaton show, convert)"
 NOT_READ: Mapping[str, str] = {
     ".mprim": f"holds {PRIMITIVES}",
+    ".pb": "is a scenario of CommonRoad as protobuf, need it as XML (commonroad-io writes both)",
     ".pgm": "is the image of a map, need the YAML file that states its resolution",
 }
 

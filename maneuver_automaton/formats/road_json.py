@@ -64,6 +64,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "timing_s": {"search": result.search_s},
         "counts": {},
         "improvements": [],
+        "notes": list(result.notes),
     }
 
 
@@ -88,6 +89,7 @@ def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> 
         "closest": _closest(result.pairs),
         "order": list(result.order),
         "timing_s": {"search": result.search_s},
+        "notes": joint_notes(result),
         "vehicles": {
             name: road_plan_to_dict(one) | {"name": name} for name, one in result.results.items()
         },
@@ -120,8 +122,19 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> dict[str, Any]:
         },
         "closest": _closest(drive.pairs),
         "collisions": sum(one.verdict.collisions for one in rows),
+        "notes": joint_notes(drive),
         "vehicles": vehicles,
     }
+
+
+def joint_notes(fleet: RoadFleetResult | RoadFleetDrive) -> list[str]:
+    """Notes of several vehicles: those on their file once, any other with the vehicle's name."""
+    said = [
+        note if note in one.planner.scene.notes else f"{name}: {note}"
+        for name, one in fleet.results.items()
+        for note in one.notes
+    ]
+    return list(dict.fromkeys(said))
 
 
 def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> dict[str, Any]:
@@ -149,6 +162,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
             {"step": None, "guarantee": GUARANTEES[what], "reason": reason}
             for what, reason in verdict.faults
         ],
+        "notes": list(drive.notes),
         "steps": [
             *(
                 _step(drive.planner, step, float(cost))

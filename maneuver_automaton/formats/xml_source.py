@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
+from maneuver_automaton._files import open_input
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.text_source import finite, read_bytes, whole
+
+CHUNK = 1 << 16  # bytes that are looked at in one go
 
 
 @dataclass(slots=True)
@@ -131,3 +135,38 @@ def read_xml(path: Path, *, what: str, most: int) -> Element:
         If it cannot be read, or is no XML.
     """
     return _Builder(path).read(read_bytes(path, most=most, what=what))
+
+
+def root_tag(path: Path) -> str:
+    """Name of the first element of a file, however much stands before it; empty if it is no XML."""
+    return next(_tags(path), (0, ""))[1]
+
+
+def tags_below_root(path: Path) -> Counter[str]:
+    """How often each name occurs right below the first element, as far as a file is valid XML."""
+    return Counter(tag for depth, tag in _tags(path) if depth == 1)
+
+
+def _tags(path: Path) -> Iterator[tuple[int, str]]:
+    """Depth and name of one element after another, until a fault or a document type."""
+    parser, open_tags, met = expat.ParserCreate(), list[str](), list[tuple[int, str]]()
+
+    def start(tag: str, _: dict[str, str]) -> None:
+        met.append((len(open_tags), tag))
+        open_tags.append(tag)
+
+    def doctype(*_: object) -> None:
+        raise LookupError  # nothing of such a file is read
+
+    parser.StartElementHandler, parser.StartDoctypeDeclHandler = start, doctype
+    parser.EndElementHandler = lambda _: open_tags.pop()
+    with open_input(path) as stream:
+        while chunk := stream.read(CHUNK):
+            try:
+                parser.Parse(chunk, False)
+            except (expat.ExpatError, LookupError):
+                chunk = b""
+            yield from met
+            if not chunk:
+                return
+            met.clear()

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
@@ -64,4 +66,14 @@ class RoadDecision:
             controls=self.controls[1:],
             lasting=max(self.lasting - 1, 0),
             reaches=self.reaches,
+        )
+
+    def then(self, other: RoadDecision, *, after: int) -> RoadDecision:
+        """The first ticks of the plan, and another one that begins where these end."""
+        return replace(
+            other,
+            tick=self.tick,
+            states=np.concatenate([self.states[:after], other.states]),
+            controls=np.concatenate([self.controls[:after], other.controls]),
+            lasting=after + other.lasting,
         )

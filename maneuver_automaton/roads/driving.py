@@ -65,6 +65,13 @@ class RoadDrive:
     __repr__ = brief
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What the file states and is not obeyed, or was read otherwise: a sentence each."""
+        after = [_state_after(self.planner, s.state, s.control) for s in self.steps[-1:]]
+        states = [*(step.state for step in self.steps), *after]
+        return self.planner.notes(np.array(states or [self.planner.start_state]))
+
+    @property
     def solve_s(self) -> Array:
         """Time (n,) that every step took to decide [s]."""
         return np.array([step.solve_s for step in self.steps])
@@ -105,7 +112,7 @@ def drive_scene(
     with patient():
         planner.warm()
         while not (driver.is_done or stopped()):
-            driver.step(planner)
+            driver.step(driver.planner)
             if progress is not None:
                 progress(driver.tick)
     return driver.drive(planner.scene)
@@ -142,6 +149,7 @@ class Driver:
         decision = self.done[-1].decision
         self.state = _state_after(planner, self.state, decision.controls[0])
         self.tick, self.tail = self.tick + 1, decision.tail()
+        self.planner = self.planner.opened(self.state)
 
     @property
     def driven(self) -> Plan:
@@ -220,6 +228,7 @@ def _ending(
         first, last = stood
         since = f"at {first:.6g} s" if first == last else f"from {first:.6g} s to {last:.6g} s"
         why += f"; no continuation was found {since}"
+    why += planner.waits(states[-1], tick=tick)
     if over:
         return "missed", f"no goal was reached until {now:.6g} s, when the last one is over; {why}"
     return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s; {why}"

@@ -1,7 +1,8 @@
-"""Lanelets: pieces of lane between two bounds, where one may drive, and how they follow another."""
+"""Lanelets: pieces of lane, how they follow another, and the stop lines across them."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -13,6 +14,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton.groups import LieGroup
 
+SAME_TIME = 1e-9  # [s]
 ROUNDED = 1e-5  # [m] gaps of less than twice this are what rounding left
 
 
@@ -90,6 +92,57 @@ class Lanelet:
     def ring(self) -> Array:
         """Outline (n, 2), counter-clockwise if the left bound is on the left [m]."""
         return np.concatenate([self.right, self.left[::-1]])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StopLine:
+    """A line across a lanelet that is not crossed while a light is red, or before standing.
+
+    Examples
+    --------
+    >>> light = StopLine(name="traffic light 8", line=[[60, 2], [60, -2]], lanelet=1,
+    ...                  phases=((10.0, True), (5.0, False)), offset=2.0)
+    >>> light.closed(0.0, 20.0)
+    [(2.0, 12.0), (17.0, 20.0)]
+    """
+
+    name: str  # of the light or sign
+    line: Array  # (2, 2) its ends [m]
+    lanelet: int  # number of the one that it is across
+    onward: tuple[int, ...] | None = None  # successors of the lanelet that it is for; None: all
+    # Durations [s] of a light's phases, again and again, and whether the line is closed in each;
+    # none for a stop sign, whose line is closed until the vehicle has stood before it.
+    phases: tuple[tuple[float, bool], ...] = ()
+    offset: float = 0.0  # [s] at which the first phase begins
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        freeze(self, "line", last=2)
+        if self.line.shape != (2, 2) or not np.ptp(self.line, axis=0).any():
+            raise ValueError(f"{self.name}: got the stop line {self.line.tolist()}, need two ends")
+        if not all(0.0 < lasts < math.inf for lasts, _ in self.phases):
+            raise ValueError(f"{self.name}: got the phases {self.phases}, need positive durations")
+
+    def moved(self, by: LieGroup, *, digits: int | None = None) -> StopLine:
+        """The line moved by a planar pose, its ends rounded to `digits` if given."""
+        return replace(self, line=_rounded(np.asarray(by.act(self.line)), digits))
+
+    def closed(self, begin: float, end: float) -> list[tuple[float, float]]:
+        """Times between two [s] in which it is closed; those of a sign are all."""
+        if not self.phases:
+            return [(begin, end)]
+        found: list[tuple[float, float]] = []
+        period = math.fsum(lasts for lasts, _ in self.phases)
+        time = self.offset + math.floor((begin - self.offset) / period) * period
+        while time < end:
+            for lasts, red in self.phases:
+                low, high = max(time, begin), min(time + lasts, end)
+                time += lasts
+                if red and low < high:
+                    follows = bool(found) and low - found[-1][1] < SAME_TIME
+                    found.append((found.pop()[0] if follows else low, high))
+        return found
 
 
 def _rounded(values: Array, digits: int | None) -> Array:

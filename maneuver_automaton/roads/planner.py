@@ -26,11 +26,12 @@ from maneuver_automaton.roads import (
 from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
 from maneuver_automaton.roads._kernels_free import Clearing
 from maneuver_automaton.roads.clearing import clearing_of
-from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
+from maneuver_automaton.roads.decision import AT_REST, RoadDecision, RoadSettings
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.polishing import ROUND, polished_controls
 from maneuver_automaton.roads.route import Route, route_of
+from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
@@ -69,6 +70,7 @@ class RoadPlanner:
     horizon: Horizon
     room: BeamArrays = field(repr=False)
     kind: tuple[Obstacle, ...] = ()  # of the scene's traffic what drives by plans like its own
+    barriers: tuple[Barrier, ...] = ()  # closed stop lines that it can keep, in the frame
 
     __repr__ = brief
 
@@ -124,9 +126,39 @@ class RoadPlanner:
         back = SE2(self.frame).inverse()
         more = tuple(moved_obstacle(one, back, digits=DIGITS) for one in others)
         local = replace(self.local, traffic=(*self.local.traffic, *more))
-        clearing = _clearing(local, self.vehicle, self.settings, tick=self.tick)
-        horizon = self.horizon._replace(clearing=clearing)
-        return replace(self, scene=scene, local=local, horizon=horizon, kind=tuple(others))
+        return replace(self, scene=scene, local=local, kind=tuple(others))._cleared()
+
+    def until(self, tick: int) -> RoadPlanner:
+        """A planner like this one, all goals over at a tick at the latest."""
+        goals = self.horizon.goals
+        ticks = np.minimum(goals.tick, tick)
+        return replace(self, horizon=self.horizon._replace(goals=goals._replace(tick=ticks)))
+
+    def opened(self, state: Array) -> RoadPlanner:
+        """A planner like this one, those stop signs done before which it stands in a state (5,)."""
+        rear, speed = state[:3], float(state[3])
+        left = [one for one in self.barriers if not one.opens_for(self.vehicle, rear, speed)]
+        if len(left) == len(self.barriers):
+            return self
+        return replace(self, barriers=tuple(left))._cleared()
+
+    def _cleared(self) -> RoadPlanner:
+        clearing = _clearing(self.local, self.vehicle, self.settings, self.barriers, tick=self.tick)
+        return replace(self, horizon=self.horizon._replace(clearing=clearing))
+
+    def waits(self, state: Array, *, tick: int) -> str:
+        """Which line is closed ahead of a state (5,) at a tick, as the end of a sentence."""
+        for one in self.barriers:
+            begin, end = one.time
+            if begin <= self.time_of(tick) <= end and one.from_body(self.vehicle, state[:3])[1]:
+                return f"; the line of {one.stop_line.name} is closed ahead of it"
+        return ""
+
+    def notes(self, states: Array, *, tick: int = 0) -> tuple[str, ...]:
+        """What of the file, and of its rules on states (n, 5) from a tick on, is not obeyed."""
+        times = np.array([self.time_of(tick + k) for k in range(len(states))])
+        route, scene = self.route.lanelets, self.scene
+        return (*scene.notes, *broken_rules(self.local, self.vehicle, route, states, times))
 
     def warm(self) -> None:
         """Compile the kernels and touch the room, before time counts."""
@@ -216,6 +248,7 @@ class RoadPlanner:
         library, settings = self.library, self.settings
         until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)
         x, y, heading, speed, steering = state.tolist()
+        speed = 0.0 if abs(speed) <= AT_REST else speed  # stops end with what rounding left
         if until <= tick or speed < 0.0:  # the library knows no motion from backward travel
             return None
         width = min(settings.narrow, settings.width) if narrow else settings.width
@@ -276,10 +309,7 @@ class RoadPlanner:
         plan = self._of_controls(
             state, tail.tick, tail.controls, tail.lasting, reaches=tail.reaches
         )
-        clearing = self.horizon.clearing
-        if self.kind:
-            clearing = clearing._replace(off_traffic=clearing.off_traffic - SEEN_OTHERWISE)
-        free = _kernels_free.free_ticks(clearing, np.array(plan.states), plan.tick)
+        free = self._free_ticks(plan.states, plan.tick)
         if free < len(plan.controls):
             if not (self.kind and plan.reaches and free >= plan.lasting):
                 return None
@@ -291,6 +321,17 @@ class RoadPlanner:
             if _kernels_goals.first_goal(self.horizon, until, plan.tick) < 0:
                 return None
         return plan
+
+    def _free_ticks(self, states: Array, tick: int) -> int:
+        """How many ticks of a motion (n + 1, 5) are free, past stop signs where it stands there."""
+        clearing = self.horizon.clearing
+        if self.kind:
+            clearing = clearing._replace(off_traffic=clearing.off_traffic - SEEN_OTHERWISE)
+        free = int(_kernels_free.free_ticks(clearing, np.array(states), tick))
+        for k, state in enumerate(states[: free + 1] if free < len(states) - 1 else ()):
+            if (opened := self.opened(state)) is not self:
+                return k + opened._free_ticks(states[k:], tick + k)
+        return free
 
     def _better(self, new: RoadDecision, old: RoadDecision) -> bool:
         """Whether a new plan is worth leaving the old one for."""
@@ -336,8 +377,13 @@ def road_planner(
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)
+    closed = tuple(
+        one
+        for one in barriers(local, vehicle, route.lanelets, until=_until(local, settings))
+        if not one.comes_too_late(vehicle, local.start, settings.off_traffic_m + DEEP)
+    )
     horizon = Horizon(
-        clearing=_clearing(local, vehicle, settings, tick=tick),
+        clearing=_clearing(local, vehicle, settings, closed, tick=tick),
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
@@ -356,20 +402,31 @@ def road_planner(
         library=library,
         horizon=horizon,
         room=beam_arrays(settings, library),
+        barriers=closed,
     )
 
 
+def _until(local: RoadScene, settings: RoadSettings) -> float:
+    """End of the last stop [s]."""
+    last = local.last_time if math.isfinite(local.last_time) else local.start.time + 60.0
+    return last + settings.horizon_s + LONGEST_STOP
+
+
 def _clearing(
-    local: RoadScene, vehicle: RoadVehicle, settings: RoadSettings, *, tick: float
+    local: RoadScene,
+    vehicle: RoadVehicle,
+    settings: RoadSettings,
+    closed: Sequence[Barrier],
+    *,
+    tick: float,
 ) -> Clearing:
     """What has to be kept clear of, until the last stop."""
-    begin = local.start.time
-    last = local.last_time if math.isfinite(local.last_time) else begin + 60.0
+    seen = (*local.traffic, *(one.obstacle for one in closed))
     return clearing_of(
-        local,
+        replace(local, traffic=seen),
         vehicle,
         tick=tick,
-        last_tick=math.ceil((last - begin + settings.horizon_s + LONGEST_STOP) / tick),
+        last_tick=math.ceil((_until(local, settings) - local.start.time) / tick),
         off_edge=settings.off_edge_m,
         off_traffic=settings.off_traffic_m,
     )

@@ -20,6 +20,7 @@ SPACING = 1.0  # [m] of the points of the line
 LONGEST = 1e5  # [m] of a route, and of the outline of a goal
 BEFORE, BEYOND = 60.0, 300.0  # [m] the line goes on straight before its first point, after its last
 LANE_CHANGE = 10.0  # [m] that a lane change counts when routes are compared
+BRAKING = 4.0  # [m/s^2] before a lower limit
 SHARE = 0.3  # of the smaller of two areas, common to a lanelet and a goal in it
 
 
@@ -30,7 +31,7 @@ class Route:
     lanelets: tuple[int, ...]  # numbers, in order
     points: Array  # (n, 2) equally spaced [m]
     heading: Array  # (n,) direction of travel, not wrapped [rad]
-    limit: Array  # (n,) speed limit [m/s], inf where there is none
+    limit: Array  # (n,) [m/s] the speed limit there and before it, inf where there is none
     extents: Array  # (goals, 4) least and greatest station, least and greatest offset of each
 
 
@@ -189,8 +190,11 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     points = np.stack([np.interp(at, station, longer[:, k]) for k in range(2)], axis=-1)
     steps = np.gradient(points, axis=0)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-    after = np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)
-    return points, heading, limits[after]
+    limit = limits[np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)]
+    limit[:-1] = np.minimum(limit[:-1], limit[1:])  # a point stands for what is around it
+    for k in range(len(limit) - 2, -1, -1):  # so fast that braking keeps the limits ahead
+        limit[k] = min(limit[k], np.sqrt(limit[k + 1] ** 2 + 2.0 * BRAKING * SPACING))
+    return points, heading, limit
 
 
 def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:

@@ -13,7 +13,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon, Shape
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.goal_region import GoalRegion
-from maneuver_automaton.roads.lanelets import Lanelet
+from maneuver_automaton.roads.lanelets import Lanelet, StopLine
 
 TIME_TOLERANCE = 1e-9  # [s] times closer than this are one
 
@@ -72,6 +72,8 @@ class RoadScene:
     source: str = ""  # author and place of the recording, for pictures
     step: float = 0.1  # [s] of the clock that the scene was recorded with
     benchmark: RoadBenchmark | None = None  # None: it is none of CommonRoad
+    stop_lines: tuple[StopLine, ...] = ()
+    notes: tuple[str, ...] = ()  # what a file states that is not obeyed, or read otherwise
 
     __repr__ = brief
 
@@ -127,6 +129,7 @@ class RoadScene:
                 for goal in self.goals
             ),
             traffic=tuple(moved_obstacle(one, by, digits=digits) for one in self.traffic),
+            stop_lines=tuple(one.moved(by, digits=digits) for one in self.stop_lines),
         )
 
 

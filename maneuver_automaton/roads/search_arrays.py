@@ -110,7 +110,7 @@ def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
     return Weights(
         offset=0.05,
         turned=1.0,
-        hurry=0.2,
+        hurry=10.0,
         pace=0.02,
         progress=math.nan if placed else scene.start.speed,
         ahead=0.05,

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton._interrupts import patient, stopped
@@ -22,6 +23,7 @@ from maneuver_automaton.roads.polishing import ROUNDS
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
+SOONER = (4.0, 8.0, 12.0)  # [s] before a goal is over, by which it is to be reached but for a stop
 WIDTHS = (100, 400, 1600, 4000)
 LONGEST = 30.0  # [s] that a plan may last
 
@@ -43,6 +45,13 @@ class RoadPlanResult:
     def cost(self) -> float | None:
         """Cost of the plan, its stop left out."""
         return None if self.decision is None else self.planner.price(self.decision)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the file states and is not obeyed, or was read otherwise: a sentence each."""
+        if self.decision is None:
+            return self.planner.scene.notes
+        return self.planner.notes(self.decision.states[: self.decision.lasting + 1])
 
     @property
     def stop(self) -> Plan | None:
@@ -109,7 +118,7 @@ def _widened(
 
 def _searched(planner: RoadPlanner) -> RoadPlanResult:
     """Result of one search from the start, polished and judged."""
-    found = planner.search(planner.start_state, tick=0)
+    found = _past_stops(planner, planner.start_state, 0)
     plan, verdict, reason = None, None, ""
     if found is None or not found.reaches:
         until = planner.time_of(round(planner.settings.horizon_s / planner.tick))
@@ -135,6 +144,28 @@ def _searched(planner: RoadPlanner) -> RoadPlanResult:
     )
 
 
+def _past_stops(planner: RoadPlanner, state: Array, tick: int) -> RoadDecision | None:
+    """A plan from a state (5,) at a tick: to each stop sign on the way, and on from there."""
+    best = found = planner.search(state, tick=tick)
+    for sooner in SOONER:
+        if found is None or found.reaches:
+            break
+        for k, there in enumerate(found.states):
+            if (opened := planner.opened(there)) is not planner:
+                onward = _past_stops(opened, there, tick + k)
+                best = found if onward is None else found.then(onward, after=k)
+                if best.reaches:
+                    return best
+                break
+        if all(one.stop_line.phases for one in planner.barriers):
+            break
+        # The search knows nothing of the way after the stop, so it is told to hurry.
+        found = planner.until(planner.last_tick - round(sooner / planner.tick)).search(
+            state, tick=tick
+        )
+    return best
+
+
 def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
     """How near the plan that leads furthest comes to a goal."""
     if found is None or not found.lasting:
@@ -143,7 +174,8 @@ def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
     times = np.array([planner.time_of(k) for k in ticks.tolist()])
     why = nearest_miss(planner.local.goals, planner.vehicle, times, found.states[ticks])
     lasts = planner.time_of(found.lasting)
-    return f"; the one that leads furthest, until {lasts:.6g} s, was {why}"
+    waits = planner.waits(found.states[found.lasting], tick=found.lasting)
+    return f"; the one that leads furthest, until {lasts:.6g} s, was {why}{waits}"
 
 
 def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanResult | None:

@@ -17,6 +17,47 @@ def lanelet(number, low, high, more=""):
     )
 
 
+def piece(number, low, high, more="", *, y=(0.0, 4.0)):
+    """A lanelet between two stations, y from the right bound to the left one."""
+
+    def bound(tag, y):
+        ends = "".join(f"<point><x>{x}</x><y>{y}</y></point>" for x in (low, high))
+        return f"<{tag}>{ends}</{tag}>"
+
+    bounds = bound("leftBound", y[1]) + bound("rightBound", y[0])
+    return f'<lanelet id="{number}">{bounds}{more}</lanelet>'
+
+
+def sign(number, name, value=None):
+    shown = "" if value is None else f"<additionalValue>{value}</additionalValue>"
+    return (
+        f'<trafficSign id="{number}"><trafficSignElement><trafficSignID>{name}</trafficSignID>'
+        f"{shown}</trafficSignElement></trafficSign>"
+    )
+
+
+def light(number, *phases, offset=0, more=""):
+    """A traffic light with phases (color, steps)."""
+    cycle = "".join(
+        f"<cycleElement><duration>{lasts}</duration><color>{color}</color></cycleElement>"
+        for color, lasts in phases
+    )
+    return (
+        f'<trafficLight id="{number}"><cycle>{cycle}<timeOffset>{offset}</timeOffset></cycle>'
+        f"{more}</trafficLight>"
+    )
+
+
+def place(x, end, *, y=2.0, begin=0):
+    """A goal of 20 m by 4 m until a step."""
+    return (
+        "<goalState><position><rectangle><length>20</length><width>4</width>"
+        f"<center><x>{x}</x><y>{y}</y></center></rectangle></position>"
+        + interval("time", begin, end)
+        + "</goalState>"
+    )
+
+
 def state(tag, *, x, y, heading=0.0, speed=None, time=0):
     velocity = "" if speed is None else f"<velocity><exact>{speed}</exact></velocity>"
     return (
