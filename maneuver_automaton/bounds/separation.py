@@ -115,14 +115,12 @@ def widest_path(
     ('connected', True, True)
     """
     scene, start, goals = _asked(problem)
-    ask = functools.partial(
-        connectivity, scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes
-    )
-    found, kept, apart = ask(deadline=deadline), 0.0, first
+    ask = functools.partial(connectivity, scene, start, goals, bounds=problem.bounds)
+    found, kept, apart = ask(most_boxes=most_boxes, deadline=deadline), 0.0, first
     for _ in range(TRIES if found.answer is Connection.CONNECTED else 0):
         if time.monotonic() > deadline or apart - kept <= ROUGHLY * kept / 2.0:
             break
-        wider = ask(give=-apart, price=1.0, deadline=deadline)
+        wider = ask(give=-apart, price=1.0, most_boxes=MOST_TRIED, deadline=deadline)
         if wider.answer is Connection.CONNECTED:
             found, kept, apart = wider, apart, (1.0 + ROUGHLY) * apart
         else:

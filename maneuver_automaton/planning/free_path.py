@@ -20,7 +20,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances
-from maneuver_automaton.planning.no_way import load_proof
+from maneuver_automaton.planning.no_way import MOST_BOXES, load_proof
 from maneuver_automaton.search.cost_to_go import CostTable
 from maneuver_automaton.search.distance_grid import distance_grid
 from maneuver_automaton.search.lattice import FirstPlan
@@ -30,7 +30,6 @@ from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, back_off_of
 from maneuver_automaton.words.transitions import SWITCH
 
-MOST_BOXES = 60_000  # of poses that are tested at each of a few distances from the obstacles
 WIDE = 25.0  # times the lattice's distance before contact, that the path keeps if there is room
 KEPT = 0.6  # share of what the path keeps that its chords keep
 PROVEN = 0.05  # share of that which words keep for certain

@@ -28,7 +28,7 @@ from maneuver_automaton.search.lattice_task import (
 from maneuver_automaton.search.reversal import forward_word, reversed_query, to_reverse
 from maneuver_automaton.words.word import Word
 
-ASIDE = 12_000  # expansions until something else is tried
+ASIDE = 50_000  # expansions until something else is tried, whose words are longer
 
 Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
 
@@ -73,13 +73,14 @@ def first_plan(
             guides.coarse_grids[turns[0].sign] = turns[0].begun.grid
     word, proof, total, left_out, other = None, "", 0, False, None
     while word is None:
+        due = room if aside is None else min(room, ASIDE)
         for one in turns:
-            if not one.may_expand or total >= room or budget.is_over:
+            if not one.may_expand or total >= due or budget.is_over:
                 continue
             search = one.begun or one.begin()
             search.is_late = budget.left < search.first_takes  # nothing is begun that would be late
             before = search.expansions - search.untold
-            word = search.run(min(one.chunk, room - total), math.inf, budget=budget)
+            word = search.run(min(one.chunk, due - total), math.inf, budget=budget)
             total += search.expansions - before
             one.chunk = min(2 * one.chunk, schedule.most_chunk)
             if word is not None:
@@ -90,8 +91,8 @@ def first_plan(
         closed = not alive or any(one.is_closed for one in turns)
         proof = _enclosed(query, guides.fine) if word is None and closed else ""
         late = alive and not any(one.may_expand for one in turns)
-        ends = not (alive or stages)
-        if aside and word is None and not proof and ASIDE * (not ends) <= total < room:
+        asks = total >= due or not (alive or stages)
+        if aside and asks and word is None and not proof and total < room:
             other, aside = aside(replace(budget, expansions=room - total)), None
             word, total = other.word, total + other.expansions
             if other.exhausted:
