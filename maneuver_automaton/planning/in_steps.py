@@ -23,6 +23,7 @@ from maneuver_automaton.planning.free_space import certificate_of, free_words, w
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.lattice_words import (
     AT_ONCE,
+    BEFORE_POLISHING,
     LatticeWords,
     improved,
     search_lattice,
@@ -44,6 +45,7 @@ WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no 
 LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
 OTHERS = 6  # costlier words that are looked at where bounds or obstacles may refuse the cheapest
 IN_SPACE = 23  # the same where some may pass above or below
+FIRST_POLISHED = 0.7  # of what is left, for polishing where there is no plan yet
 FIRST_SHARE = 0.8  # of the time limit, for a first path
 IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
 STOPPING_S = 0.01  # [s] that it takes to stop and steer along a path
@@ -70,6 +72,7 @@ def plan_in_steps(
     )
     found.counts.update(expansions=0, collision_queries=0)
     paths, lattice, searched = AlongPaths(found), None, None
+    tried = math.inf
     if (steps.along_paths or steps.words or not steps.at_will) and not budget.is_over:
         load_checks(problem, found.workspace)
     if steps.along_paths and not budget.is_over:
@@ -77,13 +80,14 @@ def plan_in_steps(
     if steps.words and not (budget.is_over or found.is_enough):
         _offer(found, _free_words(found, steps), proven=not problem.obstacles)
     if steps.lattice and not (budget.is_over or found.is_enough):
-        lattice = search_lattice(found, steps, begun)
+        lattice, tried = _search_lattice(found, steps, paths, begun)
         searched = budget.elapsed if lattice.knows_all else None
         if not problem.search.improve:
             found.offer_in_turn(lattice.candidates)
         if not found.is_enough:
             found.offer_in_turn(improved(lattice))
-    if steps.polishes and not (found.for_better.is_over or found.is_enough):
+    done = found.for_better.is_over or found.is_enough or found.cost == tried < math.inf
+    if steps.polishes and not done:
         known = found.cost
         polish_found(found, paths.guesses)
         if lattice and lattice.words and found.cost == known and not budget.is_over:
@@ -108,6 +112,29 @@ def _offer(found: Incumbents, plans: Iterable[tuple[Plan, int]], *, proven: bool
         found.offer(plan, goal_index, proven=proven)
         if found.budget.is_over or found.is_enough:
             return
+
+
+def _search_lattice(
+    found: Incumbents, steps: Steps, paths: AlongPaths, begun: Begun | None
+) -> tuple[LatticeWords, float]:
+    """What the lattice finds, and the cost that polishing has come to; inf if it may go on.
+
+    Where no plan fits but one nearly does, which polishing may mend, it does not wait for all that
+    the lattice tries: each has its share, and the lattice what is left.
+    """
+    known = bool(found.plans)
+    soon = steps.polishes and (known or found.misfits)
+    lattice = search_lattice(found, steps, begun, share=BEFORE_POLISHING if soon else 1.0)
+    if not known:  # only the first search had a share
+        lattice.limit = found.for_first
+    if found.plans or not (steps.polishes and found.misfits):
+        return lattice, math.inf
+    tried = polish_found(found, paths.guesses, share=FIRST_POLISHED)
+    ended = lattice.first is None or lattice.first.exhausted or found.budget.expansions is not None
+    if not (lattice.words or found.plans or ended):
+        lattice = search_lattice(found, steps)
+    lattice.alone = not found.plans
+    return lattice, found.cost if tried else math.inf
 
 
 def _free_words(found: Incumbents, steps: Steps) -> Iterator[tuple[Plan, int]]:

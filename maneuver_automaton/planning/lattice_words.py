@@ -167,11 +167,13 @@ class LatticeWords:
             self.found.counts.update(more)
 
 
-def search_lattice(found: Incumbents, steps: Steps, begun: Begun | None = None) -> LatticeWords:
+def search_lattice(
+    found: Incumbents, steps: Steps, begun: Begun | None = None, *, share: float = 1.0
+) -> LatticeWords:
     """The words found for a problem: a first one, and better ones for as long as there is time.
 
-    Most of the time that is left may go by until there is a plan, the rest is for a proof that
-    there is none; a share of it is for better ones where polishing or alternatives come after.
+    A share of the time that is left may go by; where there is no plan, the last is for a proof that
+    there is none.
     """
     problem, prepared = found.problem, found.workspace.prepared
     goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
@@ -182,9 +184,8 @@ def search_lattice(found: Incumbents, steps: Steps, begun: Begun | None = None) 
     known = query.library.at_will
     table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
     query = query if known else late_at_first(query)
-    alone = not found.plans
-    share = BEFORE_POLISHING if steps.polishes and not alone else 1.0
-    lattice = LatticeWords(query, table, found, steps, alone, found.for_first.stage(share))
+    limit = found.for_first.stage(share)
+    lattice = LatticeWords(query, table, found, steps, not found.plans, limit)
     lattice.first = _first(lattice, begun)
     # The path in the plane, where a way leads far round, takes longer than a first plan.
     lattice.bound = lattice_bound(query) if steps.at_will and problem.search.improve else None
@@ -195,7 +196,8 @@ def _first(lattice: LatticeWords, begun: Begun | None = None) -> FirstPlan | Non
     """The first plan; where obstacles move, one with rests if a quick search finds none."""
     query, limit = lattice.query, lattice.limit
     if query.problem.obstacles and not lattice.found.plans:
-        limit = before_proof(limit)
+        last = before_proof(lattice.found.for_first)
+        limit = replace(limit, deadline=min(limit.deadline, last.deadline))
     # where a search by cost alone would look everywhere, or for too long motions
     in_time = math.isfinite(query.most_time) or query.library.per_metre == 0.0
     if not lattice.knows_all and in_time and _quick(lattice):

@@ -91,24 +91,25 @@ def load_polishing(problem: Problem) -> None:
         cost_to_go_table(simpler_problem(problem, library, cost=BY_TIME))
 
 
-def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
+def polish_found(found: Incumbents, paths: Sequence[Aimed], *, share: float = 1.0) -> bool:
     """Polish kinematic plans of different gears, and the plans found; keep those that are cheaper.
 
-    `paths` are guesses along kinematic plans that are known already.
+    `paths` are guesses along kinematic plans that are known already. Whether all were tried within
+    a share of the time.
     """
-    problem, budget = found.problem, found.for_better
+    problem, budget = found.problem, found.for_better.stage(share)
     price = polished_price(problem)
     known = _worth_polishing(found, price)
     if budget.is_over or why_not_polished(problem):
-        return
+        return not budget.is_over
     if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
-        return  # it is there already
+        return True  # it is there already
     stage_cost = price.stage_cost(known[0][0] if known else None)
     solid = _without_passed(problem, known[0][0]) if known else problem
     work = iterations_within(budget)
     for goal_index, guesses in _in_groups(problem, known, paths, budget):
         if budget.is_over or (work is not None and work <= 0):
-            return
+            break
         try:
             polished = polish_plans(
                 solid,
@@ -125,6 +126,7 @@ def polish_found(found: Incumbents, paths: Sequence[Aimed]) -> None:
         found.counts.update(polished=len(polished.attempts))
         if work is not None:
             work -= sum(attempt.iterations for attempt in polished.attempts)
+    return not budget.is_over
 
 
 def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan, int]]:

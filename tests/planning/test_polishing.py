@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from unittest.mock import patch
 
@@ -14,6 +15,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.planning.lattice_words import improved
 from maneuver_automaton.planning.polishing import guess_of_plan, polish_plans
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import simulate
@@ -31,6 +33,36 @@ MOVING = "speed 1.5, steering 0"
 def unpolished(problem):
     with patch("maneuver_automaton.planning.in_steps.polish_found", lambda *_: None):
         return plan(problem, time_limit=60.0)
+
+
+@pytest.mark.slow
+def test_a_plan_that_only_polishing_finds_does_not_wait_for_the_lattice():
+    """In a bug trap: stops take too long for the horizon, and so do the words of the lattice."""
+    trap = (
+        Box([0.05, 1.55], [0.0, 0.0]),
+        Box([2.05, 0.05], [-1.0, 0.75]),
+        Box([2.05, 0.05], [-1.0, -0.75]),
+    )
+    problem = Problem(
+        load_stock_library("second_order_unicycle"),
+        [-1.0, 0.0, 0.0],
+        [1.5, 0.0, 0.0],
+        footprint=Box([0.5, 0.25]),
+        obstacles=trap,
+        horizon=Horizon(max_time=18.0),
+        search=SearchSettings(max_expansions=400),
+    )
+    had = []
+
+    def late(lattice):
+        had.append(lattice.found.cost)
+        return improved(lattice)
+
+    with patch("maneuver_automaton.planning.in_steps.improved", late):
+        result = plan(problem, time_limit=60.0)
+    assert had[0] < math.inf
+    assert result.plan.word == ("polished",)
+    assert result.plan.duration <= 18.0
 
 
 @pytest.mark.slow
