@@ -129,15 +129,15 @@ def build_library(
     began = time.perf_counter()
     nodes = Automaton(model, tuple(trims), name=name)
     objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
-    wanted = tuple(all_pairs(nodes) if pairs is None else dict.fromkeys(pairs))
-    for source, target in wanted:
-        _check_pair(nodes, source, target)
     for control in keep_sign:
         if control not in model.control_names:
             raise ValueError(
                 f"keep_sign: the {model.name} has no control {control!r}, need some of "
                 f"{', '.join(model.control_names)}"
             )
+    wanted = tuple(all_pairs(nodes, keep_sign=keep_sign) if pairs is None else dict.fromkeys(pairs))
+    for source, target in wanted:
+        _check_pair(nodes, source, target)
     images = _images(nodes, wanted) if mirror else {}
     to_solve = [pair for pair in wanted if pair not in images]
     recipe = _Recipe(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -114,12 +115,7 @@ def _timed(course: Trajectory, until: Array) -> Trajectory:
     """The course, its changes of control at the very times stated."""
     time = course.time.copy()
     time[np.abs(time[:, None] - until).argmin(axis=0)] = until
-    return Trajectory(
-        time=time,
-        pose=course.pose,
-        reduced_state=course.reduced_state,
-        control=course.control,
-    )
+    return replace(course, time=time)
 
 
 def inputs_of(course: Trajectory) -> Inputs:

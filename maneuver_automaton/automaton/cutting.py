@@ -14,7 +14,7 @@ from maneuver_automaton.automaton.plan import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
-from maneuver_automaton.primitives.driving import drive_all
+from maneuver_automaton.primitives.driving import along
 
 NOTHING = 1e-9  # [s] what lasts no longer has passed, or has not begun
 
@@ -262,7 +262,8 @@ def _begin_of(maneuver: Maneuver, until: float) -> Maneuver:
     k = _sample_at(course, until)
     if k is None:
         course, k = _with_rows(course, np.array([until]), *_between_samples(course, until))
-    part = Trajectory(
+    part = replace(
+        course,
         time=course.time[: k + 1],
         pose=course.pose[: k + 1],
         reduced_state=course.reduced_state[: k + 1],
@@ -279,7 +280,8 @@ def _end_of(maneuver: Maneuver, after: float) -> Maneuver:
     group = group_of(course.pose.shape[1])
     poses = np.array((group(course.pose[k]).inverse() @ group(course.pose[k:])).pose)
     poses[0] = 0.0
-    part = Trajectory(
+    part = replace(
+        course,
         time=course.time[k:] - course.time[k],
         pose=poses,
         reduced_state=course.reduced_state[k:],
@@ -300,7 +302,9 @@ def _sample_at(course: Trajectory, time: float) -> int | None:
 
 
 def _between_samples(course: Trajectory, time: float) -> tuple[Array, Array]:
-    """Pose and reduced state, a row each, between two samples, as if both changed evenly."""
+    """Pose and reduced state, a row each, between two samples; both even if no model is known."""
+    if course.model is not None:
+        return along(course, np.array([time]), course.model)
     states = [np.interp(time, course.time, column) for column in course.reduced_state.T]
     return course.pose_at(time)[None], np.array(states).reshape(1, -1)
 
@@ -316,18 +320,7 @@ def _sampled(maneuver: Maneuver, since: Array, model: Model) -> Maneuver:
     if not new:
         return maneuver
     times = np.unique(np.array(new))
-    k = np.searchsorted(course.time, times, side="right") - 1
-    rides = drive_all(
-        model,
-        course.reduced_state[k],
-        control=course.control[k][:, None],
-        durations=(times - course.time[k])[:, None],
-    )
-    group = group_of(course.pose.shape[1])
-    gained = np.array([ride.pose[-1] for ride in rides])
-    poses = (group(course.pose[k]) @ group(gained)).pose
-    states = np.array([ride.reduced_state[-1] for ride in rides])
-    return replace(maneuver, course=_with_rows(course, times, poses, states)[0])
+    return replace(maneuver, course=_with_rows(course, times, *along(course, times, model))[0])
 
 
 def _with_rows(
@@ -335,7 +328,8 @@ def _with_rows(
 ) -> tuple[Trajectory, int]:
     """The course with samples put in, and where the first of them is."""
     at = np.searchsorted(course.time, times, side="right")
-    finer = Trajectory(
+    finer = replace(
+        course,
         time=np.insert(course.time, at, times),
         pose=np.insert(course.pose, at, poses, axis=0),
         reduced_state=np.insert(course.reduced_state, at, states, axis=0),

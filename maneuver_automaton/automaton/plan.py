@@ -20,6 +20,7 @@ from maneuver_automaton.groups import SE2, LieGroup, group_of
 from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.primitives.driving import along
 
 if TYPE_CHECKING:
     from maneuver_automaton.automaton.plan_arrays import PlanArrays
@@ -473,8 +474,10 @@ class Plan:
 
 def _within(maneuver: Maneuver, since: Array) -> Array:
     """Poses (..., dof) of a maneuver at times since its begin; of one twist if it has no course."""
-    if maneuver.course is not None:
-        return maneuver.course.pose_at(since)
+    if (course := maneuver.course) is not None:
+        if course.model is None:
+            return course.pose_at(since)
+        return along(course, since.ravel(), course.model)[0].reshape(*since.shape, -1)
     group = group_of(maneuver.displacement.size)
     share = since / maneuver.duration if maneuver.duration > 0.0 else np.ones_like(since)
     return group.exp(share[..., None] * group(maneuver.displacement).log()).pose
@@ -516,11 +519,16 @@ def _finer(course: Trajectory, max_step_m: float, max_step_rad: float) -> Trajec
     first = np.concatenate([[0], np.cumsum(count)[:-1]])
     share = (np.arange(index.size) - first[index]) / count[index]
     time = np.append(course.time[index] + share * np.diff(course.time)[index], course.time[-1])
-    change = np.diff(course.reduced_state, axis=0)
-    reduced = course.reduced_state[index] + share[:, None] * change[index]
-    return Trajectory(
+    if course.model is not None:
+        pose, reduced = along(course, time, course.model)
+    else:
+        change = np.diff(course.reduced_state, axis=0)
+        reduced = course.reduced_state[index] + share[:, None] * change[index]
+        pose, reduced = course.pose_at(time), np.vstack([reduced, course.reduced_state[-1:]])
+    return replace(
+        course,
         time=time,
-        pose=course.pose_at(time),
-        reduced_state=np.concatenate([reduced, course.reduced_state[-1:]]),
+        pose=pose,
+        reduced_state=reduced,
         control=np.concatenate([course.control[index], course.control[-1:]]),
     )

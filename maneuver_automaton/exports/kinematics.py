@@ -53,8 +53,8 @@ def kinematics(rows: PlanArrays, samples: PlanArrays, model: Model | None) -> di
     rates, felt = np.zeros_like(rows.twist), np.zeros((len(rows.time), 2))
     inertia = False
     if model is not None:
-        rates = _rates(model, rows.reduced_state, rows.control)
-        felt = _accelerations(rows.twist, rates)
+        rates = twist_rates(model, rows.reduced_state, rows.control)
+        felt = accelerations(rows.twist, rates)
         inertia = bool(model.reduced_names) and _has_inertia(model, rows)
     columns["curvature_1_m"] = _curvature(rows, rates, model)
     names = (rows.reduced_names, rows.reduced_state), (rows.control_names, rows.control)
@@ -103,7 +103,7 @@ def _length(begin: Array, end: Array, seconds: Array) -> Array:
     return np.asarray(seconds * np.where(aside, (first + 4.0 * middle + last) / 6.0, along))
 
 
-def _accelerations(twist: Array, rates: Array) -> Array:
+def accelerations(twist: Array, rates: Array) -> Array:
     """Acceleration (n, 2) ahead and to the left, of a twist (n, dof) that changes at `rates`."""
     turn = twist[:, 2]
     return np.stack([rates[:, 0] - turn * twist[:, 1], rates[:, 1] + turn * twist[:, 0]], axis=-1)
@@ -114,7 +114,7 @@ def _curvature(rows: PlanArrays, rates: Array, model: Model | None) -> Array:
     speed = np.hypot(ahead, aside)
     with np.errstate(divide="ignore", invalid="ignore"):
         if aside.any():  # by its direction of travel
-            felt = _accelerations(rows.twist, rates)
+            felt = accelerations(rows.twist, rates)
             bend = (ahead * felt[:, 1] - aside * felt[:, 0]) / speed**3
         else:
             bend = turn / ahead
@@ -141,7 +141,7 @@ def _has_inertia(model: Model, rows: PlanArrays) -> bool:
     )
 
 
-def _rates(model: Model, state: Array, control: Array) -> Array:
+def twist_rates(model: Model, state: Array, control: Array) -> Array:
     """Rates (n, dof) of the twist while a control holds."""
     if not state.shape[1]:
         return np.zeros((len(state), model.group.dof))
@@ -170,5 +170,5 @@ def _jerk(model: Model, rows: PlanArrays) -> Array:
     for sign in (1.0, -1.0):
         state = rows.reduced_state + sign * STEP_S * rates
         twist = model.body_velocity(state, rows.control)
-        felt.append(_accelerations(twist, _rates(model, state, rows.control)))
+        felt.append(accelerations(twist, twist_rates(model, state, rows.control)))
     return np.asarray((felt[0] - felt[1]) / (2.0 * STEP_S))

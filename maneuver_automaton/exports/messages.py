@@ -11,6 +11,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.exports.driven import Driven, driven_of
+from maneuver_automaton.exports.kinematics import accelerations, twist_rates
 from maneuver_automaton.groups import SE2
 
 if TYPE_CHECKING:
@@ -61,9 +62,10 @@ def ros_messages(
     dict
         By topic: `path`, a nav_msgs/Path with a stamp for every pose; `trajectory`, a
         trajectory_msgs/MultiDOFJointTrajectory of the vehicle and the parts that it carries, its
-        velocities in `frame`; and lists of one message for every pose: `cmd_vel`, of
-        geometry_msgs/TwistStamped in `body_frame`; `tf`, of tf2_msgs/TFMessage; and for a model
-        with a steering angle `ackermann_cmd`, of ackermann_msgs/AckermannDriveStamped.
+        velocities and accelerations in `frame`, by the model's equations where it is known,
+        otherwise by differences, as of the parts; and lists of one message for every pose:
+        `cmd_vel`, of geometry_msgs/TwistStamped in `body_frame`; `tf`, of tf2_msgs/TFMessage; and
+        for a model with a steering angle `ackermann_cmd`, of ackermann_msgs/AckermannDriveStamped.
 
     Raises
     ------
@@ -99,7 +101,7 @@ def ros_messages(
                 for header, pose in zip(headers, poses, strict=True)
             ],
         },
-        "trajectory": _trajectory(frames, rows, since, headers[0]),
+        "trajectory": _trajectory(frames, rows, since, headers[0], driven.model),
         "cmd_vel": [
             {"header": {"stamp": one, "frame_id": body_frame}, "twist": twist}
             for one, twist in zip(stamps, twists, strict=True)
@@ -113,12 +115,25 @@ def ros_messages(
 
 
 def _trajectory(
-    frames: Sequence[tuple[str, Array]], rows: PlanArrays, since: Array, header: Message
+    frames: Sequence[tuple[str, Array]],
+    rows: PlanArrays,
+    since: Array,
+    header: Message,
+    model: Model | None,
 ) -> Message:
-    """Transforms and velocities of all frames, seen from the world."""
+    """Transforms, velocities and accelerations of all frames, seen from the world."""
     transforms = [_transforms(poses) for _, poses in frames]
-    turned = _in_world(rows.pose, rows.twist)
-    velocities = [_twists(turned), *(_twists(_rates(rows.time, poses)) for _, poses in frames[1:])]
+    velocity = _in_world(rows.pose, rows.twist)
+    if model is None:
+        acceleration = _rates(rows.time, velocity)
+    else:
+        acceleration = twist_rates(model, rows.reduced_state, rows.control)
+        acceleration[:, :2] = accelerations(rows.twist, acceleration)
+        acceleration = _in_world(rows.pose, acceleration)
+    carried = [_rates(rows.time, poses) for _, poses in frames[1:]]
+    velocities = list(map(_twists, (velocity, *carried)))
+    changes = (acceleration, *(_rates(rows.time, one) for one in carried))
+    accelerations_of = list(map(_twists, changes))
     return {
         "header": header,
         "joint_names": [name for name, _ in frames],
@@ -126,7 +141,7 @@ def _trajectory(
             {
                 "transforms": [one[k] for one in transforms],
                 "velocities": [one[k] for one in velocities],
-                "accelerations": [],
+                "accelerations": [one[k] for one in accelerations_of],
                 "time_from_start": _time(time),
             }
             for k, time in enumerate(since.tolist())

@@ -8,8 +8,10 @@ from dataclasses import dataclass
 from maneuver_automaton.models.model import Model, OnlyTranslated
 
 
-def greatest_speed(model: Model) -> float:
-    """An upper bound of the speed [m/s], climb included, within the limits of a model.
+def greatest_speed(model: Model, *, axes: tuple[int, ...] = (0, 1, 3)) -> float:
+    """An upper bound of the speed [m/s] along some axes of the body, within a model's limits.
+
+    All of them if left out, climb included.
 
     Infinite where a limit is missing, or where the velocity is made of functions that intervals
     do not know.
@@ -30,7 +32,7 @@ def greatest_speed(model: Model) -> float:
     control = [Interval(low, high) for low, high in model.control_limits.tolist()]
     try:
         velocity = model.velocity(state, control)
-        sides = [_interval(velocity[k]).size for k in range(len(velocity)) if k != 2]
+        sides = [_interval(velocity[k]).size for k in range(len(velocity)) if k in axes]
     except (TypeError, AttributeError, ZeroDivisionError):
         return math.inf
     fastest = math.hypot(*sides)

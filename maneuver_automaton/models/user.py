@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -94,6 +96,15 @@ class UserModel:
         n = len(self.reduced_names)
         return self._row_by_row("dynamics", self.dynamics, reduced_state, control, n)
 
+    def part_frames(self, z: Components, /) -> tuple[tuple[Any, ...], ...]:
+        """Components of the pose of each part, for numbers and symbols: those of `part_poses`."""
+        row = np.empty((1, len(self.reduced_names)), dtype=object)
+        for k in range(row.size):
+            row[0, k] = z[k]
+        if all(isinstance(one, Real) for one in row[0]):
+            row = row.astype(np.float64)
+        return tuple(tuple(part) for part in self.part_poses(row)[0])
+
     def _row_by_row(
         self,
         what: str,
@@ -168,13 +179,21 @@ def model_of_vector_field(
     names, dof, origin = tuple(reduced_names), group.dof, np.zeros(group.dof)
     n_states = dof + len(names)
 
+    def rates(x: Array, u: Array) -> Array:
+        try:
+            return as_array(f"{name}: rates", f(x, u), last=n_states)
+        except IndexError as error:
+            known = ", ".join((*group.coordinates, *names))
+            raise ValueError(
+                f"{name}: {error}: the state has {n_states} numbers, {known}, and the control "
+                f"{n_controls}; need reduced_names for what else the state holds"
+            ) from error
+
     def at_identity(z: Components, u: Components) -> Array:
-        return as_array(
-            f"{name}: rates", f(np.concatenate([origin, z]), np.asarray(u)), last=n_states
-        )
+        return rates(np.concatenate([origin, z]), np.asarray(u))
 
     if check:
-        _try_symmetry(f, name, group, (n_states, n_controls), tolerance)
+        _try_symmetry(rates, name, group, (n_states, n_controls), tolerance)
     return UserModel(
         name=name,
         group=group,

@@ -62,7 +62,7 @@ def plan_among_zones(
     The answer need not be the best: only where the plan that knows of no zones keeps to them, it is
     as good as that one.
     """
-    found = Incumbents(problem, budget, workspace, alternatives)
+    found = Incumbents(problem, budget, workspace, alternatives).begun()
     free = replace(problem, zones=())
     # vehicles with inertia are searched with the zones themselves: crossed slowly, left fast
     itself = [] if problem.automaton.is_kinematic else [problem]

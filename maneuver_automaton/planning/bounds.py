@@ -53,9 +53,20 @@ def lattice_bound(query: LatticeQuery) -> LowerBound:
 
 
 @kept_by_first
-def _greatest_speed(automaton: Automaton) -> float:
-    """Greatest speed [m/s] of the model."""
-    return greatest_speed(automaton.model)
+def _greatest_speeds(automaton: Automaton) -> tuple[float, float, float]:
+    """Greatest speeds [m/s] of the model: in all, in the plane, and up or down."""
+    model = automaton.model
+    every, level, climb = (greatest_speed(model, axes=axes) for axes in ((0, 1, 3), (0, 1), (3,)))
+    return every, level, climb
+
+
+def _quickest(problem: Problem, goal: Goal) -> float:
+    """Least time [s] to a goal at the model's greatest speeds."""
+    way = goal.pose - problem.start
+    ways = goal.off(problem.start)[0], math.hypot(*way[:2]), float(np.abs(way[3:]).sum())
+    speeds = _greatest_speeds(problem.automaton)
+    pairs = zip(ways, speeds, strict=True)
+    return max([0.0, *((far - goal.tolerance_m) / speed for far, speed in pairs if speed > 0.0)])
 
 
 @kept_by_first
@@ -90,7 +101,8 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     )
     known = 0.0
     if isinstance(cost, Cost):
-        known = straight * (cost.time / _greatest_speed(problem.automaton) + cost.length)
+        known = cost.time * min(_quickest(problem, goal) for goal in problem.goals)
+        known += cost.length * straight
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words
         known = max(known, straight * least_price_per_metre(problem.automaton, cost))
     if not (follows_paths(model) and rests_at_both_ends(problem) and isinstance(cost, Cost)):

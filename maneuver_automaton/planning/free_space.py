@@ -79,7 +79,7 @@ def plan_by_words(
     problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
 ) -> PlanResult:
     """The cheapest word, by exhaustive search or insertion, that stays free and inside."""
-    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives)
+    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives).begun()
     listed = _search_goals(found)
     searched = budget.elapsed
     found.offer_in_turn(listed.candidates)

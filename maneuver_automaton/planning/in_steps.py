@@ -69,7 +69,7 @@ def plan_in_steps(
     steps = steps_of(problem)
     found = Incumbents(
         problem, budget, workspace.on(problem.obstacles), alternatives, steps.likeness
-    )
+    ).begun()
     found.counts.update(expansions=0, collision_queries=0)
     paths, lattice, searched = AlongPaths(found), None, None
     tried = math.inf

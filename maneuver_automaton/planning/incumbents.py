@@ -83,11 +83,12 @@ class Incumbents:
     checking: float = 0.0  # [s] that the checks took
     longest_check: float = CHECK_S  # [s] of all so far
 
-    def __post_init__(self) -> None:
-        """Begin with what meets a goal for the checks, however far an exact end is from it."""
+    def begun(self) -> Incumbents:
+        """These, with what meets a goal for the checks, however far an exact end is from it."""
         for plan, goal_index in nearly_met(self.problem):
             if self.offer(plan, goal_index, proven=False):
                 break
+        return self
 
     @property
     def cost(self) -> float:

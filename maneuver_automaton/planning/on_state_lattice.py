@@ -56,7 +56,9 @@ def plan_on_state_lattice(
     graph = graph_of(problem, goals, workspace.prepared)
     if graph is None:
         return None
-    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives, POLISHED)
+    found = Incumbents(
+        problem, budget, workspace.on(problem.obstacles), alternatives, POLISHED
+    ).begun()
     found.counts.update(expansions=0, collision_queries=0)
     if problem.search.backwards:
         graph = graph.backwards() or graph

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +103,11 @@ class Planner:
         first = self._problem(here, aim, start_trim=self.start_trim or last)
         object.__setattr__(self, "_first", first)
         prepare(first, self.workspace)
+
+    def __reduce__(self) -> tuple[Callable[[], Planner], tuple[()]]:
+        """What makes the like of it: what is prepared is made again, in another process too."""
+        stated = {one.name: getattr(self, one.name) for one in fields(self) if one.init}
+        return functools.partial(Planner, **stated), ()
 
     def problem(
         self,

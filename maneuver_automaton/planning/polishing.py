@@ -20,6 +20,7 @@ from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.greatest_speed import Interval
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polish_values import Guard
 from maneuver_automaton.optimal_control.polishing import intervals_for
@@ -46,6 +47,7 @@ from maneuver_automaton.refinement.polish import (
 )
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 
+NUMBERS_ALONE = "part_poses of the vehicle takes numbers alone, no symbols"
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
 SAMPLES = 500  # of a plan that passes above or below obstacles
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
@@ -66,19 +68,32 @@ def why_not_polished(problem: Problem) -> str:
     """Why plans of a problem cannot be polished; empty if they can."""
     if problem.automaton.lattice is not None:
         return "the vehicle moves by the maneuvers of its library alone"
+    if not problem.automaton.model.reduced_names:
+        return "the vehicle has no inertia"
     if not problem.search.polish:
         return "it is not asked for"
+    if problem.parts and not _frames_take_symbols(problem.automaton.model):
+        return NUMBERS_ALONE
     unlimited = problem.horizon.time is None and problem.horizon.max_time is None
     if unlimited and polished_price(problem).cost.time == 0.0:
         return "time costs nothing"
     return why_no_casadi()
 
 
+def _frames_take_symbols(model: Model) -> bool:
+    """Whether the poses of what a vehicle carries follow by arithmetic alone, as intervals do."""
+    try:
+        model.part_frames([Interval(-0.1, 0.1)] * len(model.reduced_names))  # type: ignore[attr-defined]
+    except (TypeError, ValueError, AttributeError):
+        return False
+    return True
+
+
 def left_out(*problems: Problem) -> tuple[str, ...]:
     """What plans of some problems do without that they should have, and why: a sentence each."""
     for one in problems:
         why = why_not_polished(one) if has_inertia(one) else ""
-        if why and why == why_no_casadi():
+        if why and why in (why_no_casadi(), NUMBERS_ALONE):
             return (f"plans are not polished, and may cost much more: {why}",)
     return ()
 

@@ -113,11 +113,34 @@ def drive_all(
         if not step > 0.0:
             raise ValueError(f"drive: {name} must be positive, got {step}")
     ride, elements = resolved(model, z, u, h)
-    return _sampled(ride, elements, max_step_m, max_step_rad)
+    return _sampled(model, ride, elements, max_step_m, max_step_rad)
+
+
+def along(course: Trajectory, times: Array, model: Model) -> tuple[Array, Array]:
+    """Poses (n, dof) and reduced states (n, n_z) of a course at times (n,), as the model drives.
+
+    Each is driven from the sample before it, under the control that holds there.
+    """
+    k = np.clip(np.searchsorted(course.time, times, side="right") - 1, 0, course.time.size - 1)
+    since = np.maximum(times - course.time[k], 0.0)
+    poses, states, between = course.pose[k], course.reduced_state[k], np.flatnonzero(since)
+    if between.size:
+        rows = k[between]
+        rides = drive_all(
+            model,
+            course.reduced_state[rows],
+            control=course.control[rows][:, None],
+            durations=since[between, None],
+            max_step_m=np.inf,
+            max_step_rad=np.inf,
+        )
+        poses[between] = _moved(poses[between], np.array([ride.pose[-1] for ride in rides]))
+        states[between] = [ride.reduced_state[-1] for ride in rides]
+    return poses, states
 
 
 def _sampled(
-    ride: Ride, elements: Elements, max_step_m: float, max_step_rad: float
+    model: Model, ride: Ride, elements: Elements, max_step_m: float, max_step_rad: float
 ) -> tuple[Trajectory, ...]:
     """Samples of every ride, equal times apart while one control holds, all in one go."""
     counts = _n_samples(ride, elements, max_step_m, max_step_rad)
@@ -139,6 +162,7 @@ def _sampled(
         pose=_moved(poses[at], gained[:, :dof]),
         reduced_state=elements.begin[at] + gained[:, dof:],
         control=elements.control[at],
+        model=model,
     )
     last = elements.control[np.arange(len(spans)), _last_place(elements.step)]
     stops = np.searchsorted(rows[of], np.arange(len(spans)), side="right")
@@ -150,6 +174,7 @@ def _sampled(
                 [samples.reduced_state[start:stop], elements.begin[r, -1:]]
             ),
             control=np.concatenate([samples.control[start:stop], last[r][None]]),
+            model=model,
         )
         for r, (start, stop) in enumerate(zip([0, *stops[:-1]], stops, strict=True))
     )

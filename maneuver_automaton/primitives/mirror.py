@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -44,8 +44,8 @@ class Mirror:
 
     def trajectory(self, course: Trajectory) -> Trajectory:
         """The course on the other side."""
-        return Trajectory(
-            time=course.time,
+        return replace(
+            course,
             pose=course.pose * _pose_signs(course.pose.shape[-1]),
             reduced_state=self.state(course.reduced_state),
             control=course.control @ self.control.T,

@@ -29,6 +29,7 @@ class Trajectory:
     pose: Array  # (n, dof), headings continuous [m, m, rad(, m)]
     reduced_state: Array  # (n, n_z)
     control: Array  # (n, n_u)
+    model: Model | None = None  # whose equations lead from sample to sample; None: nobody knows
 
     __repr__ = brief
 

@@ -87,20 +87,36 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
     [('ahead',)]
     """
     automaton, found = problem.automaton, list[tuple[Plan, int]]()
-    moving = [trim for trim in automaton.trims if not trim.is_rest]
     for index, goal in enumerate(problem.goals):
         distance, turn = goal.off(problem.start)
         if distance <= goal.tolerance_m + MET and turn <= goal.tolerance_rad + MET:
-            resting = automaton.is_kinematic and automaton.rest is None
-            first = [] if resting else [problem.first_trim]
+            restless = automaton.is_kinematic and automaton.rest is None
+            first = [] if restless else [problem.first_trim]
             if automaton.is_kinematic or np.array_equal(
                 first[0].reduced_state, problem.last_trim(goal).reduced_state
             ):
                 found.append((Plan(problem.start, first, durations=[0.0] * len(first)), index))
-        elif automaton.is_kinematic and not goal.free_heading and len(moving) <= MOST_TRIMS:
-            for trims, times in _short_words(problem, goal, moving):
-                found.append((Plan(problem.start, trims, durations=times), index))
+        elif not goal.free_heading and len(joined := _joined(problem, goal)) <= MOST_TRIMS:
+            for trims, times in _short_words(problem, goal, joined):
+                switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
+                plan = Plan(problem.start, trims, durations=times, maneuvers=switches)
+                found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
+
+
+def _joined(problem: Problem, goal: Goal) -> list[Trim]:
+    """The moving trims that need no maneuver on the way from the first trim to the last."""
+    automaton = problem.automaton
+    if automaton.is_kinematic:
+        return [trim for trim in automaton.trims if not trim.is_rest]
+    classes = automaton.trim_classes.tolist()
+    ends = (problem.first_trim.name, problem.last_trim(goal).name)
+    first, last = (classes[automaton.index_of(name)] for name in ends)
+    return [
+        trim
+        for trim, kind in zip(automaton.trims, classes, strict=True)
+        if kind == first == last and not trim.is_rest
+    ]
 
 
 def _short_words(

@@ -133,8 +133,13 @@ def closed_bounds(problem: Problem, goal: Goal) -> dict[str, float]:
     if prices is None or is_still(relative, free_heading=goal.free_heading):
         return {"distance": 0.0}
     distance, turn = _distance_to(relative, goal), _turn_to(relative, goal)
+    ways = (
+        (distance, prices.per_metre),
+        (math.hypot(*relative[:2]) - goal.tolerance_m, prices.per_metre_level),
+        (abs(relative[3]) - goal.tolerance_m, prices.per_metre_up_down[int(relative[3] < 0.0)]),
+    )
     bounds = {
-        "distance": distance * prices.per_metre if distance > 0.0 else 0.0,
+        "distance": max((way * price for way, price in ways if way > 0.0), default=0.0),
         "turn": turn * prices.per_radian if turn > 0.0 else 0.0,
     }
     if limit is not None:
@@ -182,6 +187,8 @@ class _Prices:
     """Best prices of a library; what rest costs is taken off where it pads."""
 
     per_metre: float
+    per_metre_level: float  # of the way in the plane alone
+    per_metre_up_down: tuple[float, float]
     per_radian: float
     per_second: float
     per_square: float  # per (m/s)^2 + (rad/s)^2 and second
@@ -200,8 +207,13 @@ def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None
     with np.errstate(divide="ignore", invalid="ignore"):
         metre = np.where(library.speeds > 0.0, rates / library.speeds, np.inf)
         radian = np.where(library.turn_rates > 0.0, rates / library.turn_rates, np.inf)
+        level = np.hypot(library.twists[:, 0], library.twists[:, 1])
+        climb = library.twists[:, 3]
+        up, down = (np.where(v > 0.0, rates / v, np.inf) for v in (climb, -climb))
         return _Prices(
             per_metre=float(metre.min()),
+            per_metre_level=float(np.where(level > 0.0, rates / level, np.inf).min()),
+            per_metre_up_down=(float(up.min()), float(down.min())),
             per_radian=float(radian.min()),
             per_second=float(rates.min()),
             per_square=float(np.min(rates / squares)),

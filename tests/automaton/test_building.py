@@ -182,6 +182,11 @@ def test_a_trailer_goes_one_way():
     ahead, back = build_library(model, trims, pairs=pairs, keep_sign=("speed",)).automaton.maneuvers
     assert ahead.course.control[:, 0].min() >= 0.0
     assert back.course.control[:, 0].max() <= 0.0
+    rests = [trim for trim in trims if not trim.reduced_state.any()]
+    every = build_library(model, trims, keep_sign=("speed",), mirror=False).automaton
+    assert len(rests) == 2
+    assert {m.source.split(",")[0] for m in every.maneuvers} == {"speed 3", "speed -1"}
+    assert all(m.source.split(",")[0] == m.target.split(",")[0] for m in every.maneuvers)
 
 
 def test_near_pairs_come_in_both_directions():

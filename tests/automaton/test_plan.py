@@ -11,8 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.models import rollout
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.primitives.resimulation import _rates, pieces
 
 AHEAD = Trim(name="ahead", body_velocity=[2.0, 0.0, 0.0], control=[2.0, 0.0])
 LEFT = Trim(name="left", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])
@@ -286,3 +289,18 @@ def test_a_maneuver_without_a_course_cannot_be_sampled():
     assert plan.end.tolist() == [2, 0, 0]
     with pytest.raises(ValueError, match=r"^maneuver 'hop': has no course, so it cannot be"):
         plan.sample()
+
+
+@pytest.mark.parametrize("name", ["helicopter", "second_order_car"])
+def test_poses_between_samples_are_those_of_the_equations(name):
+    library = load_stock_library(name)
+    rates, dof = _rates(library.model), library.model.group.dof
+    for maneuver in library.maneuvers[::40]:
+        ends = library[maneuver.source], library[maneuver.target]
+        plan = Plan(np.zeros(dof), ends, durations=[0.0, 0.0], maneuvers=(maneuver,))
+        state = np.concatenate([np.zeros(dof), ends[0].reduced_state])
+        for begin, end, control in pieces(maneuver.course.time, maneuver.course.control):
+            times = np.linspace(begin, end, 7)
+            driven = rollout(rates, state, control=control, times=times, rtol=1e-11, atol=1e-12)
+            assert np.abs(plan.pose_at(times) - driven[:, :dof]).max() < 1e-9
+            state = driven[-1]

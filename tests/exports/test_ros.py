@@ -63,6 +63,36 @@ def test_velocities_are_the_rates_of_the_poses():
     assert max(ahead) == pytest.approx(2.0)
 
 
+def test_accelerations_are_the_rates_of_the_velocities():
+    for value in (inertia(), trailer()):
+        points = ma.ros_messages(value, step=0.005)["trajectory"]["points"]
+        time = np.array([seconds(one["time_from_start"]) for one in points])
+
+        def columns(name, points=points):
+            rows = [
+                [one["linear"]["x"], one["linear"]["y"], one["angular"]["z"]]
+                for point in points
+                for one in point[name]
+            ]
+            return np.array(rows).reshape(len(points), -1)
+
+        rates = np.gradient(columns("velocities"), time, axis=0)
+        off = np.abs(columns("accelerations") - rates).max(axis=1)
+        assert np.quantile(off, 0.9) < 0.02  # all but where a control jumps
+        assert np.abs(columns("accelerations")).max() > 0.1
+
+
+def test_a_piece_of_a_loop_is_a_trajectory_at_a_rate():
+    robot = ma.Automaton.of_controls(
+        ma.Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)}
+    )
+    controller = ma.RecedingHorizon(ma.Problem(robot, [0, 0, 0], [1.25, 0, 0]), step=0.5)
+    for x in (0.0, 0.5, 1.0):
+        _, log = controller.step([x, 0, 0])
+    points = ma.ros_messages(log.piece, step=0.1, model=robot.model)["trajectory"]["points"]
+    assert [point["transforms"][0]["translation"]["x"] for point in points][-1] == 1.25
+
+
 def test_a_car_has_ackermann_commands_and_a_unicycle_none():
     drive = ma.ros_messages(inertia(), step=0.5)["ackermann_cmd"]
     assert drive[1]["drive"]["acceleration"] == CAR.max_acceleration

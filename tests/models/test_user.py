@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.errors import BrokenSymmetry
-from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.groups import SE2, SE2xR, translations
 from maneuver_automaton.models import UserModel, model_of_vector_field, vector_field
 
 
@@ -83,3 +83,12 @@ def test_wrong_limits_are_named():
         user_model(control_limits=[[1.0, -1.0], [0.0, 1.0]])
     with pytest.raises(ValueError, match="speed needs least <= greatest, got"):
         user_model(control_limits=[[np.nan, 1.0], [0.0, 1.0]])
+
+
+def test_a_state_of_more_numbers_than_stated_is_told():
+    said = r"the state has 2 numbers, x, y, .* need reduced_names"
+    with pytest.raises(ValueError, match=said):
+        model_of_vector_field(windy, group=translations(2), n_controls=2)
+    model = model_of_vector_field(windy, group=translations(2), n_controls=2, check=False)
+    with pytest.raises(ValueError, match=said):
+        model.body_velocity(np.zeros(0), np.zeros(2))

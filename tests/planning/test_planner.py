@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import copy
+import functools
+import multiprocessing
+import pickle
 from dataclasses import fields
 
 import numpy as np
@@ -104,3 +108,19 @@ def test_another_map_has_another_workspace():
     assert other.workspace is not planner.workspace
     assert planner.workspace.on(planner.obstacles) is planner.workspace
     assert planner.workspace.on(other.obstacles) is not planner.workspace
+
+
+def test_a_planner_is_copied_and_sent_to_other_processes():
+    search = SearchSettings(max_expansions=200, improve=False)
+    wall = Box([1.0, 1.0], [2.0, 0.5])
+    planner = Planner(robot(TABLE_2), obstacles=[wall], margin=0.1, search=search)
+    query = functools.partial(_cost, planner, [4.0, 0.0, 0.0])
+    for again in (pickle.loads(pickle.dumps(planner)), copy.deepcopy(planner), copy.copy(planner)):
+        assert again.margin == 0.1
+        assert _cost(again, [4.0, 0.0, 0.0]) == query()
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(query) == query()
+
+
+def _cost(planner, goal):
+    return planner.plan([0, 0, 0], goal, time_limit=60.0).cost
