@@ -112,7 +112,7 @@ def _soonest(problem: Problem, plan: Plan) -> Plan:
     for _ in range(HALVINGS):
         half = 0.5 * (least + most)
         stands = float(plan.durations[-1]) + float(plan.durations[-2]) - half
-        sooner = replace(plan, durations=[*plan.durations[:-2], half, stands])
+        sooner = replace(plan, durations=np.append(plan.durations[:-2], [half, stands]))
         pose = sooner.switching_poses[-2]
         free = stands_free(problem, pose, time=until - stands, duration=stands)
         if free >= stands:
