@@ -467,8 +467,8 @@ def convert(
 
     OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with becomes
     a Nav2 map: OUT and an image beside it. Primitives end in .json (a library), .nav2.json
-    (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or a folder
-    exported by AROC.
+    (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or a folder or
+    .zip exported by AROC.
     """
     from maneuver_automaton.cli import convert_command
     from maneuver_automaton.cli.inputs import Parts

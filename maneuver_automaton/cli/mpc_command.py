@@ -6,7 +6,6 @@ import contextlib
 import functools
 import io
 import json
-import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -90,14 +89,7 @@ def drive_file(path: Path, out: Path, *, settings: Settings, parts: Parts) -> in
         if violation.guarantee is not Guarantee.DECREASE:  # what noise does, in every other step
             complain(f"{path}: step {number} was disturbed: {violation}")
     if not loop.reached:
-        from maneuver_automaton.planning.blocked import where_touched
-
-        fixed = [goal for goal in loop.problem.goals if not goal.free_heading]
-        said = (
-            [] if loop.steps else [where_touched(loop.problem, one.pose, math.inf) for one in fixed]
-        )
-        blocked = "; ".join(f"the goal is blocked: {words}" for words in said if words)
-        complain(f"{path}: {loop.status}: {blocked or loop.reason}")
+        complain(f"{path}: {loop.status}: {loop.reason}")
     return FOUND if loop.reached and not any(loop.collisions) else NO_PLAN
 
 

@@ -1,4 +1,4 @@
-"""Maneuver automata exported by AROC: a folder with `automaton.xml` and `primitives/`; read only.
+"""Maneuver automata exported by AROC: `automaton.xml` and `primitives/`, zipped or not; read only.
 
 Every child of `automaton.xml` names a file of one primitive: numbers of those that may follow, from
 1; states and inputs; and the set that the vehicle occupies while a controller keeps it near the
@@ -16,6 +16,7 @@ synthesis*, HSCC.
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,7 +24,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton, Trajectory
-from maneuver_automaton.errors import InvalidLibrary
+from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.levels import levels_of, nearest_level
 from maneuver_automaton.formats.xml_source import Element, read_xml
 from maneuver_automaton.groups import SE2
@@ -88,22 +89,39 @@ class ArocDeviation:
         )
 
 
-def is_aroc(path: Path) -> bool:
-    """Whether a path is an export: its folder, or the list in it."""
-    folder = path if path.is_dir() else path.parent
-    named = path.is_dir() or path.name == LIST
-    return named and (folder / LIST).is_file() and (folder / FOLDER).is_dir()
+def export_at(path: Path) -> Path | zipfile.Path | None:
+    """The folder of an export: that of its list, one in an archive or folder, or itself, or None.
+
+    Raises
+    ------
+    InvalidScenario
+        If an archive is broken.
+    """
+    base: Path | zipfile.Path = path.parent if path.name == LIST else path
+    if path.suffix.lower() == ".zip" and path.is_file():
+        try:
+            base = zipfile.Path(path)
+        except (OSError, zipfile.BadZipFile) as error:
+            raise InvalidScenario(f"{path}: cannot be read as a zip archive: {error}") from error
+    elif not base.is_dir():
+        return None
+    within = () if path.name == LIST else (one for one in base.iterdir() if one.is_dir())
+    places = (base, *within)
+    there = (one for one in places if (one / LIST).is_file() and (one / FOLDER).is_dir())
+    return next(there, None)
 
 
 def read_aroc(path: Path) -> tuple[ArocPrimitive, ...]:
-    """The primitives of a folder, in the order of its list.
+    """The primitives of a folder or an archive, in the order of its list.
 
     Raises
     ------
     InvalidScenario
         If a file or element is missing, or holds what it may not.
     """
-    folder = path if path.is_dir() else path.parent
+    folder = export_at(path)
+    if folder is None:
+        raise InvalidScenario(f"{path}: is no export of AROC, need {LIST} and {FOLDER}/")
     root = read_xml(folder / LIST, what="a list of primitives", most=MOST_BYTES)
     if not root.children:
         raise root.error("names no primitive, need at least one")
@@ -131,25 +149,35 @@ def wheelbase_of(primitives: tuple[ArocPrimitive, ...]) -> float:
 
 
 def automaton_of_aroc(
-    primitives: tuple[ArocPrimitive, ...], *, wheelbase: float | None = None, name: str = ""
+    primitives: tuple[ArocPrimitive, ...], *, model: AcceleratingCar | None = None, name: str = ""
 ) -> Automaton:
-    """The automaton of an export, for a `wheelbase` [m] other than the fitted one if it is given.
+    """The automaton of an export, for another `model` than the one fitted to it if it is given.
 
     Raises
     ------
     InvalidLibrary
-        If the wheelbase is not known, or a primitive is to follow one that ends at another speed.
+        If the wheelbase is not known, a primitive exceeds a limit of the model, or is to follow
+        one that ends at another speed.
     """
-    length = wheelbase_of(primitives) if wheelbase is None else wheelbase
     speeds = np.concatenate([one.states[:, 3] for one in primitives])
     inputs = np.concatenate([one.inputs for one in primitives])
-    model = AcceleratingCar(
-        wheelbase=length,
-        max_steering=max(float(np.abs(inputs[:, 1]).max()), LEAST),
-        max_speed=max(float(speeds.max()), LEAST),
-        min_speed=min(float(speeds.min()), 0.0),
-        max_acceleration=max(float(np.abs(inputs[:, 0]).max()), LEAST),
-    )
+    if model is None:
+        model = AcceleratingCar(
+            wheelbase=wheelbase_of(primitives),
+            max_steering=max(float(np.abs(inputs[:, 1]).max()), LEAST),
+            max_speed=max(float(speeds.max()), LEAST),
+            min_speed=min(float(speeds.min()), 0.0),
+            max_acceleration=max(float(np.abs(inputs[:, 0]).max()), LEAST),
+        )
+    limits = np.vstack([model.reduced_limits, model.control_limits])
+    for what, (low, high), values in zip(
+        ("a speed", "an acceleration", "a steering angle"), limits, (speeds, *inputs.T), strict=True
+    ):
+        worst = float(values[np.abs(values - 0.5 * (low + high)).argmax()])
+        if not low <= worst <= high:
+            raise InvalidLibrary(
+                f"{LIST}: has {what} of {worst:g}, but the vehicle keeps to {low:g} to {high:g}"
+            )
     begins = np.array([one.states[0, 3] for one in primitives])
     ends = np.array([one.states[-1, 3] for one in primitives])
     levels = levels_of(begins, ends, apart=FITS)
@@ -200,7 +228,7 @@ def deviation_of(primitives: tuple[ArocPrimitive, ...], automaton: Automaton) ->
     )
 
 
-def _primitive(folder: Path, listed: Element, n: int) -> ArocPrimitive:
+def _primitive(folder: Path | zipfile.Path, listed: Element, n: int) -> ArocPrimitive:
     name = listed.text.strip()
     if not name or name != Path(name).name or "\0" in name:
         raise listed.error(f"got {name!r:.60}, need the name of a file in {FOLDER}")

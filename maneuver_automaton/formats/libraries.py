@@ -13,6 +13,7 @@ from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats import aroc, commonroad_primitives, nav2_lattice, sbpl_mprim
 from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.models import AcceleratingCar, Model
 
 MPRIM, XML, JSON, NAV2_JSON = ".mprim", ".xml", ".json", ".nav2.json"
 MOST_LIBRARY_BYTES = 500_000_000
@@ -35,8 +36,10 @@ class PrimitivesRead:
     remark: str  # where the automaton is not what the file says; empty if it is
 
 
-def read_primitives(path: Path) -> PrimitivesRead | None:
+def read_primitives(path: Path, model: Model | None = None) -> PrimitivesRead | None:
     """What a file of motion primitives holds; None if it is in none of these formats.
+
+    Exports of AROC do not state the vehicle: a `model` of their kind takes the place of the fitted.
 
     Raises
     ------
@@ -46,18 +49,18 @@ def read_primitives(path: Path) -> PrimitivesRead | None:
         If it makes no automaton.
     """
     try:
-        return _read(path)
+        return _read(path, model)
     except (InvalidScenario, InvalidLibrary):
         raise
     except ValueError as error:
         raise InvalidLibrary(f"{path}: {error}") from error
 
 
-def _read(path: Path) -> PrimitivesRead | None:
+def _read(path: Path, model: Model | None) -> PrimitivesRead | None:
     """As `read_primitives`; what makes no motion raises a ValueError."""
     ending = path.suffix.lower()
-    if aroc.is_aroc(path):
-        return _of_aroc(path)
+    if aroc.export_at(path) is not None:
+        return _of_aroc(path, model)
     if path.is_dir() or not path.exists():
         return None
     if ending == MPRIM:
@@ -131,10 +134,11 @@ def _of_commonroad(path: Path) -> PrimitivesRead:
     return PrimitivesRead(kind="CommonRoad", file=file, automaton=automaton, remark=remark)
 
 
-def _of_aroc(path: Path) -> PrimitivesRead:
-    folder = path if path.is_dir() else path.parent
+def _of_aroc(path: Path, model: Model | None) -> PrimitivesRead:
+    folder = path.parent if path.name == aroc.LIST else path
     file = aroc.read_aroc(path)
-    automaton = aroc.automaton_of_aroc(file, name=folder.resolve().name)
+    own = model if isinstance(model, AcceleratingCar) else None
+    automaton = aroc.automaton_of_aroc(file, model=own, name=folder.resolve().stem)
     remark = str(aroc.deviation_of(file, automaton))
     return PrimitivesRead(kind="AROC", file=file, automaton=automaton, remark=remark)
 

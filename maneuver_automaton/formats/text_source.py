@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import zipfile
+import zlib
 from pathlib import Path
 
 from maneuver_automaton._files import open_input
@@ -13,8 +15,10 @@ MAX_BYTES = 5_000_000  # of a file that people write
 MAX_MAP_BYTES = 200_000_000  # of a file that holds a map, cell by cell
 
 
-def read_bytes(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") -> bytes:
-    """The content of a file of at most `most` bytes; `what` is what it should hold.
+def read_bytes(
+    path: Path | zipfile.Path, *, most: int = MAX_BYTES, what: str = "a scenario"
+) -> bytes:
+    """The content of a file, or of one in an archive, of at most `most` bytes: `what`.
 
     Raises
     ------
@@ -22,13 +26,15 @@ def read_bytes(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") -
         If it is missing, a folder, unreadable, or too long.
     """
     try:
-        with open_input(path) as stream:
+        packed = isinstance(path, zipfile.Path)
+        with path.open("rb") if packed else open_input(path) as stream:
             content = stream.read(most + 1)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error
     except IsADirectoryError as error:
         raise InvalidScenario(f"{path}: is a folder, need a file") from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL in the path
+    # ValueError: a NUL in the path; the others: an archive that is broken or locked
+    except (OSError, ValueError, zipfile.BadZipFile, zlib.error, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise InvalidScenario(f"{brief(str(path), 200)}: cannot be read: {reason}") from error
     if len(content) > most:

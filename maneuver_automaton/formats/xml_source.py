@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -21,7 +22,7 @@ class Element:
 
     tag: str
     attributes: dict[str, str]
-    file: Path
+    file: Path | zipfile.Path
     line: int
     text: str = ""
     children: list[Element] = field(default_factory=list)
@@ -80,7 +81,7 @@ class Element:
 class _Builder:
     """Collect the elements of one file."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path | zipfile.Path) -> None:
         self.path = path
         self.open: list[Element] = []
         self.root: Element | None = None
@@ -115,7 +116,7 @@ class _Builder:
         raise InvalidScenario(f"{self.path}:{line}: has a document type, need a file without one")
 
 
-def parse(parser: expat.XMLParserType, content: bytes, path: Path) -> None:
+def parse(parser: expat.XMLParserType, content: bytes, path: Path | zipfile.Path) -> None:
     """Let a parser read a whole file; a fault in the XML is an error that names its line."""
     try:
         parser.Parse(content, True)
@@ -126,7 +127,7 @@ def parse(parser: expat.XMLParserType, content: bytes, path: Path) -> None:
         raise InvalidScenario(f"{path}: not valid XML: {error}") from error
 
 
-def read_xml(path: Path, *, what: str, most: int) -> Element:
+def read_xml(path: Path | zipfile.Path, *, what: str, most: int) -> Element:
     """The root element of a file of at most `most` bytes; `what` is what it should hold.
 
     Raises

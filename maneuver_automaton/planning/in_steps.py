@@ -40,6 +40,7 @@ from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.words.maneuver_words import maneuver_words, only_maneuvers_turn
 
 WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no plan yet
 LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
@@ -79,6 +80,8 @@ def plan_in_steps(
         _offer(found, paths.plans())
     if steps.words and not (budget.is_over or found.is_enough):
         _offer(found, _free_words(found, steps), proven=not problem.obstacles)
+    if only_maneuvers_turn(problem.automaton) and not found.plans:
+        _offer(found, _turned_by_maneuvers(found), proven=not problem.obstacles)
     if steps.lattice and not (budget.is_over or found.is_enough):
         lattice, tried = _search_lattice(found, steps, paths, begun)
         searched = budget.elapsed if lattice.knows_all else None
@@ -148,6 +151,14 @@ def _free_words(found: Incumbents, steps: Steps) -> Iterator[tuple[Plan, int]]:
         free_words(found, goals_left(problem), others=others, share=share)
     ):
         yield plan_of(problem, word), index
+
+
+def _turned_by_maneuvers(found: Incumbents) -> Iterator[tuple[Plan, int]]:
+    """Maneuvers in a row with straight coasts, where no word of trims turns the vehicle."""
+    for index in goals_left(found.problem):
+        goal, part = found.problem.goals[index], found.budget.stage(WORDS_SHARE)
+        for plan in maneuver_words(found.problem, goal, others=OTHERS, budget=part):
+            yield plan, index
 
 
 def _count_refused(found: Incumbents, lattice: LatticeWords | None) -> None:

@@ -17,6 +17,7 @@ from maneuver_automaton.planning.tracking import (
     LITTLE,
     Tracked,
     clearance_at,
+    free_until,
     stands_free,
     track,
 )
@@ -36,7 +37,8 @@ LATE = 0.8  # after which no path to the goal is; the rest is for a fail-safe tr
 MOST_EXPANSIONS = 4_000  # of such a search, among moving obstacles
 ANEW = Patience(attempts=8_000, passes=6)  # where there is no plan to go on from
 MOMENT = 1e-9  # [s]
-SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
+NEARLY = 0.98  # of the free part of a path, after which there is room to stand
+SHARES = (1.0, 0.5, 0.25)  # of how far a path to the goal is followed before it is left
 
 
 class AmongObstacles:
@@ -118,9 +120,11 @@ class AmongObstacles:
     def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
         """Towards the goal as long as it is safe, then to wait or evade, then the last plan."""
         here, rest = self.here, self.now.rest
-        for plan in self._ambitions() if here.moves else ():
+        for plan in self._ambitions():
+            # what stands still leaves no reason to go on in steps
+            reach = self.settings.step if here.moves else NEARLY * free_until(here, plan)
             for share in SHARES:
-                towards = self.predicted.continued(plan, share * self.settings.step)
+                towards = self.predicted.continued(plan, share * reach)
                 if towards is not None:
                     yield towards, Decision.APPROACHED
         found = self.predicted.fail_safe(here.start, here.start_time)
@@ -133,9 +137,12 @@ class AmongObstacles:
                 yield tail, _evading(tail)
 
     def _ambitions(self) -> Iterator[Plan]:
-        """Paths to the goal that may be followed for a moment."""
+        """Paths to the goal that may be followed for a moment, or as far as they are free."""
         now, here = self.now, self.here
         yield from self.unsafe
+        if not here.moves:
+            yield from [now.rest] if now.rest is not None and moves_on(now.rest) else []
+            return
         if now.last is not None and now.last.decision.leads and now.rest is not None:
             yield now.rest
         static = tuple(one for one in here.obstacles if not moves(one))

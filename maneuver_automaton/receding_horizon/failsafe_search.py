@@ -27,6 +27,7 @@ IMPATIENCE = 0.1  # seconds of safety that a second of driving is worth
 MOST_NODES = 2**16
 TIMELY = 16  # expansions between two looks at the clock
 MOST_EXPANSIONS = 4000
+HALVINGS = 6  # of the last coast, to leave it as soon as it is safe to stand
 WAITING = 1e6  # [s] a tick is less than that, unless no trim moves
 
 
@@ -49,8 +50,8 @@ def search_fail_safe(
 ) -> FailSafe:
     """A motion from the problem's start that is free of its obstacles until a time, if possible.
 
-    A vehicle that can rest ends at rest. Where no motion is free until then, the one that
-    is free for longest comes back.
+    A vehicle that can rest ends at rest, as soon as it is safe there. Where no motion is free until
+    then, the one that is free for longest comes back.
 
     Parameters
     ----------
@@ -73,7 +74,14 @@ def search_fail_safe(
     >>> found.complete, found.plan.word[-1], bool(abs(found.plan.end[0] - 2.0) > 1.0)
     (True, 'rest', True)
     """
+    at, rest = problem.start_time, problem.automaton.rest
     query = lattice_query(_to_rest(problem), (0,))
+    if query.library.at_will and rest is not None and not problem.moves:
+        # where nothing moves rest is no edge of the lattice, and free for ever if it is now
+        free = stands_free(problem, problem.start, time=at, duration=until - at) > 0.0
+        trims = (problem.automaton.trims[rest],)
+        stood = Plan(problem.start, trims, durations=[until - at], start_time=at)
+        return FailSafe(plan=stood, free_until=until if free else at, complete=free, expansions=0)
     library, scene = query.library.arrays, _scene(query)
     task = _task(query, until)
     search = _arrays(MOST_NODES)
@@ -86,12 +94,32 @@ def search_fail_safe(
     state = search.state
     node = int(state[kernels.BEST])
     free_until = float(search.nodes[node, kernels.SAFE])
+    complete, plan = bool(state[kernels.FOUND] >= 0), _plan(query, task, search, node)
     return FailSafe(
-        plan=_plan(query, task, search, node),
+        plan=_soonest(problem, plan) if complete and query.library.at_will else plan,
         free_until=free_until,
-        complete=bool(state[kernels.FOUND] >= 0),
+        complete=complete,
         expansions=int(state[kernels.EXPANSIONS]),
     )
+
+
+def _soonest(problem: Problem, plan: Plan) -> Plan:
+    """The plan, whose last coast before it rests is as short as is safe."""
+    n = len(plan.trims)
+    if problem.parts or n < 2 or not plan.trims[-1].is_rest:
+        return plan
+    until, least, most = plan.start_time + plan.duration, 0.0, float(plan.durations[-2])
+    for _ in range(HALVINGS):
+        half = 0.5 * (least + most)
+        stands = float(plan.durations[-1]) + float(plan.durations[-2]) - half
+        sooner = replace(plan, durations=np.append(plan.durations[:-2], [half, stands]))
+        pose = sooner.switching_poses[-2]
+        free = stands_free(problem, pose, time=until - stands, duration=stands)
+        if free >= stands:
+            plan, most = sooner, half
+        else:
+            least = half
+    return plan
 
 
 def _to_rest(problem: Problem) -> Problem:

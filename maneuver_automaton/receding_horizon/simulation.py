@@ -16,6 +16,7 @@ from maneuver_automaton.automaton.cutting import NOTHING, tail_of
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
@@ -25,6 +26,7 @@ from maneuver_automaton.receding_horizon.disturbance import (
     checked,
     draws,
 )
+from maneuver_automaton.receding_horizon.failsafe import settled
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.shifting import moves_on
 
@@ -239,6 +241,10 @@ def _closed_loop(
             status = "steps_spent"
             reason = f"the goal is not reached after {len(applied)} steps"
             reason += ", when the loop was interrupted" if stopped() else ""
+    there = settled(replace(controller.problem, start_time=track.times[-1]))
+    blocked = [] if reached else [why_goal_blocked(there, goal) for goal in there.goals]
+    if blocked and all(blocked):
+        reason = f"the goal is blocked: {blocked[0]}{f'; {reason}' if applied else ''}"
     return ClosedLoop(
         problem=track.problem,
         step=step,

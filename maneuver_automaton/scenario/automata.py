@@ -239,7 +239,7 @@ def _from_library(document: Document, path: Path, model: Model) -> Automaton:
     from maneuver_automaton.formats.libraries import read_primitives
 
     with at(document, (*WHERE, "file")):
-        read = read_primitives(path)
+        read = read_primitives(path, model)
         if read is not None:
             return _fitting(read.automaton, model)
         if is_known(model):

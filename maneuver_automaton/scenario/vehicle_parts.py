@@ -96,7 +96,7 @@ class Vehicle(Part):
 
     instead: ClassVar = REFUSED | {
         "max_lateral_acceleration_m_s2": "no such key, which car, second_order_car, "
-        "car_with_trailer and single_track have; a zone limits it for any vehicle"
+        "accelerating_car, car_with_trailer and single_track have; a zone limits it for any vehicle"
     }
 
 
@@ -148,6 +148,22 @@ class SecondOrderCarPart(Part):
     max_speed_m_s: Positive = Field(description="a positive number")
     max_acceleration_m_s2: Positive = Field(description="a positive number")
     max_steering_rate_rad_s: Positive = Field(description="a positive number")
+    min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
+    max_lateral_acceleration_m_s2: Positive | None = Field(None, description=LATERAL)
+    footprint: Footprint | None = Field(None, description="shape of the body")
+    footprint_height_m: Interval | None = Field(None, description=ABOVE_GROUND)
+
+
+class AcceleratingCarPart(Part):
+    """A car with inertia that steers at once, as AROC has it; state [v], control [rate, angle]."""
+
+    instead: ClassVar = REFUSED
+
+    model: Literal["accelerating_car"] = Field(description="accelerating_car")
+    wheelbase_m: Positive = Field(description="distance of the axles, a positive number")
+    max_steering_rad: Sharp = Field(description=SHARP)
+    max_speed_m_s: Positive = Field(description="a positive number")
+    max_acceleration_m_s2: Positive = Field(description="a positive number")
     min_speed_m_s: Number | None = Field(None, description="left out: as fast in reverse")
     max_lateral_acceleration_m_s2: Positive | None = Field(None, description=LATERAL)
     footprint: Footprint | None = Field(None, description="shape of the body")
@@ -285,6 +301,7 @@ PARTS: tuple[type[Part], ...] = (
     CarPart,
     SecondOrderUnicyclePart,
     SecondOrderCarPart,
+    AcceleratingCarPart,
     CarWithTrailerPart,
     SingleTrackPart,
     HovercraftPart,
@@ -349,6 +366,7 @@ VehiclePart = Annotated[
     | Annotated[CarPart, Tag("<car>")]
     | Annotated[SecondOrderUnicyclePart, Tag("<second_order_unicycle>")]
     | Annotated[SecondOrderCarPart, Tag("<second_order_car>")]
+    | Annotated[AcceleratingCarPart, Tag("<accelerating_car>")]
     | Annotated[CarWithTrailerPart, Tag("<car_with_trailer>")]
     | Annotated[SingleTrackPart, Tag("<single_track>")]
     | Annotated[HovercraftPart, Tag("<hovercraft>")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zipfile
 
 import numpy as np
 import pytest
@@ -12,13 +13,17 @@ from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.aroc import (
     automaton_of_aroc,
     deviation_of,
-    is_aroc,
+    export_at,
     read_aroc,
     wheelbase_of,
 )
+from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.models import AcceleratingCar
+from maneuver_automaton.planning import plan
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.scenario import load_scenario
+from tests.search.cases import compiled_only
 
 CAR = AcceleratingCar(wheelbase=2.5, max_steering=0.5, max_speed=12.0, max_acceleration=4.0)
 
@@ -70,12 +75,11 @@ def export(tmp_path):
 
 
 def test_speeds_are_trims_and_primitives_maneuvers(export, tmp_path):
-    assert is_aroc(export)
-    assert is_aroc(export / "automaton.xml")
-    assert not is_aroc(tmp_path)
+    assert export_at(export) == export_at(export / "automaton.xml") == export_at(tmp_path) == export
+    assert export_at(export / "primitives") is None
     primitives = read_aroc(export)
     assert wheelbase_of(primitives) == pytest.approx(2.5, rel=1e-4)
-    automaton = automaton_of_aroc(primitives, wheelbase=2.5)
+    automaton = automaton_of_aroc(primitives, model=CAR)
     assert automaton.trim_names == ("speed 10", "speed 12")
     joined = [(one.name, one.source, one.target) for one in automaton.maneuvers]
     assert joined == [
@@ -157,3 +161,57 @@ def test_the_accelerating_car():
     np.testing.assert_allclose(twist, [[5.0, 0.0, 1.0]])
     assert CAR.reduced_limits.tolist() == [[-12.0, 12.0]]
     assert CAR.control_limits.tolist() == [[-4.0, 4.0], [-0.5, 0.5]]
+
+
+def zipped(export, target, *, within=""):
+    with zipfile.ZipFile(target, "w") as archive:
+        for file in (export / "automaton.xml", *sorted((export / "primitives").iterdir())):
+            archive.write(file, within + str(file.relative_to(export)))
+    return target
+
+
+@pytest.mark.parametrize("within", ["", "export/"])
+def test_an_archive_is_read_as_its_folder(export, tmp_path, within):
+    packed = read_aroc(zipped(export, tmp_path / "a.zip", within=within))
+    for one, other in zip(packed, read_aroc(export), strict=True):
+        assert (one.name, one.successors) == (other.name, other.successors)
+        np.testing.assert_array_equal(one.states, other.states)
+
+
+def test_a_broken_archive_is_told_by_its_name(export, tmp_path):
+    path = zipped(export, tmp_path / "a.zip")
+    path.write_bytes(path.read_bytes()[:-30])
+    with pytest.raises(InvalidScenario, match=r"a\.zip: cannot be read as a zip archive"):
+        read_primitives(path)
+    (export / "primitives" / "go.xml").write_text("<primitive>")
+    with pytest.raises(InvalidScenario, match=r"b\.zip/primitives/go\.xml:1: not valid XML"):
+        read_primitives(zipped(export, tmp_path / "b.zip"))
+
+
+@compiled_only
+@pytest.mark.parametrize("y", [3.5, -1.0])
+def test_the_car_of_a_file_changes_lanes(export, tmp_path, y):
+    """By maneuvers that lead from a speed to itself, at 10 m/s: 12.28 s straight ahead."""
+    text = (export / "primitives" / "left.xml").read_text()
+    right = primitive(10.0, [(0.0, -0.2)], [1, 2])
+    (export / "primitives" / "right.xml").write_text(right)
+    (export / "primitives" / "left.xml").write_text(text)
+    listed = (export / "automaton.xml").read_text()
+    longer = listed.replace("</automaton>", "<primitive>right.xml</primitive>\n</automaton>")
+    (export / "automaton.xml").write_text(longer)
+    zipped(export, tmp_path / "car.zip")
+    file = tmp_path / "lane.yaml"
+    file.write_text(
+        "schema: 1\nvehicle: {model: accelerating_car, wheelbase_m: 2.5, max_steering_rad: 0.5,\n"
+        "  max_speed_m_s: 12, min_speed_m_s: 0, max_acceleration_m_s2: 4}\n"
+        "automaton: {file: car.zip}\nstart: {pose: [0, 0, 0], trim: speed 10}\n"
+        f"goal: {{pose: [122.8, {y}, 0], trim: speed 10}}\nsearch: {{polish: false}}\n"
+    )
+    problem = load_scenario(file).problem
+    result = plan(problem, time_limit=2.0)
+    assert 12.28 < result.cost < 12.4
+    assert result.audit.passed
+    np.testing.assert_allclose(result.plan.end, [122.8, y, 0.0], atol=1e-9)
+    file.write_text(file.read_text().replace("max_steering_rad: 0.5", "max_steering_rad: 0.1"))
+    with pytest.raises(InvalidScenario, match=r"steering angle of -?0[.]2, but the vehicle"):
+        load_scenario(file)

@@ -196,3 +196,43 @@ def test_the_first_plan_must_be_free():
 def test_numbers_out_of_range_are_refused(name, value):
     with pytest.raises(ValueError, match=f"receding horizon: {name} must be"):
         RecedingHorizon(among(WALL), step=1.0, **{name: value})
+
+
+class TestAGoalThatBecomesOccupied:
+    """Seen on the way: a vehicle that can stop comes near, stops, and stays."""
+
+    BOX = Obstacle(Box([0.6, 0.6], [6.0, 0.0]))
+    CORRIDOR = tuple(Obstacle(Box([12.0, 0.2], [3.0, side])) for side in (0.8, -0.8))
+
+    def driven(self, *walls, goes=99, where=BOX, **changed):
+        problem = among(*walls, goal=[6.0, 0.0, 0.0], footprint=Disc(0.22), **changed)
+
+        def seen(number: int) -> list[Obstacle]:
+            return [*walls, where] if 3 <= number < goes else [*walls]
+
+        return simulate(problem, step=0.5, steps=24, obstacles=seen)
+
+    @pytest.mark.parametrize("walls", [(), CORRIDOR])
+    def test_it_comes_near_and_stops(self, walls):
+        loop = self.driven(*walls)
+        assert not loop.reached
+        assert "the goal is blocked: at the goal the vehicle touches" in loop.reason
+        far = np.hypot(*(loop.poses[:, :2] - [6.0, 0.0]).T)
+        assert far.min() == far[-1] < 0.3 + 0.22 + 0.15
+        assert (np.diff(far) <= 1e-9).all()  # never away
+        assert loop.steps[-1].decision is Decision.STOPPED
+        assert {one.decision for one in loop.steps} >= {Decision.APPROACHED}
+
+    def test_it_goes_on_when_the_goal_is_free_again(self):
+        assert self.driven(goes=12).reached
+
+    def test_what_closes_the_way_is_no_reason_to_leave(self):
+        closed = Obstacle(Box([0.2, 60.0], [4.0, 0.0]))
+        loop = self.driven(where=closed, bounds=Bounds(x=(-1, 8), y=(-2, 2)))
+        assert loop.poses[:, 0].max() == loop.poses[-1, 0] < 4.0
+        assert loop.poses[-1, 0] > 3.5
+
+    def test_the_reason_names_a_goal_that_is_blocked_from_the_start(self):
+        loop = simulate(among(self.BOX, goal=[6.0, 0.0, 0.0]), step=0.5)
+        assert loop.status == "no_plan"
+        assert loop.reason.startswith("the goal is blocked: at the goal the vehicle touches")

@@ -152,7 +152,8 @@ def test_what_is_left_out():
          ":17: vehicles[1].priority: got 'high', need a finite number"),
         ("leaves: true", "leaves: 1", ":25: vehicles[2].leaves: got 1, need true or false"),
         ("{model: car, ", "{model: cat, ", ":19: vehicles[2].vehicle.model: got 'cat', need one of "
-         "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
+         "unicycle, car, second_order_unicycle, second_order_car, accelerating_car, "
+         "car_with_trailer, single_track, "
          "hovercraft, helicopter, lattice_body, omnidirectional; did you mean 'car'? A vehicle of "
          "your own needs --model MODULE:OBJECT"),
         ("preset: reeds_shepp", "preset: table2", ":20: vehicles[2].automaton.preset: got "

@@ -16,7 +16,8 @@ TOP = (
     "zones, search, receding_horizon"
 )
 MODELS = (
-    "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
+    "unicycle, car, second_order_unicycle, second_order_car, accelerating_car, "
+    "car_with_trailer, single_track, "
     "hovercraft, helicopter, lattice_body, omnidirectional"
 )
 OWN = "; a vehicle of your own needs --model MODULE:OBJECT"
@@ -723,8 +724,8 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "lateral acceleration of a robot": (
         vehicle("{model: unicycle, max_lateral_acceleration_m_s2: 1.0}"),
         ":3: vehicle.max_lateral_acceleration_m_s2: got 1.0, need no such key, which car, "
-        "second_order_car, car_with_trailer and single_track have; a zone limits it for any "
-        "vehicle",
+        "second_order_car, accelerating_car, car_with_trailer and single_track have; a zone limits "
+        "it for any vehicle",
     ),
     "preset for inertia": (
         automaton("preset: parking"),
