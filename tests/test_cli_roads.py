@@ -58,7 +58,7 @@ def test_a_goal_that_is_missed_ends_with_one(folder, capsys):
 def test_a_contact_ends_with_one_in_every_output(folder, capsys):
     """Also where the start made it unavoidable, and the goal is reached."""
     goal = "<goalState>" + interval("time", 15, 20) + "</goalState>"
-    parts = *LANES, car(7, x=31.0, y=2.5, speed=4.0, steps=45), problem(goal=goal, x=30.0)
+    parts = *LANES, car(7, x=36.0, y=2.5, speed=0.0, steps=45), problem(goal=goal, x=30.0)
     Path("hit.xml").write_text(commonroad(*parts))
     said = "collision with car 7; a goal was reached at 1.5 s"
     assert run(["mpc", "hit.xml", "--no-plot", "--html"]) == 1

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ import numpy as np
 from maneuver_automaton.cli.check_command import Finding
 from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.inputs import Parts, scenario_of
-from maneuver_automaton.cli.planned import fleet_planned
+from maneuver_automaton.cli.planned import fleet_planned, road_fleet
 from maneuver_automaton.cli.progress import announced
+from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import Closest, DrivenVerdict, FleetLog, verify_driven, verify_fleet
 from maneuver_automaton.fleet.driven import FINE
@@ -30,6 +31,7 @@ from maneuver_automaton.formats.plan_json import (
 from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import within
+from maneuver_automaton.roads import RoadFleetResult, RoadPair
 
 ENDING = ".json"
 AGREES = 1e-9  # share by which a cost may differ from that of the file
@@ -52,6 +54,8 @@ def findings(
     """
     if path.suffix.lower() != ENDING:
         return None
+    if (roads := road_fleet(path, parts, alone=True)) is not None:
+        return roads.name, _on_road(roads)
     if (driven := read_fleet_loop_document(path)) is not None:
         return loop_findings(path, driven, parts)
     document = read_fleet_document(path)
@@ -95,7 +99,35 @@ def _of_fleet(
     return scenario.name, iter([*rows, *_pairs(verdict.closest, verdict.too_near)])
 
 
-def _pairs(closest: tuple[Closest, ...], too_near: tuple[Closest, ...]) -> list[Finding]:
+def _on_road(result: RoadFleetResult) -> Iterator[Finding]:
+    """What the judge says of each drive past the others, and whether it ends at a goal."""
+    for name, one in result.results.items():
+        if one.plan is None or one.verdict is None:
+            yield Finding(
+                what=f"{name}: plan", holds=False, words=_why_none({"reason": one.reason})
+            )
+            continue
+        scene, verdict = one.planner.scene, one.verdict
+        said = "; ".join(words for _, words in verdict.faults)
+        yield Finding(
+            what=f"{name}: driven",
+            holds=verdict.clean,
+            worst=None if math.isinf(verdict.clearance_m) else verdict.clearance_m,
+            words=said or f"to the edge of the road {verdict.edge_m:.3g} m",
+        )
+        end = one.plan.start_time + one.plan.duration
+        middle = one.planner.vehicle.middle_of(one.plan.end)
+        speed = float(one.plan.trims[-1].reduced_state[0])
+        there = any(goal.contains(middle, speed=speed, time=end) for goal in scene.goals)
+        words = f"reached at {end:.6g} s" if there else one.reason or "it ends elsewhere"
+        yield Finding(what=f"{name}: goal", holds=there, words=words)
+    near = tuple(one for one in result.pairs if one.distance_m <= too_close(0.0))
+    yield from _pairs(result.pairs, near)
+
+
+def _pairs(
+    closest: Sequence[Closest | RoadPair], too_near: Sequence[Closest | RoadPair]
+) -> list[Finding]:
     """Those that come too near, or one line for all."""
     if not too_near:
         words = "there is none that comes near"

@@ -23,6 +23,7 @@ from maneuver_automaton.cli.inputs import (
 )
 from maneuver_automaton.cli.pictures import skip_documentation
 from maneuver_automaton.cli.plan_settings import LookOptions
+from maneuver_automaton.cli.planned import road_fleet
 from maneuver_automaton.cli.tables import console, print_written
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.problem import Problem
     from maneuver_automaton.receding_horizon import ClosedLoop
+    from maneuver_automaton.roads import RoadFleetResult
 
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 
@@ -172,7 +174,9 @@ def plot(
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
     path = _picture(file, out, what)
-    if (driven := _loop_of_fleet(file)) is not None:
+    if (roads := road_fleet(file, Parts(beside=beside), alone=True)) is not None:
+        draw = functools.partial(_draw_roads, roads, path, what, look)
+    elif (driven := _loop_of_fleet(file)) is not None:
         from maneuver_automaton.cli.planned import fleet_planned
         from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
 
@@ -221,6 +225,19 @@ def _loop_of_fleet(file: Path) -> dict[str, Any] | None:
     from maneuver_automaton.formats.fleet_loop_reading import read_fleet_loop_document
 
     return read_fleet_loop_document(file)
+
+
+def _draw_roads(result: RoadFleetResult, path: Path, what: str, look: LookOptions) -> None:
+    """Draw plans and loops on roads, of one vehicle or several, as `plan` and `mpc` do."""
+    from maneuver_automaton import plotting
+
+    vehicle = next(iter(result.results.values())).planner.vehicle
+    if what == "picture":
+        plotting.save_road_fleet_figure(result, vehicle, path, look=look.look(result.name))
+    elif what == "page":
+        result.player(title=look.title or result.name).save(path)
+    else:
+        plotting.save_road_fleet_animation(result, vehicle, path, look=look.look(result.name))
 
 
 def _draw_fleet_loop(log: FleetLog, path: Path, what: str, look: LookOptions, name: str) -> None:

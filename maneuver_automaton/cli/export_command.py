@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
-from maneuver_automaton.cli.planned import source_of
-from maneuver_automaton.cli.road_command import is_road
+from maneuver_automaton.cli.planned import road_fleet
 from maneuver_automaton.cli.tables import print_written
 from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
@@ -55,7 +54,7 @@ def export(
     form = FORMATS[kind]
     if step is not None and not form.steps:
         raise InvalidScenario(f"--step: {kind} has no rows in time; leave it out")
-    several = _on_one_road(file, parts) if kind == "commonroad" else None
+    several = road_fleet(file, parts) if kind == "commonroad" else None
     driven: Any = several or _of_one(file, parts)
     path = _target(file, out, form, kind)
     options: dict[str, Any] = {} if step is None else {"step": step}
@@ -70,7 +69,11 @@ def export(
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
     print_written(path)
-    if kind == "commonroad" and several is None and not driven.reached:
+    if several is None:
+        reached = driven.reached
+    else:
+        reached = not any(one.reason for one in several.results.values())
+    if kind == "commonroad" and not reached:
         complain(f"{file}: it is no clean drive to a goal: the official checker refuses {path}")
     return FOUND
 
@@ -81,23 +84,6 @@ def _of_one(file: Path, parts: Parts) -> Driven:
 
     own = None if parts.model is None else user_model(parts.model)
     return exports.load_driven(file, beside=parts.beside, case=parts.case, model=own)
-
-
-def _on_one_road(file: Path, parts: Parts) -> tuple[Driven, ...] | None:
-    """The plans of several vehicles on the road of a CommonRoad file; None of any other."""
-    from maneuver_automaton import exports
-    from maneuver_automaton.formats.plan_json import read_fleet_document
-
-    try:
-        document = read_fleet_document(file)
-    except InvalidScenario:
-        return None  # told by who reads the plan of one vehicle
-    if document is None:
-        return None
-    road, its = source_of(file, document, parts)
-    if not is_road(road):
-        raise InvalidScenario(f"{file}: {road} is no scenario of CommonRoad, need one")
-    return exports.load_road_fleet(file, beside=road, vehicle=its.beside)
 
 
 def _target(file: Path, out: Path | None, form: Format, kind: str) -> Path:

@@ -1,4 +1,4 @@
-"""The fleet that plans of a file were made for."""
+"""The fleet that plans of a file were made for, and drives on roads that a file holds."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from maneuver_automaton.cli.road_command import is_road
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
+    from maneuver_automaton.roads import RoadFleetResult
     from maneuver_automaton.scenario import FleetScenario
 
 
@@ -27,14 +28,30 @@ def fleet_planned(path: Path, document: Mapping[str, Any], parts: Parts) -> Flee
     from maneuver_automaton.scenario import FleetScenario
 
     file, its = source_of(path, document, parts)
-    if is_road(file):
-        raise InvalidScenario(
-            f"{path}: is of several vehicles on the road of {file}, whose plans only export reads"
-        )
     scenario = problem_of(file, its)
     if not isinstance(scenario, FleetScenario):
         raise InvalidScenario(f"{path}: holds plans of several vehicles, but {file} states one")
     return scenario
+
+
+def road_fleet(path: Path, parts: Parts, *, alone: bool = False) -> RoadFleetResult | None:
+    """Plans or loops of several vehicles on the road of a CommonRoad file; None of any other.
+
+    One `alone` is read, too, where --with names such a file.
+    """
+    from maneuver_automaton import exports
+    from maneuver_automaton.formats.plan_json import read_fleet_document
+
+    try:
+        document = read_fleet_document(path)
+    except InvalidScenario:
+        return None  # told by who reads the plan of one vehicle
+    if document is None and not (alone and parts.beside is not None):
+        return None
+    road, its = source_of(path, document or {}, parts)
+    if not is_road(road):
+        return None
+    return exports.load_road_fleet(path, beside=road, vehicle=its.beside, case=its.case)
 
 
 def source_of(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:

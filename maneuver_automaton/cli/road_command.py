@@ -97,6 +97,8 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
         limit = settings.time_limit or TIME_LIMIT
         with waiting(f"planning before the start, at most {limit:g} s", quiet=settings.quiet):
             before = plan_before(planner, time_limit=limit)
+        if before is not None and before.plan is None and planner.hopeless() is None:
+            complain(f"{path}: no plan before the start: {before.reason}")
         most = min(settings.steps or planner.last_tick, planner.last_tick)
         with progress_bar("steps", most, quiet=settings.quiet) as advance:
             drive = drive_scene(

@@ -98,8 +98,8 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
 
 def _most_steps(scene: RoadScene, steps: int | None) -> int:
     """How many steps a vehicle may take, so that a bar has an end."""
-    from maneuver_automaton.roads.driving import LONGEST
     from maneuver_automaton.roads.library import tick_of
+    from maneuver_automaton.roads.search_arrays import LONGEST
 
     lasting = min(scene.last_time - scene.start.time, LONGEST)
     most = max(math.ceil(lasting / tick_of(scene.step)), 1)

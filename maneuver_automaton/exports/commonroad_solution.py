@@ -25,7 +25,13 @@ from maneuver_automaton.exports.driven import Driven, driven_of
 
 if TYPE_CHECKING:
     from maneuver_automaton.exports.driven import Exportable
-    from maneuver_automaton.roads import RoadBenchmark, RoadFleetResult, RoadScene, RoadVehicle
+    from maneuver_automaton.roads import (
+        RoadBenchmark,
+        RoadFleetDrive,
+        RoadFleetResult,
+        RoadScene,
+        RoadVehicle,
+    )
 
 COST_FUNCTION = "SA1"
 SAME_M = 1e-3  # [m] between our vehicle and one of CommonRoad's
@@ -33,7 +39,7 @@ ON_STEP = 1e-6  # of a time step, between a time and the next step
 
 
 def save_commonroad_solution(
-    value: Exportable | RoadFleetResult | Sequence[Driven],
+    value: Exportable | RoadFleetResult | RoadFleetDrive | Sequence[Driven],
     path: Path | str,
     *,
     cost_function: str = COST_FUNCTION,
@@ -46,7 +52,7 @@ def save_commonroad_solution(
 
     Parameters
     ----------
-    value : RoadPlanResult, RoadDrive, RoadFleetResult, or a sequence of Driven
+    value : RoadPlanResult, RoadDrive, RoadFleetResult, RoadFleetDrive, or a sequence of Driven
         On scenes that were read from a file of CommonRoad.
     path : Path or str
         The file.
@@ -85,12 +91,14 @@ class _Drive(NamedTuple):
     benchmark: RoadBenchmark
 
 
-def _each(value: Exportable | RoadFleetResult | Sequence[Driven]) -> list[Driven]:
+def _each(
+    value: Exportable | RoadFleetResult | RoadFleetDrive | Sequence[Driven],
+) -> list[Driven]:
     """The drives of one vehicle or of several."""
-    from maneuver_automaton.roads import RoadFleetResult
+    from maneuver_automaton.roads import RoadFleetDrive, RoadFleetResult
 
-    if isinstance(value, RoadFleetResult):
-        value = [driven_of(one) for one in value.results.values() if one.plan is not None]
+    if isinstance(value, RoadFleetResult | RoadFleetDrive):
+        value = [driven_of(value.results[name]) for name in value.plans]
     found = list(value) if isinstance(value, Sequence) else [driven_of(value)]
     if not found:
         raise ValueError("CommonRoad solution: nobody has a plan, need at least one")

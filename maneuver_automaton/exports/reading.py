@@ -15,7 +15,7 @@ from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.driven import Driven, driven_of, driven_on_road
 from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
-from maneuver_automaton.formats.plan_json import load_plan, read_plan_document
+from maneuver_automaton.formats.plan_json import load_plan, plan_of_document, read_plan_document
 from maneuver_automaton.scenario import (
     FleetScenario,
     RoadScenario,
@@ -26,6 +26,7 @@ from maneuver_automaton.scenario import (
 
 if TYPE_CHECKING:
     from maneuver_automaton.models import Model
+    from maneuver_automaton.roads import RoadFleetResult
 
 START_TOLERANCE = 1e-6  # [m, rad] between the first pose of a plan and the start of its problem
 
@@ -76,36 +77,96 @@ def load_driven(
 
 
 def load_road_fleet(
-    path: Path | str, *, beside: Path | str, vehicle: Path | str | None = None
-) -> tuple[Driven, ...]:
-    """The plans of a plan.json of several vehicles on one road, in the CommonRoad file `beside`.
+    path: Path | str,
+    *,
+    beside: Path | str,
+    vehicle: Path | str | None = None,
+    case: int | None = None,
+) -> RoadFleetResult:
+    """What a plan.json or closed_loop.json holds of drives on the roads of the file `beside`.
 
-    The `vehicle` is that of a scenario, if it is not CommonRoad's BMW 320i.
+    Of a loop the plans are what was driven, with the reasons of those that reached no goal. All
+    are judged again, each past the others. One vehicle alone is a fleet of one.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    beside : Path or str
+        The CommonRoad file that was planned or driven.
+    vehicle : Path or str, optional
+        A scenario that states the vehicle, if it is not CommonRoad's BMW 320i.
+    case : int, optional
+        Which planning problem one vehicle solves, from 0.
 
     Raises
     ------
     InvalidScenario
         If a file cannot be read, nobody has a plan, or a vehicle is none of the planning problems.
     """
-    from maneuver_automaton.formats.plan_json import load_plans
+    from maneuver_automaton.formats.plan_json import read_fleet_document
+    from maneuver_automaton.roads import RoadFleetResult, RoadPlanResult, road_planner
+    from maneuver_automaton.roads.several import judged_together, nearest_pairs
 
-    scenes = {
+    path, document = Path(path), read_fleet_document(path)
+    roads = {
         str(k if one.scene.benchmark is None else one.scene.benchmark.problem): one
         for k, one in enumerate(load_roads(beside, beside=vehicle))
     }
-    found = []
-    for name, plan in load_plans(path).items():
-        if name not in scenes:
-            raise InvalidScenario(
-                f"{path}: vehicles: got {name!r}, need a planning problem of {beside}: "
-                f"{', '.join(scenes)}"
-            )
-        road = scenes[name]
-        _check_start(Path(path), plan, road.vehicle.rear_of(road.scene.start.middle))
-        found.append(driven_on_road(road.scene, road.vehicle, plan))
-    if not found:
+    if document is None:
+        name = [*roads][case or 0]
+        document = {"vehicles": {name: read_closed_loop_document(path) or read_plan_document(path)}}
+    stated = document["vehicles"]
+    if others := [name for name in stated if name not in roads]:
+        raise InvalidScenario(
+            f"{path}: vehicles: got {others[0]!r}, need a planning problem of {beside}: "
+            f"{', '.join(roads)}"
+        )
+    plans = {
+        name: plan
+        for name, one in stated.items()
+        if (plan := _plan_on_road(path, one, roads[name])) is not None
+    }
+    # A loop of no step ends at its start, where one among several was never there.
+    plans = {name: plan for name, plan in plans.items() if plan.duration or len(stated) == 1}
+    if not plans:
         raise InvalidScenario(f"{path}: holds no plan, nobody has one")
-    return tuple(found)
+    scenes = {name: roads[name].scene for name in stated}
+    its = next(iter(roads.values())).vehicle
+    verdicts = judged_together(scenes, its, plans)
+    results = {
+        name: RoadPlanResult(
+            planner=road_planner(scenes[name], its),
+            decision=None,
+            plan=plans.get(name),
+            verdict=verdicts.get(name),
+            reason=str(one.get("reason") or ""),
+            search_s=0.0,
+        )
+        for name, one in stated.items()
+    }
+    return RoadFleetResult(
+        name=str(document.get("name") or scenes[next(iter(stated))].name),
+        results=results,
+        pairs=nearest_pairs(its, plans),
+        order=tuple(stated),
+        search_s=0.0,
+    )
+
+
+def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -> Plan | None:
+    """The plan of one vehicle, or what it drove; None if it has none."""
+    try:
+        if "steps" in document:
+            plan = _road_drive(document, road)
+        else:
+            plan = plan_of_document(document) if document["status"] == "found" else None
+    except (ValueError, KeyError, TypeError, IndexError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{path}: {said}") from error
+    if plan is not None:
+        _check_start(path, plan, road.vehicle.rear_of(road.scene.start.middle))
+    return plan
 
 
 def _planned(path: Path, scenario: Scenario | None) -> Driven:
@@ -145,14 +206,9 @@ def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
 def _on_road(path: Path, road: RoadScenario, loop: Mapping[str, Any] | None) -> Driven:
     """The plan or drive on a road, whose file has the rear axle's poses."""
     document = read_plan_document(path) if loop is None else loop
-    try:
-        plan = load_plan(path) if loop is None else _road_drive(loop, road)
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        if isinstance(error, InvalidScenario):
-            raise
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{path}: {said}") from error
-    _check_start(path, plan, road.vehicle.rear_of(road.scene.start.middle))
+    plan = _plan_on_road(path, document, road)
+    if plan is None:
+        raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
     return driven_on_road(
         road.scene,
         road.vehicle,

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array, IntArray
 
 PARENT, MANEUVER, TRIM, NEAR = range(4)  # columns of `links`
-N_NODES, HEAP, KEPT, CHECKS = range(4)  # places of `state`
+N_NODES, HEAP, KEPT, CHECKS, N_CHILDREN = range(5)  # places of `state`
 STOPPING, UNSAFE = range(2)  # rows of `reached`
 COST, NODE, TICK = range(3)  # columns of `reached`
 STRIP = 1.0  # [m] width of a strip along the route
@@ -70,9 +70,10 @@ class HorizonTask(NamedTuple):
 class BeamArrays(NamedTuple):
     """Nodes and their queue: room that is made once and used in every step."""
 
-    # Nodes are only added, so a number names a node for good, and a word is read backwards along
-    # the parents. A row of `pose`: x, y, heading, cost to come.
-    pose: np.ndarray  # (N, 4)
+    # The start, the ends of the two plans in `reached`, and all nodes that were kept: a word is
+    # read backwards along the parents. After them the children of one level, which the next level
+    # writes over. A row of `pose`: x, y, heading, cost to come.
+    pose: np.ndarray  # (3 + levels W + C, 4)
     links: np.ndarray  # (N, 4) parent, maneuver that led here, trim, nearest point of the route
     # What was kept of each level, best first: the search goes on from these, and if no goal is
     # reached, the plan is to one of the last of them.
@@ -83,11 +84,11 @@ class BeamArrays(NamedTuple):
     strips: np.ndarray  # (n,) how many in each strip, the first and last without an end
     cells: np.ndarray  # (4 W,) keys of cells that are taken, EMPTY for none
     # A binary heap of the level at hand: cost plus weighted cost-to-go, and the node.
-    heap_key: np.ndarray  # (N,)
-    heap_node: np.ndarray  # (N,)
+    heap_key: np.ndarray  # (C,)
+    heap_node: np.ndarray  # (C,)
     # Plans to a goal, those with a stop after them and those without: cost, node, tick.
     reached: np.ndarray  # (2, 3)
-    state: np.ndarray  # (4,) nodes made, size of the heap, nodes kept, edges proven
+    state: np.ndarray  # (5,) end of the nodes, size of the heap, nodes kept, edges proven, children
 
 
 class Horizon(NamedTuple):
@@ -146,7 +147,7 @@ def add_children(
     x, y, heading, come = pose[node, 0], pose[node, 1], pose[node, 2], pose[node, 3]
     c, s = math.cos(heading), math.sin(heading)
     for e in range(low, high):
-        child = state[N_NODES]
+        child = pose.shape[0] - search.heap_key.shape[0] + state[N_CHILDREN]
         if child >= pose.shape[0]:
             return
         d_x, d_y = maneuvers.pose[e, last, 0], maneuvers.pose[e, last, 1]
@@ -167,7 +168,7 @@ def add_children(
         pose[child, 0], pose[child, 1], pose[child, 2], pose[child, 3] = n_x, n_y, n_heading, cost
         links[child, PARENT], links[child, MANEUVER] = node, e
         links[child, TRIM], links[child, NEAR] = trim, near
-        state[N_NODES] = child + 1
+        state[N_CHILDREN] += 1
         to_go = cost_to_go(horizon, station, offset, turned, speed, tick)
         push(search.heap_key, search.heap_node, state[HEAP], cost + task.greed * to_go, child)
         state[HEAP] += 1
@@ -263,11 +264,12 @@ def finish(
     last: int,
     shares: Array,
     controls: Array,
+    rests: bool,
 ) -> tuple[int, int]:
     """Controls to a node, cut at the tick `last`, and to stop after it; (ticks, ticks in all).
 
-    The latter are -1 if no stop is free. The word is driven once more to its end, as the stop
-    begins from the exact state there.
+    The latter are -1 if no stop is free or, if it `rests`, none ends where nobody comes. The word
+    is driven once more to its end, as the stop begins from the exact state there.
     """
     limits = horizon.limits
     n = word_to(search, first, horizon.maneuvers, node, limits.ticks, controls)
@@ -286,9 +288,16 @@ def finish(
             controls[k, 1],
         )
     more = first_free_stop(
-        horizon, x, y, heading, speed, steering, task.tick + n, shares, controls, n
+        horizon, x, y, heading, speed, steering, task.tick + n, shares, controls, n, rests
     )
     return n, (-1 if more < 0 else n + more)
+
+
+@bare_inner_kernel
+def keep_node(search: BeamArrays, node: int, row: int) -> None:
+    """Copy a node to a row that the next level does not write over."""
+    for i in range(4):
+        search.pose[row, i], search.links[row, i] = search.pose[node, i], search.links[node, i]
 
 
 @bare_inner_kernel
@@ -306,7 +315,7 @@ def begin(task: HorizonTask, horizon: Horizon, search: BeamArrays, first: Maneuv
     m_y = task.y + horizon.clearing.car.ahead * math.sin(task.heading)
     links[0, PARENT], links[0, MANEUVER], links[0, TRIM] = -1, -1, -1
     links[0, NEAR] = nearest_of_all(horizon.route, m_x, m_y)
-    state[N_NODES] = 1
+    state[N_NODES] = 3
     tick = task.tick + horizon.limits.ticks
     add_children(task, horizon, search, 0, first, 0, first.target.shape[0], tick)
 
@@ -321,26 +330,34 @@ def furthest(
     shares: Array,
     controls: Array,
 ) -> tuple[int, int]:
-    """The proven node that is latest, then best, and can be stopped after; or to stop at once."""
-    for level in range(levels - 1, -1, -1):
-        last = min(task.tick + (level + 1) * horizon.limits.ticks, task.until)
-        for k in range(min(search.counts[level], TRIES)):
-            node = search.kept[level, k]
-            n, whole = finish(task, horizon, search, first, node, last, shares, controls)
-            if whole >= 0:
-                return n, whole
-    whole = first_free_stop(
-        horizon,
-        task.x,
-        task.y,
-        task.heading,
-        task.speed,
-        task.steering,
-        task.tick,
-        shares,
-        controls,
-        0,
-    )
+    """The proven node that is latest, then best, and can be stopped after; or to stop at once.
+
+    Where nobody comes until the goals are over, and only if there is no such place, anywhere.
+    """
+    whole = -1
+    for rests in (True, False):
+        for level in range(levels - 1, -1, -1):
+            last = min(task.tick + (level + 1) * horizon.limits.ticks, task.until)
+            for k in range(min(search.counts[level], TRIES)):
+                node = search.kept[level, k]
+                n, whole = finish(task, horizon, search, first, node, last, shares, controls, rests)
+                if whole >= 0:
+                    return n, whole
+        whole = first_free_stop(
+            horizon,
+            task.x,
+            task.y,
+            task.heading,
+            task.speed,
+            task.steering,
+            task.tick,
+            shares,
+            controls,
+            0,
+            rests,
+        )
+        if whole >= 0:
+            break
     return 0, whole
 
 
@@ -356,10 +373,11 @@ def note_goal(
     controls: Array,
 ) -> None:
     """Note a node that meets a goal at a tick, if it is the cheapest with, or without, a stop."""
-    _, whole = finish(task, horizon, search, first, node, tick, shares, controls)
+    _, whole = finish(task, horizon, search, first, node, tick, shares, controls, False)
     row, cost = (STOPPING if whole >= 0 else UNSAFE), search.pose[node, 3]
     if cost < search.reached[row, COST]:
-        search.reached[row, COST], search.reached[row, NODE] = cost, node
+        keep_node(search, node, 1 + row)
+        search.reached[row, COST], search.reached[row, NODE] = cost, 1 + row
         search.reached[row, TICK] = tick
 
 
@@ -410,12 +428,14 @@ def search_beam(
             if goal_tick >= 0:
                 note_goal(task, horizon, search, first, node, goal_tick, shares, controls)
             elif pose[node, 3] < reached[STOPPING, COST]:
-                search.kept[level, kept] = node
+                search.kept[level, kept] = state[N_NODES]
+                keep_node(search, node, state[N_NODES])
+                state[N_NODES] += 1
                 search.strips[strip] += 1
                 kept += 1
         search.counts[level] = kept
         state[KEPT] += kept
-        state[HEAP] = 0  # a beam: the other nodes of the level are dropped
+        state[HEAP] = state[N_CHILDREN] = 0  # a beam: the other nodes of the level are dropped
         if level + 1 == levels:
             break
         for k in range(kept):
@@ -430,7 +450,7 @@ def search_beam(
     for row in (STOPPING, UNSAFE):
         node, last = int(reached[row, NODE]), int(reached[row, TICK])
         if node >= 0:
-            n, whole = finish(task, horizon, search, first, node, last, shares, controls)
+            n, whole = finish(task, horizon, search, first, node, last, shares, controls, False)
             return True, n, (whole if row == STOPPING else n)
     if task.below < math.inf:
         return False, 0, -1

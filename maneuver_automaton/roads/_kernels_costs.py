@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads._kernels_goals import GoalArrays
 
 IMPOSSIBLE = 1e4  # cost beyond the car's limits, far above any stage cost
+SOON = 1e-3  # [s] and [m] left at least, where a value is divided by what is left
 
 
 class Weights(NamedTuple):
@@ -72,6 +73,21 @@ def rate_at(
 
 
 @bare_inner_kernel
+def to_speed(weights: Weights, goals: GoalArrays, g: int, speed: float, time: float) -> float:
+    """Cost to come to a speed of goal `g` within a time [s], at a constant acceleration."""
+    slow, fast = goals.speed[g, 0] - speed, speed - goals.speed[g, 1]
+    wrong, time = max(max(slow, fast), 0.0), max(time, SOON)
+    most, lasting, pace = (weights.braking if fast > 0.0 else weights.gain) * time, time, 0.0
+    if weights.progress == weights.progress:  # away from the pace no longer than effort is saved
+        pace = weights.pace / 3.0
+        lasting = min(time, math.sqrt(weights.ahead / pace))
+    cost = wrong * wrong * (weights.ahead / lasting + pace * lasting)
+    if wrong > most:
+        cost += IMPOSSIBLE * (wrong / most - 1.0)
+    return cost
+
+
+@bare_inner_kernel
 def along_to_goal(
     weights: Weights,
     goals: GoalArrays,
@@ -97,13 +113,17 @@ def along_to_goal(
         time, distance = least, high
     else:
         time, distance = max(enter, least), math.nan  # nothing to be done
+        # A speed may still be changed until it leaves at the mean of both.
+        wanted = min(max(speed, goals.speed[g, 0]), goals.speed[g, 1])
+        if wanted != speed:
+            time = max(min(2.0 * high / (speed + wanted), most), time)
     cost, final = 0.0, speed
     if distance == distance:
         if time <= 0.0:
             return IMPOSSIBLE, -1.0
         needed = 2.0 * (distance - speed * time) / (time * time)
         if needed < 0.0 and speed + needed * time < 0.0:
-            needed = -0.5 * speed * speed / max(distance, 1e-3)  # it has to stop before
+            needed = -0.5 * speed * speed / max(distance, SOON)  # it has to stop before
         cost += weights.ahead * needed * needed * time
         # The small share keeps a step between the last possible value and the first impossible one.
         if needed > weights.gain:
@@ -111,9 +131,7 @@ def along_to_goal(
         elif needed < -weights.braking:
             cost += IMPOSSIBLE * (-needed / weights.braking - 1.0 + 0.01)
         final = max(speed + needed * time, 0.0)
-    slow, fast = goals.speed[g, 0] - final, final - goals.speed[g, 1]
-    wrong = max(max(slow, fast), 0.0)
-    return cost + weights.ahead * wrong * wrong / max(time, 0.5), time
+    return cost + to_speed(weights, goals, g, final, time), time
 
 
 @bare_inner_kernel
@@ -146,6 +164,8 @@ def cost_to_goal(
         cost, time = along_to_goal(weights, goals, g, station, speed, least, most)
         if time < 0.0:
             return cost
+    else:
+        cost = to_speed(weights, goals, g, speed, most)
     if goals.extent[g, 2] > -math.inf:
         aside = 0.0
         reach = offset + speed * math.sin(turned) * time

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,8 +20,6 @@ from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.missed import nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner
 from maneuver_automaton.roads.scene import RoadScene
-
-LONGEST = 60.0  # [s] of a drive whose goal has no last time
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -110,7 +107,8 @@ def drive_scene(
     """
     driver = Driver(planner, first, steps)
     with patient():
-        planner.warm()
+        if not driver.is_done:
+            planner.warm()
         while not (driver.is_done or stopped()):
             driver.step(driver.planner)
             if progress is not None:
@@ -125,9 +123,9 @@ class Driver:
         self, planner: RoadPlanner, first: RoadDecision | None, steps: int | None = None
     ) -> None:
         last = planner.last_tick
-        longest = math.ceil(LONGEST / planner.tick) if math.isinf(planner.scene.last_time) else last
         self.planner = planner
-        self.limit = min(longest if steps is None else steps, last)
+        self.hopeless = planner.hopeless()
+        self.limit = 0 if self.hopeless else min(last if steps is None else steps, last)
         self.state = planner.start_state
         self.tail = first
         self.tick = 0
@@ -136,7 +134,7 @@ class Driver:
     @property
     def reached(self) -> bool:
         """Whether it is at a goal."""
-        return self.planner.at_goal(self.state, tick=self.tick)
+        return not self.hopeless and self.planner.at_goal(self.state, tick=self.tick)
 
     @property
     def is_done(self) -> bool:
@@ -164,7 +162,9 @@ class Driver:
         status, reason = _ending(planner, states, stood=_stood(self.done), reached=at_goal)
         reason += ", when the drive was interrupted" if stopped() and not at_goal else ""
         verdict = judged(scene, planner.vehicle, driven)
-        if verdict.faults:  # they decide how it ended, wherever it ended
+        if self.hopeless is not None:
+            status, reason = self.hopeless
+        elif verdict.faults:  # they decide how it ended, wherever it ended
             status = verdict.faults[0][0]
             ended = reason or f"a goal was reached at {planner.time_of(self.tick):.6g} s"
             reason = "; ".join([*(said for _, said in verdict.faults), ended])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import AnyShape, Box, Disc, Polygon, Shape, as_shapes
 
 Interval: TypeAlias = tuple[float, float]
+EXACT = 1e-9  # [m/s, s, rad] of the ends of intervals, for values that were rounded
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -64,12 +65,14 @@ class GoalRegion:
             raise ValueError(f"goal region: headings must be finite, got {self.heading} rad")
 
     def contains(
-        self, middle: ArrayLike, *, speed: float, time: float, tolerance: float = 1e-9
+        self, middle: ArrayLike, *, speed: float, time: float, tolerance: float = EXACT
     ) -> bool:
         """Whether a pose (3,) of the middle, a speed [m/s] and a time [s] are within it.
 
         The ends belong to it; `tolerance` [m/s, s, rad] is for values that were rounded.
         """
+        import shapely
+
         x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
         if not self.time[0] - tolerance <= time <= self.time[1] + tolerance:
             return False
@@ -81,7 +84,7 @@ class GoalRegion:
             heading, self.heading, tolerance=tolerance
         ):
             return False
-        return self.places is None or any(_covers(place, x, y) for place in self.places)
+        return self.away_from(shapely.Point(x, y)) <= 0.0
 
     def off_by(self, middle: ArrayLike, *, speed: float) -> tuple[float, float, float]:
         """How far a pose (3,) of the middle [m, rad] and a speed [m/s] are from it, time apart.
@@ -94,13 +97,26 @@ class GoalRegion:
         >>> goal.off_by([5.0, 0.5, 0.1], speed=4.0)
         (3.0, 0.0, -1.0)
         """
+        import shapely
+
         x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
-        away = 0.0 if self.places is None else min(_away(place, x, y) for place in self.places)
+        away = self.away_from(shapely.Point(x, y))
         turned = 0.0
         if self.heading is not None and not turns_within(heading, self.heading):
             turned = min(abs(math.remainder(heading - end, 2.0 * math.pi)) for end in self.heading)
         low, high = self.speed or (-math.inf, math.inf)
         return away, turned, min(speed - low, 0.0) + max(speed - high, 0.0)
+
+    def away_from(self, area: Any) -> float:
+        """Least distance of its places to a shapely geometry [m], 0 where they meet or anywhere is.
+
+        Examples
+        --------
+        >>> import shapely
+        >>> GoalRegion(places=(Disc(1.0, [5.0, 0.0]),)).away_from(shapely.Point(2.0, 0.0))
+        2.0
+        """
+        return min((_away(place, area) for place in self.places or ()), default=0.0)
 
 
 def turns_within(heading: float, interval: Interval, *, tolerance: float = 0.0) -> bool:
@@ -130,16 +146,12 @@ def outlines_of(places: Sequence[Shape]) -> list[Array]:
     return rings
 
 
-def _covers(place: Shape, x: float, y: float) -> bool:
-    return _away(place, x, y) <= 0.0
-
-
-def _away(place: Shape, x: float, y: float) -> float:
+def _away(place: Shape, area: Any) -> float:
     """Distance to a place, 0 inside [m]."""
     import shapely
 
     if isinstance(place, Disc):
-        return max(math.hypot(x - place.center[0], y - place.center[1]) - place.radius, 0.0)
+        return max(float(shapely.distance(shapely.Point(place.center), area)) - place.radius, 0.0)
     holes = place.holes if isinstance(place, Polygon) else ()
     corners = place.corners if isinstance(place, Box | Polygon) else np.zeros((0, 2))
-    return float(shapely.distance(shapely.Polygon(corners, holes), shapely.Point(x, y)))
+    return float(shapely.distance(shapely.Polygon(corners, holes), area))

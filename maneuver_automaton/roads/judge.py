@@ -16,6 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.problem import Goal
+from maneuver_automaton.roads.goal_region import EXACT, GoalRegion
 from maneuver_automaton.roads.land import obstacles_in
 from maneuver_automaton.roads.lanelets import Lanelet, drivable_area
 from maneuver_automaton.roads.scene import RoadScene, presence_of
@@ -77,6 +78,46 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
         clearance_m=clearance,
         edge_m=closest_to(plan, model, land_beside(scene.lanelets, plan), footprint=body).distance,
     )
+
+
+def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, str] | None:
+    """Status and words of what lets every drive fail, as the start and the goals show; else None.
+
+    `there` is the start, a plan of no duration.
+    """
+    if faults := judged(scene, vehicle, there).faults:
+        return faults[0][0], "; ".join(f"{said} at the start" for _, said in faults)
+    speed, low, high = scene.start.speed, vehicle.model.min_speed, vehicle.model.max_speed
+    if (beyond := max(low - speed, speed - high)) > EXACT:
+        said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
+        return "undrivable", f"the model cannot drive it: {said}"
+    why = [_never_reached(goal, scene, vehicle) for goal in scene.goals]
+    return None if "" in why else ("missed", f"no goal can be reached: {'; '.join(set(why))}")
+
+
+def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> str:
+    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen."""
+    import shapely
+
+    model, start = vehicle.model, scene.start
+    lasts = goal.time[1] - start.time
+    if lasts < -EXACT:
+        return f"its time is over at {goal.time[1]:.6g} s, before the start at {start.time:.6g} s"
+    low, high = goal.speed or (0.0, 0.0)
+    if low > model.max_speed + EXACT or high < model.min_speed - EXACT:
+        return (
+            f"it asks for {low:.6g} to {high:.6g} m/s, but the vehicle's speeds are"
+            f" {model.min_speed:.6g} to {model.max_speed:.6g} m/s"
+        )
+    # The middle of the body is where its half width on all sides is on the road.
+    within = shapely.buffer(drivable_area(scene.lanelets), -0.5 * vehicle.width)
+    if (off := goal.away_from(within)) > 0.0:
+        return f"it is off the road, {off:.3g} m from where the middle of the vehicle may be"
+    away = goal.away_from(shapely.Point(start.middle[:2]))
+    fastest = min(start.speed + 0.5 * model.max_acceleration * lasts, model.max_speed)
+    if away > (most := fastest * lasts):
+        return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
+    return ""
 
 
 def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,9 +83,13 @@ def tick_of(step: float) -> float:
 
 
 def road_library(
-    vehicle: RoadVehicle, *, top_speed: float, tick: float = LONGEST_TICK
+    vehicle: RoadVehicle,
+    *,
+    top_speed: float,
+    tick: float = LONGEST_TICK,
+    within: Sequence[tuple[float, float]] = (),
 ) -> RoadLibrary:
-    """Trims of speeds up to `top_speed` [m/s], and all maneuvers between them.
+    """Trims of speeds up to `top_speed`, some `within` each interval [m/s]; all maneuvers of them.
 
     Examples
     --------
@@ -94,7 +99,14 @@ def road_library(
     >>> float(library.trims.steering.max())
     1.066
     """
-    speeds = SPEED_STEP * np.arange(math.floor(top_speed / SPEED_STEP + 1e-9) + 1)
+    grid = SPEED_STEP * np.arange(math.floor(top_speed / SPEED_STEP + 1e-9) + 1)
+    more = [
+        (low, high)
+        for low, high in within
+        if low > 0.0 and high < grid[-1] and not ((grid >= low) & (grid <= high)).any()
+    ]
+    speeds = np.union1d(grid, np.mean(np.reshape(more, (-1, 2)), axis=1))
+    most_steps = MOST_STEPS + len(speeds) - len(grid)
     ticks = max(round(DURATION / tick), 1)
     angles = [
         _angles(float(sharpest), most=vehicle.model.max_steering_rate * tick * ticks)
@@ -113,7 +125,7 @@ def road_library(
         engine=min(vehicle.engine, vehicle.model.max_acceleration),
         power_speed=vehicle.power_speed,
         left_out=LEFT_OUT,
-        most_steps=MOST_STEPS,
+        most_steps=most_steps,
         weight_along=0.05,
         weight_across=0.05,
         weight_jerk=0.002,
@@ -123,7 +135,7 @@ def road_library(
         steering=np.concatenate(angles),
         first=np.cumsum([0, *counts]).astype(np.int64),
     )
-    most = trims.speed.size * (2 * MOST_STEPS + 1) * max(counts)
+    most = trims.speed.size * (2 * most_steps + 1) * max(counts)
     return RoadLibrary(
         limits=limits,
         trims=trims,

@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.roads.goal_region import GoalRegion
+from maneuver_automaton.roads.goal_region import EXACT, GoalRegion
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 PER_RADIAN, PER_SPEED = 5.0, 1.0  # [m/rad], [s]: what counts as one metre when samples are compared
-EXACT = 1e-9  # [s] of the ends of a time window
 
 
 def nearest_miss(

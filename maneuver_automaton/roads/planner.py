@@ -25,8 +25,10 @@ from maneuver_automaton.roads import (
 )
 from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
 from maneuver_automaton.roads._kernels_free import Clearing
+from maneuver_automaton.roads._kernels_goals import GoalArrays
 from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.decision import AT_REST, RoadDecision, RoadSettings
+from maneuver_automaton.roads.judge import hopeless
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.polishing import ROUND, polished_controls
@@ -112,9 +114,14 @@ class RoadPlanner:
             for goal in self.local.goals
         )
 
-    def wider(self, width: int) -> RoadPlanner:
-        """A planner like this one with another width of its search."""
-        settings = replace(self.settings, width=width)
+    def hopeless(self) -> tuple[str, str] | None:
+        """Status and words of what lets every drive from the start fail, if anything does."""
+        there = self.plan_of(self.start_state, np.zeros((0, 2)))
+        return hopeless(self.scene, self.vehicle, there)
+
+    def wider(self, width: int, *, horizon_s: float) -> RoadPlanner:
+        """A planner like this one that searches another width, and another time ahead [s]."""
+        settings = replace(self.settings, width=width, horizon_s=horizon_s)
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
     def past(self, others: Sequence[Obstacle]) -> RoadPlanner:
@@ -143,7 +150,14 @@ class RoadPlanner:
         return replace(self, barriers=tuple(left))._cleared()
 
     def _cleared(self) -> RoadPlanner:
-        clearing = _clearing(self.local, self.vehicle, self.settings, self.barriers, tick=self.tick)
+        clearing = _clearing(
+            self.local,
+            self.vehicle,
+            self.settings,
+            self.barriers,
+            self.horizon.goals,
+            tick=self.tick,
+        )
         return replace(self, horizon=self.horizon._replace(clearing=clearing))
 
     def waits(self, state: Array, *, tick: int) -> str:
@@ -235,7 +249,7 @@ class RoadPlanner:
         controls = polished_controls(self.horizon, plan, passes=passes, rounds=rounds)
         if controls is None:
             return plan
-        return self._of_controls(plan.states[0], plan.tick, controls, plan.lasting, reaches=True)
+        return self.of_controls(plan.states[0], plan.tick, controls, plan.lasting, reaches=True)
 
     def search(
         self, state: Array, *, tick: int, narrow: bool = False, below: float = math.inf
@@ -285,15 +299,16 @@ class RoadPlanner:
             return standing if free else None
         if whole < 0:
             return None
-        return self._of_controls(state, tick, controls[:whole], n, reaches=reaches)
+        return self.of_controls(state, tick, controls[:whole], n, reaches=reaches)
 
     def _standing(self, state: Array, tick: int) -> RoadDecision:
         """A tick of rest."""
-        return self._of_controls(state, tick, np.zeros((1, 2)), 0, reaches=False)
+        return self.of_controls(state, tick, np.zeros((1, 2)), 0, reaches=False)
 
-    def _of_controls(
+    def of_controls(
         self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
     ) -> RoadDecision:
+        """The plan from a state (5,) under controls (n, 2), those of its stop included."""
         model = self.vehicle.model
         states = _kernels_motion.driven(
             model.wheelbase, self.tick, np.array(state), np.array(controls)
@@ -302,20 +317,32 @@ class RoadPlanner:
             tick=tick, states=states, controls=controls, lasting=lasting, reaches=reaches
         )
 
+    def standing_on(self, plan: RoadDecision) -> RoadDecision:
+        """A plan and its stop that meet a goal there or at rest after it; any other as it is."""
+        rest = max(self.last_tick - plan.tick - len(plan.controls), 0)
+        controls = np.concatenate([plan.controls, np.zeros((rest, 2))])
+        on = self.of_controls(plan.states[0], plan.tick, controls, plan.lasting, reaches=True)
+        states, tick = np.array(on.states), plan.tick + plan.lasting
+        met = _kernels_goals.first_goal(self.horizon, states[plan.lasting :], tick)
+        n = plan.lasting + met
+        clearing = self.horizon.clearing
+        if met < 0 or _kernels_free.free_ticks(clearing, states[: n + 1], plan.tick) < n:
+            return plan
+        lasting = max(n, len(plan.controls))
+        return self.of_controls(plan.states[0], plan.tick, controls[:lasting], n, reaches=True)
+
     def _again(self, state: Array, tail: RoadDecision) -> RoadDecision | None:
         """The tail of a plan from where the vehicle is; None if it is not free any more."""
         if not len(tail.controls):
             return None
-        plan = self._of_controls(
-            state, tail.tick, tail.controls, tail.lasting, reaches=tail.reaches
-        )
+        plan = self.of_controls(state, tail.tick, tail.controls, tail.lasting, reaches=tail.reaches)
         free = self._free_ticks(plan.states, plan.tick)
         if free < len(plan.controls):
             if not (self.kind and plan.reaches and free >= plan.lasting):
                 return None
             # Others of its kind drive where it would stop, as it is gone from its goal by then.
             controls = plan.controls[: plan.lasting]
-            plan = self._of_controls(state, tail.tick, controls, plan.lasting, reaches=True)
+            plan = self.of_controls(state, tail.tick, controls, plan.lasting, reaches=True)
         if plan.reaches:
             until = np.array(plan.states[: plan.lasting + 1])
             if _kernels_goals.first_goal(self.horizon, until, plan.tick) < 0:
@@ -340,9 +367,17 @@ class RoadPlanner:
         if new.stops != old.stops:
             return new.stops
         if not new.reaches:
+            if self._rests(old) and not self._rests(new):
+                return False
             # It looks a tick further, unless nothing better than to stop at once was found.
             return new.lasting > 0 or not old.lasting
         return self.price(new) < (1.0 - self.settings.gain) * self.price(old)
+
+    def _rests(self, plan: RoadDecision) -> bool:
+        """Whether nobody comes where a plan stops, until the goals are over."""
+        tick = plan.tick + len(plan.controls)
+        still = np.repeat(plan.states[-1:], max(self.last_tick - tick, 0) + 1, axis=0)
+        return _kernels_free.free_ticks(self.horizon.clearing, still, tick) == len(still) - 1
 
     def price(self, plan: RoadDecision, *, ticks: int | None = None) -> float:
         """Cost of a plan, or of its first ticks, its stop left out."""
@@ -363,7 +398,7 @@ class RoadPlanner:
         controls = np.stack([rates, np.zeros_like(rates)], axis=-1).reshape(-1, 2)
         if not len(controls):
             return self._standing(state, tick)
-        return self._of_controls(state, tick, controls, 0, reaches=False)
+        return self.of_controls(state, tick, controls, 0, reaches=False)
 
 
 def road_planner(
@@ -373,22 +408,25 @@ def road_planner(
     vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
     top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
     tick = tick_of(scene.step)
-    library = road_library(vehicle, top_speed=top, tick=tick)
+    wanted = [one.speed for one in scene.goals if one.speed is not None]
+    library = road_library(vehicle, top_speed=top, tick=tick, within=wanted)
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)
+    goals = goal_arrays(local, route, tick=tick)
+    until = local.start.time + _last_tick(goals, settings, tick) * tick
     closed = tuple(
         one
-        for one in barriers(local, vehicle, route.lanelets, until=_until(local, settings))
+        for one in barriers(local, vehicle, route.lanelets, until=until)
         if not one.comes_too_late(vehicle, local.start, settings.off_traffic_m + DEEP)
     )
     horizon = Horizon(
-        clearing=_clearing(local, vehicle, settings, closed, tick=tick),
+        clearing=_clearing(local, vehicle, settings, closed, goals, tick=tick),
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
         route=route_arrays(route),
-        goals=goal_arrays(local, route, tick=tick),
+        goals=goals,
         obstacles=static_obstacles(local, route, vehicle),
         weights=weights_of(scene, vehicle),
     )
@@ -406,10 +444,11 @@ def road_planner(
     )
 
 
-def _until(local: RoadScene, settings: RoadSettings) -> float:
-    """End of the last stop [s]."""
-    last = local.last_time if math.isfinite(local.last_time) else local.start.time + 60.0
-    return last + settings.horizon_s + LONGEST_STOP
+def _last_tick(goals: GoalArrays, settings: RoadSettings, tick: float) -> int:
+    """When the last stop is over."""
+    return max(int(goals.tick[:, 1].max()), 0) + math.ceil(
+        (settings.horizon_s + LONGEST_STOP) / tick
+    )
 
 
 def _clearing(
@@ -417,6 +456,7 @@ def _clearing(
     vehicle: RoadVehicle,
     settings: RoadSettings,
     closed: Sequence[Barrier],
+    goals: GoalArrays,
     *,
     tick: float,
 ) -> Clearing:
@@ -426,7 +466,7 @@ def _clearing(
         replace(local, traffic=seen),
         vehicle,
         tick=tick,
-        last_tick=math.ceil((_until(local, settings) - local.start.time) / tick),
+        last_tick=_last_tick(goals, settings, tick),
         off_edge=settings.off_edge_m,
         off_traffic=settings.off_traffic_m,
     )

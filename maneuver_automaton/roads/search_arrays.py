@@ -12,16 +12,15 @@ from maneuver_automaton.roads._kernels_costs import StaticObstacles, Weights
 from maneuver_automaton.roads._kernels_goals import GoalArrays
 from maneuver_automaton.roads._kernels_route import RouteArrays
 from maneuver_automaton.roads.decision import RoadSettings
-from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
+from maneuver_automaton.roads.goal_region import EXACT, GoalRegion, outlines_of
 from maneuver_automaton.roads.lanelets import drivable_area
 from maneuver_automaton.roads.library import RoadLibrary
 from maneuver_automaton.roads.route import SPACING, Route, extent_on
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
-CHILDREN = 64  # rows for the children of a node
 STRIPS = 17  # along the route, side by side
-FAR_TICK = 1 << 40  # of a goal without a last time
+LONGEST = 60.0  # [s] that is looked ahead from its begin on to a goal without a last time
 
 
 def route_arrays(route: Route) -> RouteArrays:
@@ -42,16 +41,13 @@ def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
     start = scene.start.time
     ticks, headings, speeds = [], [], []
     for goal in scene.goals:
-        end = (goal.time[1] - start) / tick
-        ticks.append(
-            (
-                max(math.ceil((goal.time[0] - start) / tick - 1e-6), 0),
-                math.floor(end + 1e-6) if math.isfinite(end) else FAR_TICK,
-            )
-        )
+        begin, end = goal.time[0] - start, goal.time[1] - start
+        end = end if math.isfinite(end) else max(begin, 0.0) + LONGEST
+        ticks.append((max(math.ceil(begin / tick - 1e-6), 0), math.floor(end / tick + 1e-6)))
         low, high = goal.heading or (0.0, 2.0 * math.pi)
-        headings.append((low, min(high - low, 2.0 * math.pi)))
-        speeds.append(goal.speed or (-math.inf, math.inf))
+        headings.append((low - EXACT, min(high - low + 2.0 * EXACT, 2.0 * math.pi)))
+        low, high = goal.speed or (-math.inf, math.inf)
+        speeds.append((low - EXACT, high + EXACT))
     return GoalArrays(
         corner=np.concatenate(flat) if flat else np.zeros((0, 2)),
         ring=np.cumsum([0, *(len(ring) for ring in flat)]).astype(np.int64),
@@ -125,7 +121,9 @@ def beam_arrays(settings: RoadSettings, library: RoadLibrary) -> BeamArrays:
     """Room for the nodes of one search."""
     limits = library.limits
     levels = round(settings.horizon_s / limits.tick) // limits.ticks + 1
-    nodes = CHILDREN * settings.width * levels + 1024
+    most = int(np.diff(library.maneuvers.first).max())  # of a node; at first, one for every trim
+    children = max(settings.width * most, library.trims.speed.size)
+    nodes = 3 + settings.width * levels + children
     return BeamArrays(
         pose=np.empty((nodes, 4)),
         links=np.empty((nodes, 4), dtype=np.int64),
@@ -133,8 +131,8 @@ def beam_arrays(settings: RoadSettings, library: RoadLibrary) -> BeamArrays:
         counts=np.zeros(levels, dtype=np.int64),
         strips=np.zeros(STRIPS, dtype=np.int64),
         cells=np.empty(1 << (64 * settings.width).bit_length(), dtype=np.int64),
-        heap_key=np.empty(nodes),
-        heap_node=np.empty(nodes, dtype=np.int64),
+        heap_key=np.empty(children),
+        heap_node=np.empty(children, dtype=np.int64),
         reached=np.zeros((2, 3)),
-        state=np.zeros(4, dtype=np.int64),
+        state=np.zeros(5, dtype=np.int64),
     )

@@ -22,7 +22,7 @@ from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.collision.blocked import too_close
-from maneuver_automaton.roads.judge import judged
+from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.scene import RoadScene, presence_of
 from maneuver_automaton.roads.single_plan import RoadPlanResult, plan_road
 from maneuver_automaton.roads.vehicle import RoadVehicle
@@ -187,30 +187,42 @@ def driving(vehicle: RoadVehicle, plan: Plan, name: str) -> Obstacle:
     return Obstacle(vehicle.footprint, motion=Motion.of_plan(plan), name=name)
 
 
+def judged_together(
+    scenes: Mapping[str, RoadScene], vehicle: RoadVehicle, plans: Mapping[str, Plan]
+) -> dict[str, RoadVerdict]:
+    """The verdict on each plan past all others."""
+    there = {name: driving(vehicle, plan, name) for name, plan in plans.items()}
+    return {
+        name: judged(
+            replace(
+                scenes[name],
+                traffic=(
+                    *scenes[name].traffic,
+                    *(there[other] for other in plans if other != name),
+                ),
+            ),
+            vehicle,
+            plan,
+        )
+        for name, plan in plans.items()
+    }
+
+
 def _checked(
     scenes: Mapping[str, RoadScene], vehicle: RoadVehicle, results: Mapping[str, RoadPlanResult]
 ) -> dict[str, RoadPlanResult]:
     """The answers as the judge sees them past all others; a plan that hits one is left out."""
     kept = dict(results)
     while True:
-        there = {
-            name: driving(vehicle, one.plan, name)
-            for name, one in kept.items()
-            if one.plan is not None
-        }
-        worst, said = None, ""
-        for name, one in kept.items():
-            if one.plan is None:
-                continue
-            others = [body for other, body in there.items() if other != name]
-            past = replace(scenes[name], traffic=(*scenes[name].traffic, *others))
-            kept[name] = one = replace(one, verdict=judged(past, vehicle, one.plan))
-            if one.verdict is not None and not one.verdict.clean:
-                worst, said = name, "; ".join(words for _, words in one.verdict.faults)
-        if worst is None:
+        plans = {name: one.plan for name, one in kept.items() if one.plan is not None}
+        verdicts = judged_together(scenes, vehicle, plans)
+        kept |= {name: replace(kept[name], verdict=one) for name, one in verdicts.items()}
+        wrong = [name for name, one in verdicts.items() if not one.clean]
+        if not wrong:
             return kept
+        said = "; ".join(words for _, words in verdicts[wrong[-1]].faults)
         reason = f"its plan fails the judge past the others: {said}"
-        kept[worst] = replace(kept[worst], plan=None, verdict=None, reason=reason)
+        kept[wrong[-1]] = replace(kept[wrong[-1]], plan=None, verdict=None, reason=reason)
 
 
 def nearest_pairs(vehicle: RoadVehicle, plans: Mapping[str, Plan]) -> tuple[RoadPair, ...]:

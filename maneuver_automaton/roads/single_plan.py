@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass, replace
 
@@ -14,9 +13,8 @@ from maneuver_automaton._display import Player, picture, player_frame, player_pa
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
-from maneuver_automaton.roads.driving import RoadDrive, drive_scene
+from maneuver_automaton.roads.driving import Driver, RoadDrive, drive_scene
 from maneuver_automaton.roads.judge import RoadVerdict, judged
-from maneuver_automaton.roads.library import tick_of
 from maneuver_automaton.roads.missed import nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner, road_planner
 from maneuver_automaton.roads.polishing import ROUNDS
@@ -24,8 +22,7 @@ from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 SOONER = (4.0, 8.0, 12.0)  # [s] before a goal is over, by which it is to be reached but for a stop
-WIDTHS = (100, 400, 1600, 4000)
-LONGEST = 30.0  # [s] that a plan may last
+WIDTHS = (100, 400, 0, 1600, 4000)  # 0: driven in closed loop instead
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -83,64 +80,81 @@ def plan_road(
 
     It is polished, and passes the judge. No search begins after `time_limit` [s].
     """
-    settings = settings or RoadSettings()
-    last = scene.last_time - scene.start.time
-    tick = tick_of(scene.step)
-    horizon = min(max(math.ceil(last / tick - 1e-6) * tick, tick), LONGEST)
     begin = time.perf_counter()
     with patient():
-        best = _widened(scene, vehicle, settings, horizon, begin + time_limit)
+        best = _widened(road_planner(scene, vehicle, settings), begin + time_limit)
     return replace(best, search_s=time.perf_counter() - begin)
 
 
-def _widened(
-    scene: RoadScene,
-    vehicle: RoadVehicle | None,
-    settings: RoadSettings,
-    horizon: float,
-    deadline: float,
-) -> RoadPlanResult:
+def _widened(planner: RoadPlanner, deadline: float) -> RoadPlanResult:
     """The better one of the first search that finds a plan, and of the next wider one."""
-    planner = road_planner(scene, vehicle, replace(settings, width=WIDTHS[0], horizon_s=horizon))
-    best = RoadPlanResult(
-        planner=planner, decision=None, plan=None, verdict=None, reason="", search_s=0.0
-    )
+    if (why := planner.hopeless()) is not None:
+        return _without(planner, why[1])
+    best, driven = _without(planner, ""), ""
     for width in WIDTHS:
-        if width > WIDTHS[0] and (stopped() or time.perf_counter() > deadline):
+        if width != WIDTHS[0] and (stopped() or time.perf_counter() > deadline):
             break
-        found, cost = _searched(planner.wider(width)), best.cost
-        if cost is None or (found.cost is not None and found.cost < cost):
+        cost = best.cost
+        if width:
+            horizon = planner.last_tick * planner.tick
+            found = _searched(planner.wider(width, horizon_s=horizon))
+        elif cost is None:
+            found, driven = _driven(planner, deadline)
+        else:
+            continue
+        if found.plan is not None and (cost is None or (found.cost or 0.0) < cost):
             best = found
+        elif cost is None and width:
+            best = found  # for its reason
         if cost is not None:
             break
-    return best
+    return best if best.plan is not None else replace(best, reason=best.reason + driven)
+
+
+def _driven(planner: RoadPlanner, deadline: float) -> tuple[RoadPlanResult, str]:
+    """What the closed loop drives, as a plan; else how it ends, in words that follow others."""
+    driver = Driver(planner, None)
+    while not (driver.is_done or stopped() or time.perf_counter() > deadline):
+        driver.step(driver.planner)
+    drive = driver.drive(planner.scene)
+    if not drive.reached:
+        said = f"; driven step by step until {planner.time_of(driver.tick):.6g} s: {drive.status}"
+        return _without(planner, ""), f"{said}, {drive.reason}"
+    controls = np.array([step.control for step in driver.done]).reshape(-1, 2)
+    plan = planner.of_controls(planner.start_state, 0, controls, len(controls), reaches=True)
+    return _judged(planner, plan), ""
 
 
 def _searched(planner: RoadPlanner) -> RoadPlanResult:
     """Result of one search from the start, polished and judged."""
     found = _past_stops(planner, planner.start_state, 0)
-    plan, verdict, reason = None, None, ""
+    if found is not None and not found.reaches:
+        found = planner.standing_on(found)
     if found is None or not found.reaches:
-        until = planner.time_of(round(planner.settings.horizon_s / planner.tick))
         reason = (
-            f"no goal is reached until {min(planner.scene.last_time, until):.6g} s by any of the"
+            f"no goal is reached until {planner.time_of(planner.last_tick):.6g} s by any of the"
             f" words searched, {planner.settings.width} at a time{_how_near(planner, found)}"
         )
-    else:
-        found = planner.polished(found, rounds=ROUNDS)
-        plan = planner.plan_of(planner.start_state, found.controls[: found.lasting])
-        verdict = judged(planner.scene, planner.vehicle, plan)
-        if not verdict.clean:
-            said = "; ".join(words for _, words in verdict.faults)
-            reason = f"the plan that was found fails the judge: {said}"
-    none = bool(reason)
+        return _without(planner, reason)
+    return _judged(planner, found)
+
+
+def _judged(planner: RoadPlanner, found: RoadDecision) -> RoadPlanResult:
+    """A plan to a goal, polished, if it passes the judge."""
+    found = planner.polished(found, rounds=ROUNDS)
+    plan = planner.plan_of(planner.start_state, found.controls[: found.lasting])
+    verdict = judged(planner.scene, planner.vehicle, plan)
+    if not verdict.clean:
+        said = "; ".join(words for _, words in verdict.faults)
+        return _without(planner, f"the plan that was found fails the judge: {said}")
     return RoadPlanResult(
-        planner=planner,
-        decision=None if none else found,
-        plan=None if none else plan,
-        verdict=None if none else verdict,
-        reason=reason,
-        search_s=0.0,
+        planner=planner, decision=found, plan=plan, verdict=verdict, reason="", search_s=0.0
+    )
+
+
+def _without(planner: RoadPlanner, reason: str) -> RoadPlanResult:
+    return RoadPlanResult(
+        planner=planner, decision=None, plan=None, verdict=None, reason=reason, search_s=0.0
     )
 
 
@@ -191,7 +205,10 @@ def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanRe
     first = planner.search(planner.start_state, tick=0)
     if first is not None and first.reaches:
         return None
-    return plan_road(planner.scene, planner.vehicle, planner.settings, time_limit=time_limit)
+    begin = time.perf_counter()
+    with patient():
+        best = _widened(planner, begin + time_limit)
+    return replace(best, search_s=time.perf_counter() - begin)
 
 
 def drive_road(

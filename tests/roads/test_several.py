@@ -15,6 +15,7 @@ import shapely
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
+from maneuver_automaton.exports import load_road_fleet
 from maneuver_automaton.formats import load_plans
 from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
 from maneuver_automaton.groups import SE2
@@ -178,6 +179,46 @@ class TestLoop:
         assert drive.plans["101"].start_time == pytest.approx(1.2)
         assert all(one.verdict.clean for one in drive.results.values())
 
+    def test_a_file_of_it_is_checked_drawn_and_exported(self, folder, capsys):
+        assert run(["mpc", "road.xml", "--no-plot", "--quiet"]) == 0
+        loop = "out/closed_loop.json"
+        assert run(["check", loop]) == 0
+        said = capsys.readouterr().out
+        assert all(f"{name}: goal" in said for name in ("100", "101", "102"))
+        assert "every pair: apart" in said
+        for more, ending in (((), "png"), (("--animate",), "gif"), (("--html",), "html")):
+            assert run(["plot", loop, *more]) == 0
+            assert Path("out", f"closed_loop.{ending}").stat().st_size > 1000
+        read = load_road_fleet(loop, beside="road.xml")
+        assert all(one.verdict.clean for one in read.results.values())
+        # A file that says what was not driven is told.
+        document = json.loads(Path(loop).read_text())
+        for step in document["vehicles"]["101"]["steps"][:-1]:
+            step["control"] = [-4.0, 0.0] if step["reduced_state"][0] > 1.0 else [0.0, 0.0]
+        Path(loop).write_text(json.dumps(document))
+        assert run(["check", loop]) == 1
+        assert "NO" in capsys.readouterr().out
+
+    @quiet
+    def test_solutions_of_all_are_written(self, folder):
+        pytest.importorskip("commonroad.common.solution")
+        Path("road.xml").write_text(
+            commonroad(*LANES, SLOW, *PROBLEMS).replace("TST_Lanes", "ZAM_Lanes")
+        )
+        assert run(["mpc", "road.xml", "--no-plot", "--quiet"]) == 0
+        assert run(["export", "out/closed_loop.json", "--to", "commonroad"]) == 0
+        root = ElementTree.parse("out/closed_loop_commonroad.xml").getroot()
+        assert [one.get("planningProblem") for one in root] == ["100", "101", "102"]
+
+    def test_one_vehicle_is_checked_and_drawn_with_its_file(self, folder, capsys):
+        Path("one.xml").write_text(commonroad())
+        assert run(["mpc", "one.xml", "--no-plot", "--quiet"]) == 0
+        assert run(["plan", "one.xml", "--no-plot", "--quiet"]) == 0
+        for file in ("out/closed_loop.json", "out/plan.json"):
+            assert run(["check", file, "--with", "one.xml"]) == 0
+            assert run(["plot", file, "--with", "one.xml"]) == 0
+            assert "100: goal" in capsys.readouterr().out
+
 
 def test_nothing_to_plan():
     with pytest.raises(ValueError, match="there is no vehicle"):
@@ -227,8 +268,7 @@ class TestCommands:
             assert len(one["steps"]) > 10
         for ending in ("png", "gif"):
             assert Path(f"out/closed_loop.{ending}").stat().st_size > 10_000
-        assert run(["check", "out/closed_loop.json"]) == 2
-        assert "is of several vehicles on the road of road.xml" in capsys.readouterr().err
+        assert run(["check", "out/closed_loop.json"]) == 0
 
     def test_mpc_of_few_steps(self, folder, capsys):
         assert run(["mpc", "road.xml", "--steps", "3", "--quiet", "--no-plot"]) == 1
@@ -273,14 +313,11 @@ class TestCommands:
         said = "road.xml: two planning problems have one id, need distinct ids\n"
         assert capsys.readouterr().err == said
 
-    def test_other_commands_do_not_read_it(self, folder, capsys):
+    def test_other_commands_read_it(self, folder, capsys):
         assert run(["plan", "road.xml", "--quiet", "--no-plot"]) == 0
         for command in ("check", "plot"):
-            assert run([command, "out/plan.json"]) == 2
-            assert capsys.readouterr().err == (
-                "out/plan.json: is of several vehicles on the road of road.xml, whose plans only "
-                "export reads\n"
-            )
+            assert run([command, "out/plan.json"]) == 0
+        assert capsys.readouterr().err == ""
 
     @quiet
     def test_a_solution_of_all(self, folder):

@@ -1,0 +1,220 @@
+"""Goals of speed, braking as a plan, late goals, causes told before any search, places to stand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+import maneuver_automaton as ma
+from maneuver_automaton.collision import Box, Motion, Obstacle
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads import (
+    GoalRegion,
+    Lanelet,
+    RoadDrive,
+    RoadPlanner,
+    RoadScene,
+    RoadStart,
+    drive_road,
+    drive_scene,
+    plan_road,
+    road_planner,
+    single_plan,
+)
+from tests.formats.outside import DATA, needs_data
+from tests.roads.files import LANES, interval, lanelet, parked, problem, scene_of
+
+LIMIT = 300.0  # [s] that nobody waits for: searches end by themselves
+
+
+def place(x, y, length, width=4.0):
+    return (
+        f"<position><rectangle><length>{length}</length><width>{width}</width>"
+        f"<center><x>{x}</x><y>{y}</y></center></rectangle></position>"
+    )
+
+
+def goal(*parts, time=(0, 100)):
+    return f"<goalState>{''.join(parts)}{interval('time', *time)}</goalState>"
+
+
+def speed(low, high):
+    return interval("velocity", low, high)
+
+
+def ends(value, plan):
+    """Middle, speed and time at the end of a plan of a result or a drive."""
+    middle = value.planner.vehicle.middle_of(plan.end)
+    return middle, plan.trims[-1].reduced_state[0], plan.start_time + plan.duration
+
+
+@pytest.mark.parametrize("lanes", [LANES[:1], LANES])
+@pytest.mark.parametrize(
+    ("begin", "where", "time"),
+    [(10.0, (105.0, 190.0), (0, 100)), (6.0, (36.0, 4.0), (0, 80)), (15.0, (70.0, 40.0), (70, 90))],
+)
+def test_it_stops_at_a_place_exactly(tmp_path, lanes, begin, where, time):
+    x, length = where
+    asked = goal(place(x, 2.0, length), speed(0, 0), time=time)
+    drive = drive_road(scene_of(tmp_path, *lanes, problem(goal=asked, speed=begin)))
+    assert drive.status == "reached"
+    assert abs(drive.driven.trims[-1].reduced_state[0]) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("begin", "wanted", "time"),
+    [
+        (10.0, (0.0, 0.5), (30, 40)),
+        (20.0, (3.1, 3.3), (0, 35)),
+        (14.0, (7.31, 7.31), (0, 25)),
+        (25.0, (6.6, 8.6), (40, 50)),
+        (8.0, (12.2, 12.4), (0, 40)),
+    ],
+)
+def test_a_speed_without_a_place_is_reached_on_two_lanes(tmp_path, begin, wanted, time):
+    scene = scene_of(tmp_path, *LANES, problem(goal=goal(speed(*wanted), time=time), speed=begin))
+    for value in (plan_road(scene, time_limit=LIMIT), drive_road(scene, time_limit=LIMIT)):
+        plan = value.driven if isinstance(value, RoadDrive) else value.plan
+        assert plan is not None
+        middle, at, when = ends(value, plan)
+        assert wanted[0] - 1e-9 <= at <= wanted[1] + 1e-9
+        assert value.planner.scene.goals[0].contains(middle, speed=at, time=when)
+
+
+@pytest.mark.parametrize("end", ["dead end", "wall"])
+@pytest.mark.parametrize(("begin", "spare"), [(10.0, 0.55), (12.0, 0.3), (5.0, 1.0)])
+def test_braking_before_the_end_of_the_road_is_a_plan(tmp_path, end, begin, spare):
+    front = 10.0 + begin**2 / 16.0 + 2.254 + spare
+    road = lanelet(1, 0.0, 4.0).replace("200.0", str(front)).replace("100.0", str(front / 2))
+    parts = (road,) if end == "dead end" else (LANES[0], parked(3, x=front + 1, y=2, size=(2, 4)))
+    scene = scene_of(tmp_path, *parts, problem(goal=goal(time=(50, 50)), speed=begin))
+    result = plan_road(scene, time_limit=LIMIT)
+    assert result.plan is not None
+    assert result.verdict.clean
+    assert result.plan.duration == pytest.approx(5.0)
+    assert drive_road(scene).status == "reached"
+
+
+def test_what_the_loop_drives_is_a_plan(tmp_path, monkeypatch):
+    scene = scene_of(tmp_path)
+    monkeypatch.setattr(single_plan, "WIDTHS", (0,))
+    result, drive = plan_road(scene, time_limit=LIMIT), drive_scene(road_planner(scene))
+    assert result.plan.duration == pytest.approx(drive.driven.duration)
+    assert result.cost <= sum(step.applied_cost for step in drive.steps)
+    late = scene_of(tmp_path, *LANES, problem(goal=goal(speed(35, 36), time=(10, 20))))
+    reason = plan_road(late, time_limit=LIMIT).reason
+    assert reason.startswith("; driven step by step until 2 s: missed, no goal was reached until 2")
+
+
+@pytest.mark.parametrize(("step", "begin", "end"), [(0.1, 32.0, 40.0), (0.04, 31.2, 33.6)])
+def test_late_goals_are_found(tmp_path, step, begin, end):
+    asked = goal(place(190.0, 2.0, 16.0), time=(round(begin / step), round(end / step)))
+    scene = scene_of(tmp_path, *LANES, problem(goal=asked, speed=10.0), step=step)
+    result = plan_road(scene, time_limit=LIMIT)
+    assert result.plan is not None
+    assert begin - 1e-9 <= result.plan.duration <= end + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("start", "asked", "status", "said"),
+    [
+        ({"y": 7.8}, goal(), "off_road", "off the road: a part of the body was outside"),
+        ({"x": 33.0}, goal(), "touched", "collision with parkedVehicle 3 at the start"),
+        ({"speed": 60.0}, goal(), "undrivable", "the model cannot drive it: speed is 9.2 beyond"),
+        ({"speed": -3.0}, goal(), "undrivable", "the model cannot drive it: speed is 3 beyond"),
+        (
+            {},
+            goal(place(150.0, 30.0, 8.0)),
+            "missed",
+            "no goal can be reached: it is off the road, 20.8 m from where the middle of the",
+        ),
+        (
+            {},
+            goal(speed(60, 70)),
+            "missed",
+            "no goal can be reached: it asks for 60 to 70 m/s, but the vehicle's speeds are 0 to",
+        ),
+        (
+            {},
+            goal(place(190.0, 2.0, 8.0), time=(0, 20)),
+            "missed",
+            "no goal can be reached: it is 176 m away, and until it is over one drives 40 m at",
+        ),
+    ],
+)
+def test_causes_are_told_before_any_search(tmp_path, monkeypatch, start, asked, status, said):
+    def never(*_args, **_options):
+        raise AssertionError("nothing is to be searched")
+
+    monkeypatch.setattr(RoadPlanner, "search", never)
+    there = parked(3, x=36.0, y=2.0)
+    scene = scene_of(tmp_path, *LANES, there, problem(goal=asked, **start))
+    result, drive = plan_road(scene), drive_scene(road_planner(scene))
+    assert result.plan is None
+    assert result.reason.startswith(said)
+    assert (drive.status, drive.reason, len(drive.steps)) == (status, result.reason, 0)
+
+
+def test_a_goal_that_is_over_is_said(tmp_path):
+    start = problem(goal=goal(time=(5, 9)), speed=5.0).replace(
+        "<time><exact>0</exact></time>", "<time><exact>20</exact></time>"
+    )
+    result = plan_road(scene_of(tmp_path, *LANES, start))
+    assert result.reason == (
+        "no goal can be reached: its time is over at 0.9 s, before the start at 2 s"
+    )
+
+
+def crossing():
+    """A road to the right, and cars that cross it 48 m ahead of the start for some seconds."""
+    along = Lanelet(1, [[0, 2], [400, 2]], [[0, -2], [400, -2]])
+    across = Lanelet(2, [[56, -90], [56, 90]], [[60, -90], [60, 90]])
+    times = np.linspace(0.0, 12.0, 121)
+    traffic = [
+        Obstacle(
+            Box([4.5, 1.8]),
+            motion=Motion(times, [[58.0, y + 8.0 * time, np.pi / 2] for time in times]),
+            name=f"car {k}",
+        )
+        for k, y in enumerate((-24.0, -40.0, -56.0, -72.0, -88.0))
+    ]
+    return RoadScene(
+        name="crossing",
+        lanelets=(along, across),
+        start=RoadStart(middle=[10.0, 0.0, 0.0], speed=9.0),
+        goals=(GoalRegion(places=(Box([60.0, 4.0], [150.0, 0.0]),), time=(0.0, 20.0)),),
+        traffic=tuple(traffic),
+    )
+
+
+def test_it_waits_where_nobody_comes():
+    scene = crossing()
+    drive = drive_scene(road_planner(scene))
+    assert drive.status == "reached"
+    body = drive.planner.vehicle.footprint.corners
+    for step in drive.steps[::6]:
+        decision = step.decision
+        if decision.reaches or not decision.stops:
+            continue
+        still = shapely.Polygon(SE2(drive.planner.world(decision.states[-1, :3])).act(body))
+        begin = step.time + drive.planner.tick * len(decision.controls)
+        for one in scene.traffic:
+            for time in np.arange(begin, one.motion.time[-1], 0.4):
+                assert not still.intersects(shapely.Polygon(one.at(time).corners))
+
+
+@needs_data
+@pytest.mark.parametrize(
+    "name", ["stop-at-place", "slow-down-two-lanes", "braking-is-a-plan", "late-goal"]
+)
+def test_files_of_others_are_planned_and_driven(name):
+    scene = ma.load_scenario(DATA / "field" / "roads" / f"{name}.xml").scene
+    assert plan_road(scene, time_limit=LIMIT).plan is not None
+    assert drive_road(scene, time_limit=LIMIT).status == "reached"
+
+
+@needs_data
+def test_it_is_not_hit_where_it_stands():
+    scene = ma.load_scenario(DATA / "commonroad" / "scenarios" / "CHN_Sha-7_1_T-1.xml").scene
+    assert drive_scene(road_planner(scene)).status == "reached"
