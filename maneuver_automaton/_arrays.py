@@ -83,7 +83,7 @@ def plain_numbers(instance: Any) -> None:
     ValueError
         If a field holds anything else.
     """
-    for name, (convert, need) in _numbers_of(type(instance)):
+    for name, (convert, need) in _numbers_of(instance.__class__):
         value = getattr(instance, name)
         if value is not None:
             try:

@@ -119,7 +119,9 @@ def _samples(label: str, entry: Any) -> Trajectory:
     label = f"{label}: samples"
     check_keys(label, entry, known=SAMPLED, needed=SAMPLED)
     time = numbers_of(f"{label}: time", entry["time"])
-    tables = {name: table_of(f"{label}: {name}", entry[name]) for name in SAMPLED[1:]}
+    tables: dict[str, Any] = {
+        name: table_of(f"{label}: {name}", entry[name]) for name in SAMPLED[1:]
+    }
     for name, table in tables.items():
         if len(table) != time.size or not time.size:
             raise InvalidLibrary(

@@ -148,12 +148,11 @@ def _written(entry: Mapping[str, Any]) -> Maneuver:
     """A maneuver whose course is written in the log."""
     if "course" not in entry:
         raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
-    course = Trajectory(
-        **{
-            name: np.array(entry["course"][name], dtype=np.float64)
-            for name in ("time", "pose", "reduced_state", "control")
-        }
-    )
+    rows: dict[str, Any] = {
+        name: np.array(entry["course"][name], dtype=np.float64)
+        for name in ("time", "pose", "reduced_state", "control")
+    }
+    course = Trajectory(**rows)
     return Maneuver.along(
         course,
         name=entry["name"],
