@@ -14,9 +14,10 @@ rest is free; in a trim that moves as long as it has been driven, and it hopes f
 it last could rest. One that cannot rest at all is safe as long as its trim stays free.
 
 The open list is ordered by safety lost and time spent: the node that is safe for longest comes
-first, and of equal ones the one that gets there soonest. The search ends at the first node that is
-safe for as long as was asked, because any will do. A cell of space, heading and time is entered
-once in a class of trims: what comes there later is as good to go on from, to within the cell.
+first, and of equal ones the one that gets there soonest. The search ends at the first node that
+leads to one that is safe for as long as was asked: to the soonest of these. A cell of space,
+heading and time is entered once in a class of trims: what comes there later is as good to go on
+from, to within the cell.
 """
 
 from __future__ import annotations
@@ -133,9 +134,10 @@ def add_node(
     nodes[node, SAFE], nodes[node, HOPE] = safe, hope
     links[node, PARENT], links[node, TRIM], links[node, EDGE] = parent, trim, edge
     state[N_NODES] = node + 1
-    if node == 0 or safe > nodes[state[BEST], SAFE]:
+    if node == 0 or (state[FOUND] < 0 and safe > nodes[state[BEST], SAFE]):
         state[BEST] = node
-    if safe >= task.until and (rest >= 0 or not task.rests):
+    is_sooner = state[FOUND] < 0 or clock < nodes[state[FOUND], CLOCK]
+    if is_sooner and safe >= task.until and (rest >= 0 or not task.rests):
         state[FOUND] = node
         state[BEST] = node
     key = task.impatience * (clock - task.clock) - hope
@@ -206,9 +208,9 @@ def expand(
                     elif goes_on:
                         known = clock + proven
                     add_node(task, lib, scene, search, then, clock + t, t, known, node, trim, -1)
-                    if state[FOUND] >= 0:
-                        return 0
                 t *= 2.0
+                if state[FOUND] >= 0 and clock + t >= nodes[state[FOUND], CLOCK]:
+                    break  # the one that was found is sooner
         for edge in range(lib.first_edge[group], lib.first_edge[group + 1]):
             if not edge_free(scene, lib, edge, pose, clock):
                 continue
@@ -223,6 +225,4 @@ def expand(
                 if coast_inside(scene, lib, trim, then, proven):
                     known = later + proven
             add_node(task, lib, scene, search, then, later, 0.0, known, node, trim, edge)
-            if state[FOUND] >= 0:
-                return 0
     return 1
