@@ -158,7 +158,7 @@ def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -
     """The plan of one vehicle, or what it drove; None if it has none."""
     try:
         if "steps" in document:
-            plan = _road_drive(document, road)
+            plan: Plan | None = _road_drive(document, road)
         else:
             plan = plan_of_document(document) if document["status"] == "found" else None
     except (ValueError, KeyError, TypeError, IndexError) as error:

@@ -26,8 +26,7 @@ def read_bytes(
         If it is missing, a folder, unreadable, or too long.
     """
     try:
-        packed = isinstance(path, zipfile.Path)
-        with path.open("rb") if packed else open_input(path) as stream:
+        with open_input(path) if isinstance(path, Path) else path.open("rb") as stream:
             content = stream.read(most + 1)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error

@@ -52,7 +52,8 @@ def plan_within_tolerance(
     results: list[PlanResult] = []
     asking = budget.before(LOOSENED_SHARE * budget.seconds)
     for k, question in enumerate(asked):
-        if results and asking.is_over:
+        enough = found.plans and not problem.search.improve
+        if enough or (results and asking.is_over):
             break
         part = asking.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
         part = replace(part, expansions=question.search.max_expansions)
@@ -61,7 +62,6 @@ def plan_within_tolerance(
             found.note(cost, at=part.began - budget.began + at)
         found.counts.update(result.counts)
         results.append(result)
-    for result in results:
         if result.plan is not None:
             for plan in (result.plan, *(other.plan for other in result.alternatives)):
                 _offer_loosened(found, plan)
