@@ -26,8 +26,7 @@ def read_bytes(
         If it is missing, a folder, unreadable, or too long.
     """
     try:
-        packed = isinstance(path, zipfile.Path)
-        with path.open("rb") if packed else open_input(path) as stream:
+        with path.open("rb") if isinstance(path, zipfile.Path) else open_input(path) as stream:
             content = stream.read(most + 1)
     except FileNotFoundError as error:
         raise InvalidScenario(f"{path}: no such file") from error

@@ -109,8 +109,9 @@ def polished_price(problem: Problem) -> PolishedPrice:
 
 def prices_metres_alone(cost: StageCost) -> bool:
     """Whether a cost prices the length of a motion, and neither its time nor its controls."""
-    known = isinstance(cost, Cost) and cost.length > 0.0
-    return known and not any((cost.time, cost.effort, cost.norm))
+    if not isinstance(cost, Cost):
+        return False
+    return cost.length > 0.0 and not any((cost.time, cost.effort, cost.norm))
 
 
 def admitted_durations(problem: Problem) -> tuple[float, float]:
