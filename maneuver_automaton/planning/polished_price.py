@@ -12,13 +12,14 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.optimal_control.polish_values import LEAST_DURATION, MOST_DURATION
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.problem import Problem
 
 EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some
 SMOOTHING = 1e-9  # [m^2/s^2] under the root of a speed, which has no slope at zero
+HURRY = 0.01  # of the greatest price of a second, where metres alone have a price
 ROUND = 0.03  # of the greatest control, within which a norm is smooth: solvers stall at its tip
 
 
@@ -95,11 +96,22 @@ def polished_price(problem: Problem) -> PolishedPrice:
     waiting = float(problem.rates[rest]) if pads and rest is not None else 0.0
     counted = cost.switch > 0.0 or cost.direction_change > 0.0
     per_second = (cost.time, cost.effort, cost.norm, cost.length)
+    limit = problem.horizon.time or problem.horizon.max_time
+    if limit is None and prices_metres_alone(cost):
+        # lengths are the same at any pace: a little for the time tells the solver which
+        cost = replace(cost, time=HURRY * float(problem.rates.max()))
     if counted:
         none_is_left = not any(per_second)
         time = 1.0 if none_is_left else cost.time
         cost = replace(cost, time=time, switch=0.0, direction_change=0.0)
     return PolishedPrice(problem, cost, waiting)
+
+
+def prices_metres_alone(cost: StageCost) -> bool:
+    """Whether a cost prices the length of a motion, and neither its time nor its controls."""
+    if not isinstance(cost, Cost):
+        return False
+    return cost.length > 0.0 and not any((cost.time, cost.effort, cost.norm))
 
 
 def admitted_durations(problem: Problem) -> tuple[float, float]:

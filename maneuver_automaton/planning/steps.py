@@ -16,6 +16,7 @@ from maneuver_automaton.planning.needs import (
     has_inertia,
     rests_at_both_ends,
 )
+from maneuver_automaton.planning.polished_price import prices_metres_alone
 from maneuver_automaton.planning.polishing import load_polishing, why_not_polished
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
@@ -64,11 +65,13 @@ def steps_of(problem: Problem) -> Steps:
         )
     linked = bool(automaton.maneuvers)
     first = method == "auto" and _suits_words(problem)
+    along = searched and follows_paths(automaton.model) and rests_at_both_ends(problem)
+    shortest = along and prices_metres_alone(problem.cost)  # to stop and steer costs no metre
     return Steps(
-        along_paths=searched and follows_paths(automaton.model) and rests_at_both_ends(problem),
+        along_paths=along,
         words=linked and (not searched or first),
         lattice=linked and searched,
-        polishes=not why_not_polished(problem),
+        polishes=not (shortest or why_not_polished(problem)),
         at_will=False,
         likeness=POLISHED,
     )

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maneuver_automaton import Automaton, Omnidirectional
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Box, Disc
@@ -28,7 +29,12 @@ from tests.inertia import unicycle_automaton
 
 FIELD = Path(__file__).parents[2] / "../shared/data/field"
 BODY = Disc(0.3)
-KINDS = {"at will": ROBOT, "inertia": unicycle_automaton()}
+SIDES = {"n": (0, 1, 0), "s": (0, -1, 0), "e": (1, 0, 0), "w": (-1, 0, 0), "rest": (0, 0, 0)}
+KINDS = {
+    "at will": ROBOT,
+    "inertia": unicycle_automaton(),
+    "translations": Automaton.of_controls(Omnidirectional(), SIDES),
+}
 
 
 def fleet_of(kind, ends, walls=(), **more):
@@ -62,7 +68,7 @@ def test_who_stands_in_the_way_on_open_floor_is_passed(kind, seed):
     places = [[2.0, 0.2 * rng.normal(), 1.0], [4.5, 0.2 * rng.normal(), -2.0]][: 1 + seed % 2]
     fleet = fleet_of(kind, [([0, 0, 0], [6.5, 0, 0]), *((one, one) for one in places)]).moved(by)
     # With inertia a round of improvement takes all the time there is.
-    result = plan_fleet(fleet, time_limit=120.0, max_rounds=6 if kind == "at will" else 0)
+    result = plan_fleet(fleet, time_limit=120.0, max_rounds=0 if kind == "inertia" else 6)
     assert is_good(fleet, result)
     assert result.plans["2"].duration == 0.0  # it is cheaper to be passed than to make room
     assert result.cost < 2.0 * result.alone_cost

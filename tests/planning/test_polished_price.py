@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.polished_price import admitted_durations, polished_price
 from maneuver_automaton.planning.polishing import why_not_polished
-from maneuver_automaton.problem import Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from tests.search.cases import compiled_only
 
 ROBOT = load_stock_library("second_order_unicycle")
@@ -92,6 +92,19 @@ def test_a_longest_time_bounds_what_is_polished():
 def test_effort_alone_has_no_quickest_motion():
     assert why_not_polished(posed(cost=Cost(effort=1.0))) == "time costs nothing"
     assert not why_not_polished(posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=9.0)))
+
+
+@pytest.mark.slow
+@compiled_only
+def test_metres_alone_are_polished_where_the_vehicle_keeps_moving():
+    """A car from one cruise to another: fewer metres than along the best word found."""
+    car, cruise = load_stock_library("second_order_car"), "speed 1.5, steering 0"
+    rng = np.random.default_rng(0)
+    goal = Goal(pose=[*rng.uniform(-15.0, 15.0, 2), rng.uniform(-3.0, 3.0)], trim=cruise)
+    problem = Problem(car, [0, 0, 0], goal, start_trim=cruise, cost=Cost(length=1.0))
+    assert not why_not_polished(problem)
+    words = replace(problem, search=SearchSettings(polish=False))
+    assert plan(problem, time_limit=20.0).cost < plan(words, time_limit=20.0).cost - 0.1
 
 
 @pytest.mark.slow
