@@ -87,12 +87,16 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
     """
     if faults := judged(scene, vehicle, there).faults:
         return faults[0][0], "; ".join(f"{said} at the start" for _, said in faults)
-    speed, low, high = scene.start.speed, vehicle.model.min_speed, vehicle.model.max_speed
+    speed, (low, high) = scene.start.speed, vehicle.model.reduced_limits[0].tolist()
     if (beyond := max(low - speed, speed - high)) > EXACT:
         said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
         return "undrivable", f"the model cannot drive it: {said}"
     why = [_never_reached(goal, scene, vehicle) for goal in scene.goals]
-    return None if "" in why else ("missed", f"no goal can be reached: {'; '.join(set(why))}")
+    return (
+        None
+        if "" in why
+        else ("missed", f"no goal can be reached: {'; '.join(dict.fromkeys(why))}")
+    )
 
 
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> str:
@@ -104,10 +108,11 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> 
     if lasts < -EXACT:
         return f"its time is over at {goal.time[1]:.6g} s, before the start at {start.time:.6g} s"
     low, high = goal.speed or (0.0, 0.0)
-    if low > model.max_speed + EXACT or high < model.min_speed - EXACT:
+    slowest, top = model.reduced_limits[0].tolist()
+    if low > top + EXACT or high < slowest - EXACT:
         return (
             f"it asks for {low:.6g} to {high:.6g} m/s, but the vehicle's speeds are"
-            f" {model.min_speed:.6g} to {model.max_speed:.6g} m/s"
+            f" {slowest:.6g} to {top:.6g} m/s"
         )
     # The middle of the body is where its half width on all sides is on the road.
     within = shapely.buffer(drivable_area(scene.lanelets), -0.5 * vehicle.width)
