@@ -92,11 +92,8 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
         said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
         return "undrivable", f"the model cannot drive it: {said}"
     why = [_never_reached(goal, scene, vehicle) for goal in scene.goals]
-    return (
-        None
-        if "" in why
-        else ("missed", f"no goal can be reached: {'; '.join(dict.fromkeys(why))}")
-    )
+    said = "; ".join(dict.fromkeys(why))
+    return None if "" in why else ("missed", f"no goal can be reached: {said}")
 
 
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> str:
