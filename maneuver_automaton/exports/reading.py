@@ -156,6 +156,7 @@ def load_road_fleet(
 
 def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -> Plan | None:
     """The plan of one vehicle, or what it drove; None if it has none."""
+    plan: Plan | None
     try:
         if "steps" in document:
             plan: Plan | None = _road_drive(document, road)

@@ -92,7 +92,8 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
         said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
         return "undrivable", f"the model cannot drive it: {said}"
     why = [_never_reached(goal, scene, vehicle) for goal in scene.goals]
-    return None if "" in why else ("missed", f"no goal can be reached: {'; '.join(set(why))}")
+    said = "; ".join(dict.fromkeys(why))
+    return None if "" in why else ("missed", f"no goal can be reached: {said}")
 
 
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> str:
@@ -104,11 +105,11 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> 
     if lasts < -EXACT:
         return f"its time is over at {goal.time[1]:.6g} s, before the start at {start.time:.6g} s"
     low, high = goal.speed or (0.0, 0.0)
-    least, most_speed = model.reduced_limits[0].tolist()
-    if low > most_speed + EXACT or high < least - EXACT:
+    slowest, top = model.reduced_limits[0].tolist()
+    if low > top + EXACT or high < slowest - EXACT:
         return (
             f"it asks for {low:.6g} to {high:.6g} m/s, but the vehicle's speeds are"
-            f" {least:.6g} to {most_speed:.6g} m/s"
+            f" {slowest:.6g} to {top:.6g} m/s"
         )
     # The middle of the body is where its half width on all sides is on the road.
     within = shapely.buffer(drivable_area(scene.lanelets), -0.5 * vehicle.width)
