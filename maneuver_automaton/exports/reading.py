@@ -159,7 +159,7 @@ def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -
     plan: Plan | None
     try:
         if "steps" in document:
-            plan: Plan | None = _road_drive(document, road)
+            plan = _road_drive(document, road)
         else:
             plan = plan_of_document(document) if document["status"] == "found" else None
     except (ValueError, KeyError, TypeError, IndexError) as error:

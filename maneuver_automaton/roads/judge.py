@@ -116,7 +116,7 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> 
     if (off := goal.away_from(within)) > 0.0:
         return f"it is off the road, {off:.3g} m from where the middle of the vehicle may be"
     away = goal.away_from(shapely.Point(start.middle[:2]))
-    fastest = min(start.speed + 0.5 * model.max_acceleration * lasts, model.max_speed)
+    fastest = min(abs(start.speed) + 0.5 * model.max_acceleration * lasts, max(top, -slowest))
     if away > (most := fastest * lasts):
         return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
     return ""
