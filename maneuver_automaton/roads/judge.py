@@ -23,6 +23,7 @@ from maneuver_automaton.roads.scene import RoadScene, presence_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 BESIDE = 30.0  # [m] from the path: the edge of the road is not looked for further away
+PIECE = 1e-11  # [m, rad] of rounding that each piece of a motion adds to its end
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,8 +73,11 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
         clearance = min(clearance, distance)
         if distance <= too_close(0.0):
             hit.add(one.name)
+    rounding = PIECE * len(plan.trims)
     return RoadVerdict(
-        audit=audit_plan(plan, Goal(pose=plan.end), model),
+        audit=audit_plan(
+            plan, Goal(pose=plan.end, tolerance_m=rounding, tolerance_rad=rounding), model
+        ),
         hit=tuple(sorted(hit)),
         clearance_m=clearance,
         edge_m=closest_to(plan, model, land_beside(scene.lanelets, plan), footprint=body).distance,
