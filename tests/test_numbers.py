@@ -192,6 +192,7 @@ def test_no_kernel_is_compiled_for_numbers_as_people_write_them(name):
     [
         (lambda: ma.Disc("1"), "Disc: radius: got '1', need a number"),
         (lambda: ma.Disc([1.0]), r"Disc: radius: got \[1.0\], need a number"),
+        (lambda: ma.Disturbance(seed=1.5), "Disturbance: seed: got 1.5, need a whole number"),
         (lambda: ma.Horizon(max_trims=2.5), "Horizon: max_trims: got 2.5, need a whole number"),
         (lambda: ma.Bounds(x=(0, "far")), "Bounds: x: got .*, need two numbers"),
         (lambda: ma.Cost(time=1j), "Cost: time: got 1j, need a number"),
