@@ -34,7 +34,7 @@ from maneuver_automaton.planning.polished_price import (
     polished_price,
 )
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Problem, moves
+from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
 from maneuver_automaton.refinement.guesses import course_guess, timed
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, simpler_problem
@@ -46,12 +46,18 @@ from maneuver_automaton.refinement.polish import (
     polish_guesses,
 )
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
+from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.setup import search_setup, sub_library
+from maneuver_automaton.search.words import search_setup_words
 
 NUMBERS_ALONE = "part_poses of the vehicle takes numbers alone, no symbols"
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
 SAMPLES = 500  # of a plan that passes above or below obstacles
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
 FEWEST_ITERATIONS = 100  # however few expansions are allowed: one guess to its end
+MOST_WORDS = 100  # that switch at will and are looked at for other ways to turn
+OTHER_TURNS = 6  # ways to turn that are tried
+STRAIGHT = 1e-6  # [rad] between two samples
 NEAR_HEADING = 1.0  # [rad] from the heading of a plan, to which its motion is a guess
 BY_TIME = Cost(time=1.0)
 
@@ -185,6 +191,39 @@ def _guesses(
     aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]
     yield from aimed
     yield from _other_headings(problem, aimed[0])
+    if problem.automaton.translated is None and not (problem.obstacles or problem.zones):
+        yield from _other_turns(problem, known, budget)
+
+
+def _other_turns(
+    problem: Problem, known: Sequence[tuple[Plan, int]], budget: Budget
+) -> Iterator[Aimed]:
+    """Guesses along words that switch at will, and turn in other ways than the plans known.
+
+    A solver keeps the ways in which its guess turns, and maneuvers between few trims are too long
+    for some: those ways are in no word of the library.
+    """
+    seen, index = {_turns(plan) for plan, _ in known}, known[0][1]
+    at_will = replace(problem, cost=BY_TIME, horizon=Horizon())
+    setup = sub_library(search_setup(at_will, problem.goals[index]))
+    for word in search_setup_words(
+        at_will, setup, alternatives=MOST_WORDS, budget=budget, spare=False
+    ):
+        plan = plan_of(problem, word)
+        if (turns := _turns(plan)) not in seen:
+            seen.add(turns)
+            yield Aimed(guess_of_plan(plan), index)
+        if len(seen) > OTHER_TURNS:
+            return
+
+
+def _turns(plan: Plan) -> tuple[int, ...]:
+    """The sides to which a plan turns, one after the other, and how many times around in all."""
+    headings = plan.sample().pose[:, 2]
+    turned = np.diff(headings)
+    sides = np.sign(turned[np.abs(turned) > STRAIGHT]).astype(int)
+    around = round(float(headings[-1] - headings[0]) / math.pi)  # of plans to one heading
+    return (around, *sides[np.flatnonzero(np.diff(sides, prepend=0))].tolist())
 
 
 def _by_goal(problem: Problem, aimed: Iterator[Aimed]) -> Iterator[tuple[int, Iterable[Guess]]]:

@@ -1,0 +1,56 @@
+"""A library with more trims, all those of a smaller one among them, never plans worse."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.groups import SE2
+from tests.planning.test_among_obstacles import assert_moved
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only
+SAME = 1e-3  # of a cost: polishing ends in one optimum with steps of another size
+SEARCH = ma.SearchSettings(max_expansions=2000)
+TURNS = ma.UserModel(
+    name="turns",
+    group=ma.SE2,
+    control_names=("curvature_rate",),
+    reduced_names=("curvature",),
+    velocity=lambda z, u: [1.0, 0.0, z[0]],
+    dynamics=lambda z, u: [u[0]],
+    control_limits=[[-0.1, 0.1]],
+    reduced_limits=[[-0.5, 0.5]],
+)
+
+
+@functools.cache
+def curvatures(count: int) -> ma.Automaton:
+    """Steady turns, each linked to each: of 3 curvatures no maneuver turns by less than 2.5 rad."""
+    return ma.Automaton.of_model(TURNS, {"curvature": np.linspace(-0.5, 0.5, count)}, pairs="all")
+
+
+def problem(count: int, goal: list[float]) -> ma.Problem:
+    ahead = "curvature 0"
+    return ma.Problem(
+        curvatures(count), [0, 0, 0], ma.Goal(goal, trim=ahead), start_trim=ahead, search=SEARCH
+    )
+
+
+@pytest.mark.parametrize(
+    ("goal", "optimum"), [([10.77, -4.52, -0.48], 11.83), ([0.28, 10.81, -2.24], 21.951)]
+)
+def test_turns_of_few_curvatures_are_polished_to_those_of_many(goal, optimum):
+    """The optimum: the least cost that 17 curvatures or another start have led to."""
+    pytest.importorskip("casadi")
+    costs = [ma.plan(problem(count, goal), time_limit=60).cost for count in (3, 5, 9)]
+    assert costs == pytest.approx([optimum] * 3, rel=SAME)
+
+
+def test_what_turns_in_another_way_is_moved_with_its_problem():
+    pytest.importorskip("casadi")
+    here = problem(3, [10.77, -4.52, -0.48])
+    assert assert_moved(here, SE2([30.0, -20.0, 2.5]))
