@@ -46,7 +46,7 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 MOST_QUESTIONS = 8  # choices of zones to enter and zones to go around
-SLOWED_SHARE = 0.25  # of the time left, for slowing a plan down before others are improved
+SLOWED_SHARE = 0.4  # of the time left, for slowing a plan down where there is none yet
 CROSSED_SHARE = 0.5  # of the time left, for a plan from zone to zone
 STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
 PARALLEL = 1e-12  # of twists, relative
@@ -85,7 +85,8 @@ def plan_among_zones(
             return replace(result, problem=problem)
         stuck = waits and not found.plans and k == len(questions) - 1
         if itself and first.plan is not None and (stuck or (k == 0 and ended)):
-            polish_slowed(found, problem, first.plan, budget.stage(SLOWED_SHARE if stuck else 1.0))
+            share = 1.0 if found.plans else SLOWED_SHARE
+            polish_slowed(found, problem, first.plan, budget.stage(share))
             waits = False
         none = ended and not (found.plans or budget.is_over)
         if k == 0 and itself and result.plan is not None and none:
