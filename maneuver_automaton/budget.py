@@ -35,7 +35,6 @@ class Watch:
     bound: float = 0.0  # no plan is cheaper
     is_abandoned: bool = False  # nobody waits for a better bound any more
     is_given_up: bool = False  # nor for a better plan
-    shows: Callable[[Any], None] | None = None  # called when a better plan has passed its checks
 
     @property
     def is_closed(self) -> bool:
@@ -72,6 +71,8 @@ class Budget:
     watch: Watch | None = None  # once its gap is closed, no time is left
     worked: float = -math.inf  # [s] processor time of this process at the begin; -inf: no matter
     late: float = LATE  # [s] by which checks may be late, besides a share of the time
+    shows: Callable[[Any], None] | None = None  # called when a better plan has passed its checks
+    quits: Callable[[], bool] | None = None  # asked whether others shall try first
 
     @classmethod
     def from_now(
@@ -110,7 +111,8 @@ class Budget:
     def is_stopped(self) -> bool:
         """Whether the gap is closed, or somebody asks to come to an end."""
         watch = self.watch
-        return stopped() or (watch is not None and (watch.is_closed or watch.is_given_up))
+        given_up = watch is not None and (watch.is_closed or watch.is_given_up)
+        return stopped() or given_up or (self.quits is not None and self.quits())
 
     @property
     def is_over(self) -> bool:

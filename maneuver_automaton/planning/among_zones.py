@@ -31,7 +31,7 @@ from maneuver_automaton.collision.surroundings import fastest_point, parts_of, s
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.planning.blocked import blocked_ends
-from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents
 from maneuver_automaton.planning.polishing import (
     guess_of_plan,
     iterations_within,
@@ -46,8 +46,8 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 MOST_QUESTIONS = 8  # choices of zones to enter and zones to go around
+SLOWED_SHARE = 0.4  # of the time left, for slowing a plan down where there is none yet
 CROSSED_SHARE = 0.5  # of the time left, for a plan from zone to zone
-LEAST_TIME = 1e-3  # [s] for each question and stretch, also where the time is over
 STEP = 0.02  # [m, rad] between places where a trim may be replaced by a faster one
 PARALLEL = 1e-12  # of twists, relative
 CLEAR = 0.02  # [m] between body and zone where a coast through the zone begins
@@ -68,27 +68,34 @@ def plan_among_zones(
     itself = [] if problem.automaton.is_kinematic else [problem]
     questions = [free, *itself, *(one for one in _questions(problem) if blocked_ends(one) is None)]
     first: PlanResult | None = None
-    for k, question in enumerate(questions):
-        if budget.is_over and first is not None:
-            break
-        part = budget.part(1.0 / (len(questions) - k), at_least=LEAST_TIME)
-        result = search(question, part, workspace, alternatives=alternatives)
-        first = first or result
-        found.counts.update(result.counts)
+    waits = False  # the first question lets others try
+
+    def offer(result: PlanResult) -> None:
         for plan, goal_index in _plans(problem, result):
             if found.may_check:
                 found.offer(plan, goal_index)
+
+    turns = found.ask(questions, search, offer, budget=budget, alternatives=alternatives)
+    for k, result, ended in turns:
+        offer(result)
+        waits = not ended if k == 0 else waits
+        if first is None or (k == 0 and result.plan is not None):
+            first = result
         if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
             return replace(result, problem=problem)
-        if k == 0 and itself and result.plan is not None:
-            polish_slowed(found, problem, result.plan, budget)
-        if k == 0 and itself and result.plan is not None and not (found.plans or budget.is_over):
-            part = budget.part(CROSSED_SHARE, at_least=LEAST_TIME)
+        stuck = waits and not found.plans and k == len(questions) - 1
+        if itself and first.plan is not None and (stuck or (k == 0 and ended)):
+            share = 1.0 if found.plans else SLOWED_SHARE
+            polish_slowed(found, problem, first.plan, budget.stage(share))
+            waits = False
+        none = ended and not (found.plans or budget.is_over)
+        if k == 0 and itself and result.plan is not None and none:
+            part = replace(budget.part(CROSSED_SHARE, at_least=LEAST_TIME), shows=None)
             crossed = crossed_slowly(problem, result.plan, search, part, workspace)
             if crossed is not None and found.may_check:
                 found.offer(*crossed)
-        if k > 0 and question is not problem and first.plan is not None:
-            polish_slowed(found, question, first.plan, budget)
+        if k > 0 and ended and questions[k] is not problem and first.plan is not None:
+            polish_slowed(found, questions[k], first.plan, budget)
     assert first is not None
     if found.plans:
         return found.found(bound=first.bound or LowerBound(value=0.0, kind="distance"))

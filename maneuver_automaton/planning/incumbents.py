@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Callable, Iterable
+from collections import Counter, deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
@@ -14,7 +13,13 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.budget import FIRST_LATE, Budget
 from maneuver_automaton.planning.checking import Condition, TooLate, check_plan, what_is_hit
-from maneuver_automaton.planning.result import Alternative, LowerBound, PlanResult, PlanStatus
+from maneuver_automaton.planning.result import (
+    Alternative,
+    Answer,
+    LowerBound,
+    PlanResult,
+    PlanStatus,
+)
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
@@ -30,6 +35,9 @@ CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it b
 LATE = 8  # plans that may be refused once the time is over, before no other is checked
 OTHERS_SHARE = 0.1  # of the time, that is kept back for the checks of alternatives
 CHECK_S = 0.01  # [s] a check takes that nothing is known of yet
+LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
+SOON_SHARE, SOON = 0.08, 0.02  # of the time for a first turn of all questions; [s] of one at least
+SOON_TURNS = 2  # that questions try before others do, the second twice as long
 LONGER = 1.3  # times the longest check so far, that the next one may take
 
 
@@ -149,6 +157,8 @@ class Incumbents:
 
         Whether one passed them; what was not `proven` free may hit something without a word.
         """
+        if any(one.plan is plan for one in self.plans):
+            return True
         none_fits, goal = True, self.problem.goals[goal_index]
         for fitted in fitted_plans(self.problem, plan, goal, budget=self.for_checks):
             none_fits = False
@@ -164,6 +174,52 @@ class Incumbents:
             self._refuse(Condition.WORD, broken_condition(self.problem, padded(self.problem, plan)))
             self.misfits.append((plan, goal_index))
         return False
+
+    def ask(
+        self,
+        questions: Sequence[Problem],
+        search: Answer,
+        offer: Callable[[PlanResult], None],
+        *,
+        budget: Budget,
+        alternatives: int,
+        shares: Sequence[float] = (),
+    ) -> Iterator[tuple[int, PlanResult, bool]]:
+        """Answers to simpler questions, and whether each has ended; their plans are offered.
+
+        A first plan is offered as it is found, but may be refused: until there is one, each
+        question lets the others try after a moment, twice; then each has its share of the time.
+        """
+        waiting, turns = deque(enumerate(questions)), 0
+        moment = SOON_SHARE / len(questions) * budget.seconds
+
+        def better(made: Callable[..., PlanResult]) -> None:
+            if self.budget.shows is not None or not self.plans:
+                offer(made(bound=LowerBound(value=0.0, kind="distance")))
+
+        while waiting and (turns == 0 or not (budget.is_over or self.is_enough)):
+            k, question = waiting.popleft()
+            share = 1.0 if not waiting else shares[k] if shares else 1.0 / (1 + len(waiting))
+            part = replace(budget.part(share, at_least=LEAST_TIME), shows=better)
+            part = replace(part, expansions=question.search.max_expansions)
+            shift, turn = budget.elapsed, turns // len(questions)
+
+            def quits(until: float = shift + moment * 2.0**turn) -> bool:
+                over = not self.plans and budget.elapsed > until
+                return over or (budget.quits is not None and budget.quits())
+
+            soon = moment > SOON and turn < SOON_TURNS and part.expansions is None
+            if soon and waiting:
+                part = replace(part, quits=quits)
+            result = search(question, part, self.workspace, alternatives=alternatives)
+            at = tuple((shift + at, cost) for at, cost in result.improvements)
+            result = replace(result, improvements=at)
+            turns += 1
+            self.counts.update(result.counts)
+            again = part.quits is quits and quits()
+            if again:
+                waiting.append((k, question))
+            yield k, result, not again
 
     def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
         """Check candidates, the cheapest first, until as many plans as asked for are no costlier.
@@ -227,17 +283,12 @@ class Incumbents:
             others = [other for other in self.plans if other not in same]
             self.plans = sorted([*others, one], key=lambda other: other.rank)
             if self.plans[0] is one and cost < self.least_cost * (1.0 - CHEAPER):
+                self.least_cost = cost
                 self.improvements.append((self.budget.elapsed, cost))
                 self._tell(cost)
-            if self.plans[0] is one and self.shows is not None:
-                self.shows(self.found)
+            if self.plans[0] is one and self.budget.shows is not None:
+                self.budget.shows(self.found)
         return True
-
-    @property
-    def shows(self) -> Callable[[Any], None] | None:
-        """Who waits for each better plan of this very problem."""
-        watch = self.budget.watch
-        return watch.shows if watch is not None and watch.problem is self.problem else None
 
     def _tell(self, cost: float) -> None:
         """Tell a proof beside the search what a plan of this very problem costs."""

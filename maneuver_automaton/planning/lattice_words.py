@@ -108,7 +108,7 @@ class LatticeWords:
         if self.knows_all:
             self.found.note(word.cost + self.query.padding)
             # The first is checked at once: whatever comes between, there is something to return.
-            wanted = self.found.shows is not None or not self.found.plans
+            wanted = self.found.budget.shows is not None or not self.found.plans
             if wanted and self.found.may_check:
                 goal_index = self.query.goal_index[word.goal]
                 self.found.offer(plan_of_word(self.query, word), goal_index)

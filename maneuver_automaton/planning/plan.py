@@ -81,9 +81,10 @@ def plan(
         search = functools.partial(plan, gap=gap, watch=watch)
         return plan_leaving(problem, search, time_limit=time_limit)
     workspace = workspace_of(problem.obstacles)
+    shows = None
     if on_better is not None:
         watch = watch or Watch(gap=-math.inf)
-        watch.shows = _shown(problem, watch, on_better)
+        shows = _shown(problem, watch, on_better)
     return plan_in(
         workspace,
         problem,
@@ -91,6 +92,7 @@ def plan(
         alternatives=alternatives,
         gap=gap,
         watch=watch,
+        shows=shows,
     )
 
 
@@ -119,6 +121,7 @@ def plan_in(
     alternatives: int,
     gap: float | None = None,
     watch: Watch | None = None,
+    shows: Callable[..., None] | None = None,
 ) -> PlanResult:
     """Plan as `plan` does, with arrays prepared for the problem's map."""
     if not time_limit > 0.0:
@@ -135,6 +138,7 @@ def plan_in(
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
+    budget = replace(budget, shows=shows)
     with patient():
         if gap is None:
             if watch is not None:

@@ -36,10 +36,9 @@ RINGS = (1.0, 0.5)  # shares of the tolerance at which these lie
 MOST_NODES = 32  # of a lattice that are aimed at for each goal
 MOST_AIMS = 12  # poses that are aimed at where the goal itself is blocked
 SHARES = (1.0, 0.5, 0.25)  # of the tolerance that an end may use, until it is free
-LATER = (0.45, 0.8)  # shares of the time left for the first question, and for the second of three
+LATER = (0.45, 0.8, 0.8)  # shares of the time left for each question but the last
 MOST_LAST = 4  # trims at the end whose times alone are changed where all of them hit something
 LOOSENED_SHARE = 0.1  # of the time, that is kept back for letting ends loose
-LEAST_TIME = 1e-3  # [s] for each question, also where the time is over
 SPARE = 3  # plans asked for each alternative: with loose ends some are one motion
 
 
@@ -48,22 +47,26 @@ def plan_within_tolerance(
 ) -> PlanResult:
     """The cheapest plan found that ends within the tolerance of a goal."""
     found = Incumbents(problem, budget, workspace, alternatives)
-    asked = list(_questions(problem))
-    results: list[PlanResult] = []
-    asking = budget.before(LOOSENED_SHARE * budget.seconds)
-    for k, question in enumerate(asked):
-        enough = found.plans and not problem.search.improve
-        if enough or (results and asking.is_over):
-            break
-        part = asking.part(1.0 if k == len(asked) - 1 else LATER[k], at_least=LEAST_TIME)
-        part = replace(part, expansions=question.search.max_expansions)
-        result = answer(question, part, workspace, alternatives=SPARE * alternatives)
+    results: dict[int, PlanResult] = {}
+
+    def offer(result: PlanResult) -> None:
+        assert result.plan is not None
+        any(found.offer(result.plan, index) for index in _goals_met(problem, result.plan))
+
+    turns = found.ask(
+        list(_questions(problem)),
+        answer,
+        offer,
+        budget=budget.before(LOOSENED_SHARE * budget.seconds),
+        alternatives=SPARE * alternatives,
+        shares=LATER,
+    )
+    for k, result, _ in turns:
+        results[k] = result
         for at, cost in result.improvements:
-            found.note(cost, at=part.began - budget.began + at)
-        found.counts.update(result.counts)
-        results.append(result)
-        if result.plan is not None:
-            for plan in (result.plan, *(other.plan for other in result.alternatives)):
+            found.note(cost, at=at)
+        for plan in (result.plan, *(other.plan for other in result.alternatives)):
+            if plan is not None:
                 _offer_loosened(found, plan)
     if not found.plans:
         if found.why_unchecked:

@@ -36,6 +36,7 @@ ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT))
 
 import maneuver_automaton as ma  # noqa: E402
+from maneuver_automaton.budget import FIRST_LATE  # noqa: E402
 from maneuver_automaton.collision import Motion, Obstacle, OccupancyMap, Polygon  # noqa: E402
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings  # noqa: E402
 from maneuver_automaton.scenario import load_scenario  # noqa: E402
@@ -44,7 +45,7 @@ from tests.matrix.vehicles import VEHICLES as ALL  # noqa: E402
 from tests.matrix.vehicles import Vehicle  # noqa: E402
 
 LIMITS = (0.02, 2.0)  # [s] drawn evenly on a scale of logarithms
-SHARE, CONSTANT = 0.1, 0.02  # of the limit, and [s], by which a call may exceed it
+SHARE, CONSTANT = 0.1, 0.02  # of the limit, and [s], by which a call may exceed it with a plan
 PARKS = sorted((ROOT.parent / "shared/data/parkbench").glob("*.yaml"))
 KINDS = ("free", "obstacles", "map", "moving", "heights", "park")
 WORST = 12
@@ -243,12 +244,22 @@ def warm(kinds: Sequence[str]) -> None:
     gc.freeze()
 
 
+def allowed(row: dict[str, Any]) -> float:
+    """By how much [s] a call may exceed its limit: more as long as no plan has passed its checks.
+
+    With nothing else to return the check of a plan may be late by a moment of its own.
+    """
+    limit, first = row["time_limit"], row["first"]
+    waits = first is None or first + row["audit"] > limit
+    return float(SHARE * limit + CONSTANT + (FIRST_LATE if waits else 0.0))
+
+
 def report(rows: Sequence[dict[str, Any]]) -> None:
     """Quantiles, the worst calls, and how often there was a plan."""
     refused = [row for row in rows if "took" not in row]
     rows = [row for row in rows if "took" in row]
     print(f"{len(rows)} calls, {len(refused)} refused")
-    beyond = np.array([row["took"] - row["time_limit"] * (1.0 + SHARE) - CONSTANT for row in rows])
+    beyond = np.array([row["took"] - row["time_limit"] - allowed(row) for row in rows])
     over = np.array([row["took"] - row["time_limit"] for row in rows])
     shares = (0.5, 0.9, 0.99, 0.999, 1.0)
     for name, values in (("overrun", over), ("overrun less what is allowed", beyond)):
