@@ -75,8 +75,9 @@ def findings(
             f"{path}: is a plan, which does not state its problem; need --with FILE, the scenario "
             "that it was planned from"
         )
-    plan, stated = load_plan(path), read_plan_document(path)
+    stated = read_plan_document(path)
     scenario = scenario_of(parts.beside, replace(parts, beside=None))
+    plan = load_plan(path, model=scenario.problem.automaton.model)
     with announced(), _of_this(path):
         verdict = verify(scenario.problem, plan, leave=leave)
     return scenario.name, iter([_plan("plan", verdict, stated.get("cost"))])

@@ -233,7 +233,7 @@ def _file_name(kind: str) -> str:
     return f"{kind.replace(' ', '_')}.json"
 
 
-def load_plan(path: Path | str, *, vehicle: str | None = None) -> Plan:
+def load_plan(path: Path | str, *, vehicle: str | None = None, model: Model | None = None) -> Plan:
     """The plan of a plan.json; no automaton is needed.
 
     The body velocity of each trim is taken from the samples: the logarithm of the motion over a
@@ -244,6 +244,9 @@ def load_plan(path: Path | str, *, vehicle: str | None = None) -> Plan:
     path : Path or str
     vehicle : str, optional
         Which of several vehicles, by its name, if the file holds their plans.
+    model : Model, optional
+        Of the vehicle, which the file does not name: what lies between the samples of a maneuver
+        follows its equations then. Without it the twist is constant from sample to sample.
 
     Raises
     ------
@@ -251,13 +254,13 @@ def load_plan(path: Path | str, *, vehicle: str | None = None) -> Plan:
         If the file cannot be read, is no plan.json, or holds no plan, or none of that vehicle.
     """
     if vehicle is None:
-        return _plan_of_file(read_plan_document(path), str(path))
+        return _plan_of_file(read_plan_document(path), str(path), model)
     document = read_fleet_document(path)
     vehicles = {} if document is None else document["vehicles"]
     if vehicle not in vehicles:
         names = ", ".join(vehicles) or "one vehicle without a name"
         raise InvalidScenario(f"{path}: holds no vehicle {vehicle!r}, but {names}")
-    return _plan_of_file(vehicles[vehicle], f"{path}: vehicles.{vehicle}")
+    return _plan_of_file(vehicles[vehicle], f"{path}: vehicles.{vehicle}", model)
 
 
 def load_plans(path: Path | str) -> dict[str, Plan]:
@@ -278,12 +281,12 @@ def load_plans(path: Path | str) -> dict[str, Plan]:
     }
 
 
-def _plan_of_file(document: Any, place: str) -> Plan:
+def _plan_of_file(document: Any, place: str, model: Model | None = None) -> Plan:
     """The plan of a document at a place of a file; or InvalidScenario."""
     try:
         if document["status"] != "found":
             raise InvalidScenario(f"{place}: holds no plan, its status is {document['status']!r}")
-        return plan_of_document(document)
+        return plan_of_document(document, model)
     except InvalidScenario:
         raise
     except (ValueError, KeyError, TypeError, IndexError) as error:
@@ -410,8 +413,8 @@ def _refuse_constant(word: str) -> float:
     raise ValueError(f"{word} is no JSON")
 
 
-def plan_of_document(document: Mapping[str, Any]) -> Plan:
-    """The plan of a plan.json that is read already.
+def plan_of_document(document: Mapping[str, Any], model: Model | None = None) -> Plan:
+    """The plan of a plan.json that is read already; `model` is as in `load_plan`.
 
     Raises
     ------
@@ -431,6 +434,7 @@ def plan_of_document(document: Mapping[str, Any]) -> Plan:
         pose=pose,
         reduced_state=_rows(trajectory, "reduced_state", len(time)),
         control=_rows(trajectory, "control", len(time)),
+        model=model,
     )
     durations = [_duration(k, entry) for k, entry in enumerate(primitives)]
     switches = _switches(time, durations)
@@ -473,6 +477,7 @@ def _stretch(samples: Trajectory, begin: int, end: int) -> Trajectory:
         pose=pose,
         reduced_state=samples.reduced_state[rows],
         control=control,
+        model=samples.model,
     )
 
 

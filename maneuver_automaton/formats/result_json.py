@@ -49,14 +49,14 @@ def result_of_document(document: Mapping[str, Any], problem: Problem, *, path: s
 
 
 def _result_of(document: Mapping[str, Any], problem: Problem) -> PlanResult:
-    status = PlanStatus(document["status"])
+    status, model = PlanStatus(document["status"]), problem.automaton.model
     narrowest = document.get("narrowest")
     others = (_alternative(one, problem) for one in document.get("alternatives") or ())
     return PlanResult(
         problem=problem,
         status=status,
         reason=str(document.get("reason") or ""),
-        plan=plan_of_document(document) if status is PlanStatus.FOUND else None,
+        plan=plan_of_document(document, model) if status is PlanStatus.FOUND else None,
         cost=document.get("cost"),
         lower_bound=document.get("lower_bound"),
         gap=document.get("gap"),

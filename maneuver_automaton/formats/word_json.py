@@ -132,7 +132,7 @@ def _maneuver(entry: Mapping[str, Any], automaton: Automaton) -> Maneuver:
     """The maneuver of the library, or what was left of it when the step began."""
     one = _in_library(entry, automaton)
     if one is None:
-        return _written(entry)
+        return _written(entry, automaton)
     begun = one.duration - float(entry["duration_s"])
     if begun <= 0.0:
         return one
@@ -144,7 +144,7 @@ def _maneuver(entry: Mapping[str, Any], automaton: Automaton) -> Maneuver:
     return rest.maneuvers[0]
 
 
-def _written(entry: Mapping[str, Any]) -> Maneuver:
+def _written(entry: Mapping[str, Any], automaton: Automaton) -> Maneuver:
     """A maneuver whose course is written in the log."""
     if "course" not in entry:
         raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
@@ -152,7 +152,7 @@ def _written(entry: Mapping[str, Any]) -> Maneuver:
         name: np.array(entry["course"][name], dtype=np.float64)
         for name in ("time", "pose", "reduced_state", "control")
     }
-    course = Trajectory(**rows)
+    course = Trajectory(**rows, model=automaton.model)
     return Maneuver.along(
         course,
         name=entry["name"],

@@ -243,7 +243,7 @@ def test_a_plan_with_maneuvers_comes_back(tmp_path):
     assert sum(durations) == pytest.approx(document["duration_s"], abs=1e-12)
     kinds = {one["kind"]: one["control"] for one in document["primitives"]}
     assert kinds == {"maneuver": None, "trim": [0.0, 0.0]}
-    read = load_plan(tmp_path / "plan.json")
+    read = load_plan(tmp_path / "plan.json", model=CAR)
     assert read.word == plan.word
     times = np.linspace(0.0, plan.duration, 200)
     np.testing.assert_allclose(read.pose_at(times), plan.pose_at(times), atol=1e-9)

@@ -57,7 +57,8 @@ def plan_file(vehicle: Vehicle, engine: Engine) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "plan.json"
         engine.save_plan(result, path)
-        again, document = load_plan(path), json.loads(path.read_text())
+        model = result.problem.automaton.model
+        again, document = load_plan(path, model=model), json.loads(path.read_text())
     assert outside.apart(motion, again) <= 1e-6, "the file holds another motion"
     lasting = sum(one["duration_s"] for one in document["primitives"])
     close(lasting, document["duration_s"], "duration")
