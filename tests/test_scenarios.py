@@ -147,9 +147,9 @@ def test_its_cost_is_that_of_its_word(planned):
 
 
 def test_the_plan_comes_back_from_its_file(planned, tmp_path):
-    _, result = planned
+    scenario, result = planned
     ma.save_plan(result, tmp_path / "plan.json")
-    read = ma.load_plan(tmp_path / "plan.json")
+    read = ma.load_plan(tmp_path / "plan.json", model=scenario.problem.automaton.model)
     assert read.word == result.plan.word
     assert read.durations.tolist() == result.plan.durations.tolist()
     assert read.start.tolist() == result.plan.start.tolist()

@@ -95,11 +95,23 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
             if automaton.is_kinematic or np.array_equal(
                 first[0].reduced_state, problem.last_trim(goal).reduced_state
             ):
-                found.append((Plan(problem.start, first, durations=[0.0] * len(first)), index))
+                plan = Plan(
+                    problem.start,
+                    first,
+                    durations=[0.0] * len(first),
+                    start_time=problem.start_time,
+                )
+                found.append((plan, index))
         elif not goal.free_heading and len(joined := _joined(problem, goal)) <= MOST_TRIMS:
             for trims, times in _short_words(problem, goal, joined):
                 switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
-                plan = Plan(problem.start, trims, durations=times, maneuvers=switches)
+                plan = Plan(
+                    problem.start,
+                    trims,
+                    durations=times,
+                    maneuvers=switches,
+                    start_time=problem.start_time,
+                )
                 found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
 
