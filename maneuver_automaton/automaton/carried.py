@@ -95,6 +95,6 @@ def _maneuvers(
             moved.append(None)
         else:
             course, pose = next(seen)
-            there = replace(course, pose=pose)
+            there = replace(course, pose=pose, model=None)  # the vehicle's equations lead it
             moved.append(replace(one, displacement=pose[-1], course=there))
     return tuple(moved)

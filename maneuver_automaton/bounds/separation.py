@@ -82,7 +82,7 @@ def separation(
     ...                   bounds=Bounds(x=(-2.0, 10.0), y=(-4.0, 4.0)))
     >>> separation(problem).reason  # the walls leave 1.8 m
     'no collision-free path leads from the start to the goal, however it is driven: the passage at \
-(4, 0) is 0.22 m too narrow'
+(3.56, 0) is 0.22 m too narrow'
     """
     if not lasting_obstacles(problem):
         return None
@@ -107,9 +107,11 @@ def widest_path(
     Examples
     --------
     >>> from maneuver_automaton import Automaton, Box, Unicycle
+    >>> from maneuver_automaton.problem import Bounds
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
     >>> walls = [Box([1.0, 8.0], [4.0, 5.2]), Box([1.0, 8.0], [4.0, -5.2])]
-    >>> problem = Problem(robot, [0, 0, 0], [8, 0, 0], obstacles=walls, footprint=Box([3.0, 2.0]))
+    >>> problem = Problem(robot, [0, 0, 0], [8, 0, 0], obstacles=walls, footprint=Box([3.0, 2.0]),
+    ...                   bounds=Bounds(x=(-2.0, 10.0), y=(-4.0, 4.0)))
     >>> answer, path, apart = widest_path(problem, first=0.1)  # the walls leave 2.4 m
     >>> answer.value, len(path) > 2, 0.1 <= apart < 0.2
     ('connected', True, True)
