@@ -175,7 +175,7 @@ def _plan_facts(result: RoadPlanResult, out: Path) -> dict[str, str]:
     return {
         "goal": f"reached at {plan.switching_times[-1]:.6g} s",
         "cost": f"{result.cost:.6g}",
-        "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",
+        "clearance": verdict.room,
         "stop after it": "free" if decision.stops else "none was found",
         "searched": f"{result.search_s:.3g} s",
         "written to": str(out),
@@ -189,7 +189,7 @@ def _drive_facts(drive: RoadDrive, before: RoadPlanResult | None, out: Path) -> 
         "goal": f"reached at {end:.6g} s" if drive.reached else f"{drive.status}: {drive.reason}",
         "steps": f"{len(drive.steps)}, {sum(step.replanned for step in drive.steps)} replanned",
         "collisions": str(len(verdict.hit)),
-        "clearance": f"{verdict.clearance_m:.3g} m, to the edge of the road {verdict.edge_m:.3g} m",
+        "clearance": verdict.room,
         "written to": str(out),
     }
     if before is not None and before.plan is not None:
