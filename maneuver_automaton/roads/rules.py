@@ -10,7 +10,6 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.decision import AT_REST
-from maneuver_automaton.roads.lanelets import Lanelet, StopLine
+from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area
 from maneuver_automaton.roads.scene import RoadScene, RoadStart
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -109,9 +108,11 @@ def _across(stop_line: StopLine, lanelets: dict[int, Lanelet], ours: set[int]) -
 
     own = lanelets[stop_line.lanelet]
     against = _side_by_side(lanelets, own.against) - ours
-    area = shapely.buffer(_union([own, *(lanelets[k] for k in against)]), GAPS, join_style="mitre")
-    others = _union([lanelets[k] for k in ours - {stop_line.lanelet}])
-    area = shapely.union_all([shapely.difference(area, others), _union([own])])
+    area = shapely.buffer(
+        drivable_area([own, *(lanelets[k] for k in against)]), GAPS, join_style="mitre"
+    )
+    others = drivable_area([lanelets[k] for k in ours - {stop_line.lanelet}])
+    area = shapely.union_all([shapely.difference(area, others), drivable_area([own])])
     ends, center = stop_line.line, own.center
     middle = ends.mean(axis=0)
     along = (ends[1] - ends[0]) / np.hypot(*(ends[1] - ends[0]))
@@ -125,12 +126,6 @@ def _across(stop_line: StopLine, lanelets: dict[int, Lanelet], ours: set[int]) -
         return Polygon(np.array([*ends, *(ends[::-1] + back)]))
     there = min(parts, key=lambda one: float(shapely.distance(one, shapely.Point(middle))))
     return Polygon(shapely.get_coordinates(there.exterior)[:-1])
-
-
-def _union(lanelets: Sequence[Lanelet]) -> Any:
-    import shapely
-
-    return shapely.union_all([shapely.make_valid(shapely.Polygon(one.ring)) for one in lanelets])
 
 
 def broken_rules(
@@ -163,7 +158,7 @@ def _too_fast(
     allowed = np.full(len(times), -math.inf)
     for one in lanelets:
         limit = math.inf if one.speed_limit is None else one.speed_limit
-        inside = shapely.intersects(_union([one]), places)
+        inside = shapely.intersects(drivable_area([one]), places)
         allowed[inside] = np.maximum(allowed[inside], limit)
     over = np.where(np.isfinite(allowed), speed - allowed, 0.0)
     if over.max() > FASTER:
