@@ -31,6 +31,7 @@ from maneuver_automaton.refinement.fitting import (
 )
 from maneuver_automaton.search.inside import stays_inside
 
+ROUNDING = 1e-12  # relative, of sums of costs
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
 LATE = 8  # plans that may be refused once the time is over, before no other is checked
 OTHERS_SHARE = 0.1  # of the time, that is kept back for the checks of alternatives
@@ -313,7 +314,9 @@ class Incumbents:
         The search lasted until `searched` [s], or until the first plan.
         """
         best, *others = self.plans[: self.alternatives + 1]
-        value = min(best.cost, bound.value)
+        # the search adds the same terms up in another order
+        value = bound.value if bound.value < best.cost * (1.0 - ROUNDING) else best.cost
+        bound = replace(bound, value=value, optimal=bound.optimal or value == best.cost)
         first = self.improvements[0][0]
         return PlanResult(
             problem=self.problem,
@@ -324,7 +327,7 @@ class Incumbents:
             cost=best.cost,
             lower_bound=value,
             gap=bound.gap(best.cost),
-            bound=replace(bound, value=value, optimal=bound.optimal or value == best.cost),
+            bound=bound,
             certificate=certificate,
             terminal_error=self._terminal_error(best),
             clearance_m=best.audit.min_clearance_m,

@@ -9,7 +9,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
-from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents
 from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
@@ -22,7 +22,6 @@ ALONE = 32768  # expansions of the exact search until one that is greedy begins 
 GREEDY = 4  # times fewer expansions than the exact search has in its turn
 MOST_CHUNK = 1 << 20
 MOST_WIDER = 2  # times that a window is widened where there is no plan
-ROUNDING = 1e-12  # relative, of sums of costs
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
 
@@ -68,11 +67,10 @@ def plan_on_state_lattice(
         return found.none(*why, nodes=nodes)
     if not problem.search.improve:  # A* with a weight is off by that factor at most
         least /= problem.search.weight or WEIGHT
-    value = found.cost if least >= found.cost * (1.0 - ROUNDING) else least
     if budget.watch is not None and budget.watch.problem is problem:
-        budget.watch.bound = max(budget.watch.bound, value)
+        budget.watch.bound = max(budget.watch.bound, min(least, found.cost))
     kind = "exhaustive" if complete else "open"
-    return found.found(bound=LowerBound(value=value, kind=kind), nodes=nodes)
+    return found.found(bound=LowerBound(value=least, kind=kind), nodes=nodes)
 
 
 def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, str], Array | None]:
