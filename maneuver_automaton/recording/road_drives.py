@@ -171,6 +171,7 @@ def _mover(
         reason=reason,
         cost=cost,
         there=there if leaves else (-math.inf, math.inf),
+        road=planner,
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -100,6 +101,7 @@ class Mover:
     there: tuple[float, float] = (-math.inf, math.inf)  # [s] when it appears, and is gone
     held: tuple[tuple[float, Plan], ...] = ()  # the plan held from a time on [s]
     names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())  # of state and control, by a file
+    road: Any = None  # the RoadPlanner of one that drives on roads
 
     __repr__ = brief
 

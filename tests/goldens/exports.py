@@ -81,8 +81,14 @@ def of_bag(value: Any, path: Path) -> Any:
 def of_rerun(value: Any, path: Path) -> Any:
     """What the viewer is told, by entity."""
     told: dict[str, list[Any]] = {}
-    with mock.patch.dict(sys.modules, {"rerun": _rerun(told)}):
+    known = sys.modules.get("rerun")
+    sys.modules["rerun"] = _rerun(told)
+    try:
         ma.save_rerun(value, path, step=STEP)
+    finally:
+        sys.modules.pop("rerun")
+        if known is not None:
+            sys.modules["rerun"] = known
     return {at: digest(what) for at, what in told.items()}
 
 
@@ -171,10 +177,12 @@ def _rerun(told: dict[str, list[Any]]) -> types.ModuleType:
             told["/"] = [application]
 
         def log(self, at: str, what: Any, *, static: bool = False) -> None:
-            told.setdefault(at, []).append({"static": static, "at": now[0], "what": what})
+            row = {"what": what} if static else {"at": now[0], "what": what}
+            told.setdefault(f"/{at.lstrip('/')}", []).append(row)
 
         def send_columns(self, at: str, *, indexes: Any, columns: Any) -> None:
-            told.setdefault(at, []).append({"indexes": indexes, "columns": columns})
+            row = {"indexes": indexes, "columns": columns}
+            told.setdefault(f"/{at.lstrip('/')}", []).append(row)
 
         def send_recording_name(self, name: str) -> None:
             told["/"].append(name)
