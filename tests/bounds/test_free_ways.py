@@ -34,6 +34,7 @@ def test_no_drawn_scene_is_called_impossible(seed):
     assert wrong(drawn(seed)) == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("first", batches(range(0, 5000, 250), quick=1))
 def test_none_of_5000_drawn_scenes_is_called_impossible(first):
@@ -41,6 +42,7 @@ def test_none_of_5000_drawn_scenes_is_called_impossible(first):
     assert said == {}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("first", batches(range(0, 300, 20), quick=1))
 def test_no_drawn_scene_that_is_planned_is_called_impossible(first):

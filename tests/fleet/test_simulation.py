@@ -254,6 +254,7 @@ def test_who_was_to_leave_but_has_no_plan_stays():
     assert [*log.violations] == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_an_emergency_that_is_not_acknowledged():
     """All messages of three steps are lost as one breaks down: nobody swaps, all is flagged."""
@@ -292,6 +293,7 @@ def test_another_goal_on_the_way():
         loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], margin=0.0))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_who_lost_its_plan_finds_a_long_way_round():
     """Beside one that broke down, no way is found with few expansions."""
