@@ -15,11 +15,9 @@ from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.exports.driven import driven_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
-from maneuver_automaton.plotting.bodies import SWEPT
-from maneuver_automaton.plotting.colors import Color
+from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
-from maneuver_automaton.plotting.roads import EGO, GOAL, LANE
 from maneuver_automaton.plotting.swept import merged, swept_region
 from maneuver_automaton.roads.scene import presence_of
 
@@ -29,6 +27,7 @@ if TYPE_CHECKING:
 APPLICATION = "maneuver_automaton"
 TIMELINE = "plan"  # [s] on the clock of the plan
 WORLD = "world"
+EGO, GOAL = SEQUENCE[0], SEQUENCE[2]
 STEP = 0.05  # [s]
 
 

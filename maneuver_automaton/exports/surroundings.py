@@ -14,12 +14,10 @@ from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.exports.driven import Driven
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.closed_loop_track import joined_track
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.obstacles import round_times
-from maneuver_automaton.plotting.paths import bare_scene
-from maneuver_automaton.plotting.scene import Carried, Scene, scene_of
-from maneuver_automaton.plotting.track import Track
+from maneuver_automaton.plotting.scene import Carried, Scene, bare_scene, scene_of
+from maneuver_automaton.plotting.track import Track, joined_track
 from maneuver_automaton.roads.scene import presence_of
 
 

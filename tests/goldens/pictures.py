@@ -24,12 +24,13 @@ from matplotlib.patches import Patch
 
 from maneuver_automaton import plotting
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
-from maneuver_automaton.fleet import FleetLog, FleetResult, simulate_fleet
+from maneuver_automaton.fleet import FleetLog, simulate_fleet
 from maneuver_automaton.formats.commonroad import read_commonroad
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import film
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance
+from maneuver_automaton.receding_horizon import Disturbance
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.roads import (
     RoadScene,
     RoadSettings,
@@ -41,8 +42,7 @@ from maneuver_automaton.roads import (
 from tests.exports.cases import trailer
 from tests.fleet import robots
 from tests.plotting import fleets, loops
-from tests.plotting.cases import parking_plan, plan_of, result_of, slalom_problem
-from tests.plotting.test_space import flight
+from tests.plotting.cases import flight, parking_plan, plan_of, result_of, slalom_problem
 from tests.roads.files import LANES, car, commonroad, parked, problem
 
 DIGITS = 3
@@ -211,6 +211,8 @@ def _parts(artist: Any) -> list[Any]:
         if hasattr(artist, "_faces"):  # in space, where the view tells where they are
             return [np.zeros((1, 2))] * len(artist._faces)
         at = np.asarray(artist.get_offsets())
+        if len(getattr(artist, "get_sizes", tuple)()):  # one marker each
+            return list(at[:, None])
         if len(at) and artist.get_offset_transform() is not None and at.any():
             return list(at[:, None])
         return [path.vertices for path in artist.get_paths() if len(path.vertices)]
@@ -287,36 +289,18 @@ def picture_of(name: str) -> Figure:
 
 
 def _save(result: Any, path: Path) -> None:
-    from maneuver_automaton.plotting import notebooks
-
+    view = "plane"
     if isinstance(result, PlanResult) and result.alternatives:
-        plotting.save_alternatives_figure(result, path)
-    elif isinstance(result, PlanResult) and plotting.flies_among_heights(result.problem):
-        plotting.save_space_figure(result, path)
-    else:
-        notebooks._save(result, path)
+        view = "alternatives"
+    elif plotting.flies_among_heights(recording_of(result)):
+        view = "space"
+    plotting.save_picture(result, path, view=view)
 
 
 def film_of(name: str) -> film.Film:
     """The film of a case."""
     result = RESULTS[name]()
-    if isinstance(result, PlanResult):
-        return filmed(
-            lambda path: plotting.save_plan_animation(result.plan, path, problem=result.problem)
-        )
-    if isinstance(result, ClosedLoop):
-        return filmed(lambda path: plotting.save_closed_loop_animation(result, path))
-    if isinstance(result, FleetResult):
-        return filmed(lambda path: plotting.animate_fleet(result, path))
-    if isinstance(result, FleetLog):
-        return filmed(lambda path: plotting.animate_fleet_loop(result, path))
-    if hasattr(result, "driven"):
-        scene, vehicle = result.planner.scene, result.planner.vehicle
-        return filmed(
-            lambda path: plotting.save_road_animation(scene, vehicle, result.driven, path)
-        )
-    vehicle = next(iter(result.results.values())).planner.vehicle
-    return filmed(lambda path: plotting.save_road_fleet_animation(result, vehicle, path))
+    return filmed(lambda path: plotting.save_film(result, path))
 
 
 CASES: dict[str, Callable[[], dict[str, Any]]] = {
