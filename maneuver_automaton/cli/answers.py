@@ -100,16 +100,16 @@ class PlanAnswer:
 
         result, look = self.result, settings.look.look(self.name)
         if settings.plot:
-            plotting.save_plan_figure(result, out / "plan.png", nodes=result.nodes, look=look)
-            if plotting.flies_among_heights(result.problem):
-                plotting.save_space_figure(result, out / "plan_3d.png", title=look.title)
+            plotting.save_picture(result, out / "plan.png", look=look)
+            if plotting.flies_among_heights(result):
+                plotting.save_picture(result, out / "plan_3d.png", look=look, view="space")
             if settings.gap is not None and result.plan is not None:
                 plotting.save_progress_figure(result, out / "progress.png", title=look.title)
             if result.alternatives:
                 path = out / "alternatives.png"
-                plotting.save_alternatives_figure(result, path, title=look.title)
+                plotting.save_picture(result, path, look=look, view="alternatives")
         if settings.animate and result.plan is not None:
-            plotting.save_plan_animation(result.plan, out / "plan.gif", problem=result.problem)
+            plotting.save_film(result, out / "plan.gif")
         if settings.html:
             result.player(title=settings.look.title or self.name).save(out / "plan.html")
 

@@ -42,11 +42,9 @@ from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
 if TYPE_CHECKING:
-    from maneuver_automaton.fleet import FleetLog, FleetResult
     from maneuver_automaton.planning import PlanResult
     from maneuver_automaton.problem import Problem
     from maneuver_automaton.receding_horizon import ClosedLoop
-    from maneuver_automaton.roads import RoadFleetResult
 
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 
@@ -175,28 +173,28 @@ def plot(
     what = "animation" if animate else "page" if html else "picture"
     path = _picture(file, out, what)
     if (roads := road_fleet(file, Parts(beside=beside), alone=True)) is not None:
-        draw = functools.partial(_draw_roads, roads, path, what, look)
+        draw = functools.partial(_draw, roads, path, what, look, roads.name)
     elif (driven := _loop_of_fleet(file)) is not None:
         from maneuver_automaton.cli.planned import fleet_planned
         from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
 
         fleet = fleet_planned(file, driven, Parts(beside=beside))
         log = load_fleet_loop(file, fleet.fleet)
-        draw = functools.partial(_draw_fleet_loop, log, path, what, look, fleet.name)
+        draw = functools.partial(_draw, log, path, what, look, fleet.name)
     elif (plans := _plans_of_fleet(file)) is not None:
         from maneuver_automaton.cli.planned import fleet_planned
         from maneuver_automaton.formats.fleet_json import load_fleet
 
         fleet = fleet_planned(file, plans, Parts(beside=beside))
         result = load_fleet(file, fleet.fleet)
-        draw = functools.partial(_draw_fleet, result, path, what, look, fleet.name)
+        draw = functools.partial(_draw, result, path, what, look, fleet.name)
     elif beside is None:
         document = _drawn(file)
         draw = functools.partial(_draw_file, document, path, what, look)
     else:
         scenario = scenario_of(beside)
         value = _value_of(file, scenario.problem)
-        draw = functools.partial(_draw_value, value, path, what, look, scenario.name)
+        draw = functools.partial(_draw, value, path, what, look, scenario.name)
     make_folder(path.parent)
     skip_documentation()
     try:
@@ -227,84 +225,40 @@ def _loop_of_fleet(file: Path) -> dict[str, Any] | None:
     return read_fleet_loop_document(file)
 
 
-def _draw_roads(result: RoadFleetResult, path: Path, what: str, look: LookOptions) -> None:
-    """Draw plans and loops on roads, of one vehicle or several, as `plan` and `mpc` do."""
+def _draw(value: Any, path: Path, what: str, look: LookOptions, name: str) -> None:
+    """Draw any result as the command does that made it."""
     from maneuver_automaton import plotting
+    from maneuver_automaton.recording import recording_of
 
-    vehicle = next(iter(result.results.values())).planner.vehicle
-    if what == "picture":
-        plotting.save_road_fleet_figure(result, vehicle, path, look=look.look(result.name))
-    elif what == "page":
-        result.player(title=look.title or result.name).save(path)
+    recording = recording_of(value)
+    if what == "page":
+        value.player(title=look.title or name).save(path)
+    elif what == "picture":
+        plotting.save_picture(recording, path, look=look.look(name))
+    elif not any(one.has_plan for one in recording.movers):
+        raise ValueError(f"holds no plan, its status is {recording.status!r}")
     else:
-        plotting.save_road_fleet_animation(result, vehicle, path, look=look.look(result.name))
-
-
-def _draw_fleet_loop(log: FleetLog, path: Path, what: str, look: LookOptions, name: str) -> None:
-    """Draw the closed loop of several vehicles as `mpc` does."""
-    from maneuver_automaton import plotting
-
-    if what == "picture":
-        plotting.save_fleet_loop_figure(log, path, look=look.look(name))
-    elif what == "page":
-        log.player(title=look.title or name).save(path)
-    else:
-        plotting.animate_fleet_loop(log, path)
-
-
-def _draw_fleet(result: FleetResult, path: Path, what: str, look: LookOptions, name: str) -> None:
-    """Draw plans of several vehicles as `plan` does."""
-    from maneuver_automaton import plotting
-
-    if what == "picture":
-        plotting.save_fleet_figure(result, path, look=look.look(name))
-    elif what == "page":
-        result.player(title=look.title or name).save(path)
-    elif not result.plans:
-        raise ValueError(f"holds no plan, its status is {result.status.value!r}")
-    else:
-        plotting.animate_fleet(result, path)
+        plotting.save_film(recording, path)
 
 
 def _draw_file(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:
     """Draw what a file states: the motion, without body and obstacles."""
     from maneuver_automaton import plotting
     from maneuver_automaton.formats.plan_json import plan_of_document
+    from maneuver_automaton.recording.plans import stated
 
     name = str(document.get("name") or "")
-    if what == "picture":
-        plotting.save_plan_file_figure(document, path, look=look.look(name))
-        return
-    if document["status"] != "found":
+    found = document["status"] == "found" and bool(document["trajectory"])
+    if not found and what != "picture":
         raise ValueError(f"holds no plan, its status is {document['status']!r}")
-    plan = plan_of_document(document)
-    if what == "animation":
-        plotting.save_plan_animation(plan, path)
-        return
-    title = look.title or name or path.stem
-    plotting.player_of_file(document, plan, title=title).save(path)
-
-
-def _draw_value(
-    value: PlanResult | ClosedLoop, path: Path, what: str, look: LookOptions, name: str
-) -> None:
-    """Draw a plan or a closed loop as `plan` and `mpc` do."""
-    from maneuver_automaton import plotting
-    from maneuver_automaton.receding_horizon import ClosedLoop
-
-    if what == "page":
-        value.player(title=look.title or name).save(path)
-    elif isinstance(value, ClosedLoop):
-        if what == "animation":
-            plotting.save_closed_loop_animation(value, path)
-        else:
-            plotting.save_closed_loop_figure(value, path, look=look.look(name))
-    elif what == "picture":
-        plotting.save_plan_figure(value, path, look=look.look(name))
-    elif value.plan is None:
-        raise ValueError(f"holds no plan, its status is {value.status.value!r}")
-    else:
-        plotting.save_plan_animation(value.plan, path, problem=value.problem)
+    plan = plan_of_document(document) if found else None
+    if what == "picture":
+        plotting.save_picture(stated(document, plan), path, look=look.look(name))
+    elif what == "animation":
+        plotting.save_film(plan, path)
+    elif plan is not None:
+        title = look.title or name or path.stem
+        plotting.player_of_file(document, plan, title=title).save(path)
 
 
 def _picture(file: Path, out: Path | None, what: str) -> Path:

@@ -147,4 +147,4 @@ def _write(
         source=source,
         interrupted=stopped(),
     )
-    draw_loop(log, name, out, settings, figure="save_fleet_loop_figure", film="animate_fleet_loop")
+    draw_loop(log, name, out, settings)

@@ -53,9 +53,9 @@ class FleetAnswer:
 
         if settings.plot:
             look = settings.look.look(self.name)
-            plotting.save_fleet_figure(self.result, out / "plan.png", look=look)
+            plotting.save_picture(self.result, out / "plan.png", look=look)
         if settings.animate and self.result.plans:
-            plotting.animate_fleet(self.result, out / "plan.gif")
+            plotting.save_film(self.result, out / "plan.gif")
         if settings.html:
             self.result.player(title=settings.look.title or self.name).save(out / "plan.html")
 

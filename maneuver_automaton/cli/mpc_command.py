@@ -268,16 +268,11 @@ def _write(loop: ClosedLoop, name: str, out: Path, settings: Settings) -> None:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
     save_closed_loop(loop, out / "closed_loop.json", name=name, interrupted=stopped())
-    draw_loop(
-        loop, name, out, settings,
-        figure="save_closed_loop_figure", film="save_closed_loop_animation",
-    )  # fmt: skip
+    draw_loop(loop, name, out, settings)
 
 
-def draw_loop(
-    loop: ClosedLoop | FleetLog, name: str, out: Path, settings: Settings, *, figure: str, film: str
-) -> None:
-    """Write the pictures of a loop that were asked for; `figure` and `film` are of `plotting`."""
+def draw_loop(loop: ClosedLoop | FleetLog, name: str, out: Path, settings: Settings) -> None:
+    """Write the pictures of a loop that were asked for."""
     for picture in PICTURES:
         (out / picture).unlink(missing_ok=True)  # of an earlier loop
     if stopped() or not (settings.plot or settings.animate or settings.html):
@@ -288,8 +283,8 @@ def draw_loop(
     skip_documentation()
 
     if settings.plot:
-        getattr(plotting, figure)(loop, out / "closed_loop.png", look=settings.look.look(name))
+        plotting.save_picture(loop, out / "closed_loop.png", look=settings.look.look(name))
     if settings.animate:
-        getattr(plotting, film)(loop, out / "closed_loop.gif")
+        plotting.save_film(loop, out / "closed_loop.gif")
     if settings.animate or settings.html:
         loop.player(title=settings.look.title or name).save(out / "closed_loop.html")

@@ -16,7 +16,6 @@ from maneuver_automaton.cli.progress import announced, progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:
-    from maneuver_automaton.automaton import Plan
     from maneuver_automaton.cli import mpc_command
     from maneuver_automaton.cli.plan_settings import Settings as PlanSettings
     from maneuver_automaton.roads import RoadDrive, RoadPlanResult, RoadScene, RoadVehicle
@@ -56,7 +55,7 @@ def plan_file(path: Path, out: Path, *, settings: PlanSettings, parts: Parts) ->
         for name in ("plan.png", "plan.gif", "plan.html"):
             (out / name).unlink(missing_ok=True)  # of an earlier plan
         if result.plan is not None:
-            _draw(scene, vehicle, result.plan, out / "plan", settings)
+            _draw(result, out / "plan", settings)
         if settings.html and not stopped():
             result.player(title=settings.look.title or scene.name).save(out / "plan.html")
 
@@ -113,7 +112,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
         write_document(document, out / "closed_loop.json", interrupted=stopped())
         for name in ("closed_loop.png", "closed_loop.gif", "closed_loop.html"):
             (out / name).unlink(missing_ok=True)  # of an earlier loop
-        _draw(scene, vehicle, drive.driven, out / "closed_loop", settings)
+        _draw(drive, out / "closed_loop", settings)
         if (settings.animate or settings.html) and not stopped():
             page = drive.player(title=settings.look.title or scene.name)
             page.save(out / "closed_loop.html")
@@ -138,26 +137,21 @@ def _road(path: Path, parts: Parts) -> tuple[RoadScene, RoadVehicle]:
 
 
 def _draw(
-    scene: RoadScene,
-    vehicle: RoadVehicle,
-    plan: Plan,
-    file: Path,
-    settings: PlanSettings | mpc_command.Settings,
+    what: RoadPlanResult | RoadDrive, file: Path, settings: PlanSettings | mpc_command.Settings
 ) -> None:
     """Write the pictures that were asked for, `file` with their endings."""
     if stopped() or not (settings.plot or settings.animate):
         return
     from maneuver_automaton import plotting
     from maneuver_automaton.cli.pictures import skip_documentation
+    from maneuver_automaton.plotting import Look
 
     skip_documentation()
-
+    look = settings.look.look(what.planner.scene.name)
     if settings.plot:
-        picture, look = file.with_suffix(".png"), settings.look.look(scene.name)
-        plotting.save_road_figure(scene, vehicle, plan, picture, look=look)
+        plotting.save_picture(what, file.with_suffix(".png"), look=look)
     if settings.animate:
-        titled = replace(scene, name=settings.look.title or scene.name)
-        plotting.save_road_animation(titled, vehicle, plan, file.with_suffix(".gif"))
+        plotting.save_film(what, file.with_suffix(".gif"), look=Look(title=look.title))
 
 
 def _written(write: Callable[[], None], out: Path) -> None:

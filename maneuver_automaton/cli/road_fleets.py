@@ -190,7 +190,7 @@ def _write(
     source = {"file": path, "with": parts.beside, "case": None}
     document["source"] = source_entry(source, out / "plan.json")
     write_document(document, out / "plan.json", interrupted=stopped())
-    _draw(result, vehicle, out / "plan", settings)
+    _draw(result, out / "plan", settings)
 
 
 def _write_drive(
@@ -209,12 +209,11 @@ def _write_drive(
     source = {"file": path, "with": parts.beside, "case": None}
     document = road_fleet_drive_to_dict(drive) | {"source": source_entry(source, file)}
     write_document(document, file, interrupted=stopped())
-    _draw(drive, vehicle, out / "closed_loop", settings)
+    _draw(drive, out / "closed_loop", settings)
 
 
 def _draw(
     what: RoadFleetResult | RoadFleetDrive,
-    vehicle: RoadVehicle,
     file: Path,
     settings: Settings | mpc_command.Settings,
 ) -> None:
@@ -233,9 +232,9 @@ def _draw(
     skip_documentation()
     look = settings.look.look(what.name)
     if settings.plot:
-        plotting.save_road_fleet_figure(what, vehicle, file.with_suffix(".png"), look=look)
+        plotting.save_picture(what, file.with_suffix(".png"), look=look)
     if settings.animate:
-        plotting.save_road_fleet_animation(what, vehicle, file.with_suffix(".gif"), look=look)
+        plotting.save_film(what, file.with_suffix(".gif"), look=look)
 
 
 def _print(result: RoadFleetResult, out: Path) -> None:

@@ -15,8 +15,9 @@ from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.exports.recorded import exported, title_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
-from maneuver_automaton.plotting.colors import SEQUENCE, Color
+from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color
 from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.recording import Mover, Recording
 
 APPLICATION = "maneuver_automaton"
@@ -24,10 +25,6 @@ TIMELINE = "plan"  # [s] on the clock of the plan
 WORLD = "world"
 STEP = 0.05  # [s]
 BODY, GOAL = SEQUENCE[0], SEQUENCE[2]
-SWEPT: Color = (0.36, 0.60, 0.85)
-LANE: Color = (0.91, 0.91, 0.92)
-SOLID: Color = (0.36, 0.38, 0.42)
-MOVING: Color = (0.44, 0.22, 0.58)
 
 
 def save_rerun(value: Any, path: Path | str, *, step: float = STEP) -> None:
