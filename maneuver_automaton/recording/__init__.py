@@ -30,7 +30,7 @@ def recording_of(result: Any) -> Recording:
 
     Parameters
     ----------
-    result : Plan, PlanResult, ClosedLoop, Statistics, FleetResult, FleetLog, RoadPlanResult, \
+    result : Plan, PlanResult, ClosedLoop, FleetResult, FleetLog, RoadPlanResult, \
 RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
 
     Raises
@@ -56,5 +56,5 @@ RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
             return made
     raise TypeError(
         f"recording: got {type(result).__name__}, need a Plan, PlanResult, ClosedLoop, "
-        "Statistics, FleetResult, FleetLog, or a plan or drive on roads"
+        "FleetResult, FleetLog, or a plan or drive on roads"
     )

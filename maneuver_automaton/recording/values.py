@@ -68,7 +68,9 @@ class Curve:
 
     def __post_init__(self) -> None:
         freeze(self, "time")
-        freeze(self, "value")
+        value = np.array(self.value, dtype=np.float64)  # nan included
+        value.setflags(write=False)
+        object.__setattr__(self, "value", value)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -133,7 +133,7 @@ def paged(name: str) -> Any:
         player = player_of(VALUES[name]())
     content = json.loads(json.dumps(player.content))
     for step in content.get("steps", ()):
-        step.pop("solve_s")
+        step.pop("solve_s", None)
     search = content.get("search", {})
     for curve in ("costs", "bounds"):
         search |= {curve: [value for _, value in search.get(curve, ())]}

@@ -15,7 +15,7 @@ from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyM
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.distances import thinned
-from maneuver_automaton.plotting.player.local import POSE_DIGITS, rounded
+from maneuver_automaton.plotting.player.numbers import POSE_DIGITS, rounded
 from maneuver_automaton.plotting.regions import map_paths
 
 MOST_SAMPLES = 400

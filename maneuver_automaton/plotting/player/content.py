@@ -1,0 +1,309 @@
+"""What a player shows of a recording, as plain values that the browser draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
+from maneuver_automaton.plotting.colors import Color
+from maneuver_automaton.plotting.distances import distance_times, nearest_others
+from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.labels import shown_name
+from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.player.clearances import (
+    clearance_entry,
+    distance_curve,
+    sample_times,
+)
+from maneuver_automaton.plotting.player.numbers import (
+    Local,
+    body_entries,
+    curve_entries,
+    goal_entries,
+    hex_color,
+    limit_entries,
+    motion_entry,
+    obstacle_entries,
+    part_entries,
+    part_frames,
+    rounded,
+)
+from maneuver_automaton.plotting.player.page import Player
+from maneuver_automaton.plotting.scene import BODIES, LEAST_MARK
+from maneuver_automaton.plotting.track import Track, joined_track
+from maneuver_automaton.recording import Curve, Fact, Mover, Recording, Search, recording_of
+from maneuver_automaton.recording.plans import stated
+
+MOST_NODES = 20_000  # shown of a search
+Numbers = Mapping[str, int]  # of the trims on a page, by name
+
+
+def player_of(value: Any, *, title: str = "") -> Player:
+    """The player of any result in which somebody moves.
+
+    Parameters
+    ----------
+    value : any result, or a Recording
+        What to play.
+    title : str
+        Heads the page; the kind of `value` if left out.
+
+    Raises
+    ------
+    TypeError
+        If it is none of these.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
+    >>> player = player_of(Plan([0.0, 0.0, 0.0], (ahead,), durations=[3.0]), title="Ahead")
+    >>> player.content["title"], player.content["motions"][0]["times"]
+    ('Ahead', [0.0, 3.0])
+    """
+    recording = recording_of(value)
+    return Player(content_of(replace(recording, title=title) if title else recording))
+
+
+def player_of_file(document: Mapping[str, Any], plan: Plan, *, title: str) -> Player:
+    """The player of a loaded plan.json and its `plan`, without the body and the obstacles."""
+    recording, bound = stated(document, plan), document.get("bound") or {}
+    known = Fact(label="known", value="the motion alone; body and obstacles with the scenario")
+    search = Search(
+        improvements=tuple(map(tuple, document.get("improvements") or ())),
+        bounds=tuple(map(tuple, bound.get("history") or ())),
+        cost=document.get("cost"),
+        bound=document.get("lower_bound"),
+        kind=bound.get("kind") or "",
+    )
+    facts = (*recording.facts, known)
+    return Player(content_of(replace(recording, title=title, facts=facts, search=search)))
+
+
+def content_of(recording: Recording) -> dict[str, Any]:
+    """Title, facts, motions, and what is around them; of several vehicles one may be picked."""
+    cast, world = cast_of(recording), recording.world
+    first, local = cast.actors[0], Local(cast.actors[0].track.start[:2])
+    others = {one: joined_track(one.start, one.pieces) for one in recording.alternatives}
+    trims, numbers = _trims(cast, list(others.values()))
+    motions = [
+        _motion(one.mover, one.track, recording, local, its)
+        for one, its in zip(cast.actors, numbers, strict=True)
+    ]
+    motions += [_motion(one, way, recording, local, numbers[0]) for one, way in others.items()]
+    content: dict[str, Any] = {
+        "title": recording.title,
+        "facts": [(fact.label, fact.text) for fact in recording.facts],
+        "trims": trims,
+        "motions": motions,
+        "bodies": [],
+        "origin": local.origin.tolist(),
+        "box": local.places(_box(cast, [first.track, *others.values()])),
+        "mark": rounded([_mark(cast)])[0],
+        "goals": goal_entries(cast.scene.goals, local, cast.scene.reached),
+        "obstacles": obstacle_entries(world.obstacles, local, leave=world.fleeting),
+        **limit_entries(world.zones, world.bounds, local),
+        "ending": recording.ending,
+    }
+    if world.lanes:
+        content["lanes"] = [local.places(ring) for ring in world.lanes]
+        regions = {str(one): Obstacle(one) for mover in recording.movers for one in mover.regions}
+        content["regions"] = obstacle_entries(regions.values(), local, leave=False)
+    if len(cast.actors) > 1:
+        _add_vehicles(content, cast, local, numbers)
+        return content
+    content["bodies"] = body_entries(first.mover.bodies)
+    if recording.search is not None:
+        content["search"] = _search(recording.search, local)
+    if first.held:
+        content["steps"] = _steps(cast, local, numbers[0])
+    return content
+
+
+def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], list[Numbers]]:
+    """Name and colour of all trims, and for each vehicle their numbers.
+
+    Vehicles of two kinds may have trims of one name; each keeps the colours of its own kind.
+    """
+    entries: list[dict[str, str]] = []
+    of_kind: dict[int, Numbers] = {}
+    kinds = [_kind(one.mover) for one in cast.actors]
+    for kind in dict.fromkeys(kinds):
+        alike = [one for one, its in zip(cast.actors, kinds, strict=True) if its == kind]
+        tracks = [*others, *(way for one in alike for way in (one.track, *_held(one)))]
+        every = {name: twist for way in tracks for name, twist in way.twists.items()}
+        colors: dict[str, Color] = track_colors(every)
+        if len(cast.actors) == 1:
+            colors |= track_colors(cast.actors[0].track.twists)  # as in its picture
+        of_kind[kind] = {name: len(entries) + k for k, name in enumerate(colors)}
+        entries += [
+            {"name": shown_name(name), "color": hex_color(color)} for name, color in colors.items()
+        ]
+    return entries, [of_kind[kind] for kind in kinds]
+
+
+def _held(one: Actor) -> list[Track]:
+    return [track for _, track in one.held]
+
+
+def _kind(mover: Mover) -> int:
+    """What tells vehicles of two kinds apart."""
+    return id(mover.model if mover.problem is None else mover.problem.automaton)
+
+
+def _motion(
+    mover: Mover, track: Track, recording: Recording, local: Local, numbers: Numbers
+) -> dict[str, Any]:
+    """What a vehicle drives, with its curves, its clearance, and the parts that it carries."""
+    model, names = mover.model, [name for name in mover.bodies if name]
+    times = sample_times(track.switching_times)
+    poses = track.at(times)
+    around = recording.world.obstacles if mover.problem is None else mover.problem.obstacles
+    rings = footprint_polygons(list(mover.bodies.get("", ()))) or [np.zeros((1, 2))]
+    bodies = [(ring, poses) for ring in rings]
+    parts: list[Any] = []
+    if model is not None and names and track.pieces:
+        at, frames = part_frames(track, model)
+        for k, name in enumerate(names):
+            columns = [np.interp(times, at, column) for column in frames[:, k].T]
+            there = (SE2(poses[:, :3]) @ SE2(np.stack(columns, axis=-1))).pose
+            bodies += [(ring, there) for ring in footprint_polygons(list(mover.bodies[name]))]
+        parts = part_entries(track, model, names)
+    heights = None
+    if mover.problem is not None and track.start.size > 3:
+        heights = poses[:, 3:] + np.array(mover.problem.body_height)
+    entry = motion_entry(track, local, numbers)
+    entry["poses"][-1] = local.poses(np.asarray(mover.end))  # what pushed it at the end included
+    leave = recording.world.fleeting
+    curves = [_curve(one) for one in recording.curves if _is_value(one, recording, mover)]
+    return {
+        **entry,
+        "curves": curve_entries(track, mover) + [{"label": "value", **one} for one in curves],
+        "clearance": clearance_entry(times, bodies, around, heights=heights, leave=leave),
+        "parts": parts,
+        "cost": mover.cost,
+    }
+
+
+def _is_value(curve: Curve, recording: Recording, mover: Mover) -> bool:
+    alone = len(recording.movers) == 1
+    return curve.label == "value" and (alone or bool(curve.mover)) and curve.mover == mover.name
+
+
+def _curve(curve: Curve) -> dict[str, list[float]]:
+    """Corners of a number that holds until the next, where it is known."""
+    known = np.isfinite(curve.value)
+    time, value = curve.time[known], curve.value[known]
+    return {
+        "t": rounded(np.append(np.repeat(time, 2)[1:-1], time[-1:])),
+        "v": rounded(np.append(np.repeat(value[:-1], 2), value[-1:])),
+    }
+
+
+def _box(cast: Cast, tracks: Iterable[Track]) -> Array:
+    """The box (2, 2) of the picture, and all that the body sweeps along tracks in it."""
+    body = cast.scene.body
+    bodies = [ring for track in tracks for ring in placed(body, track.pose)]
+    places = [*cast.box, *np.concatenate([np.zeros((0, 2)), *bodies])]
+    return np.array([np.min(places, axis=0), np.max(places, axis=0)])
+
+
+def _mark(cast: Cast) -> float:
+    """Size of a path [m] that the marks of the page suit."""
+    if cast.on_roads:
+        return max(float(np.ptp(ring[:, 0])) for one in cast.actors for ring in one.body)
+    if len(cast.actors) == 1:
+        return cast.size
+    extent = float(np.ptp(cast.box, axis=0).max())
+    reach = max(one.reach for one in cast.actors)
+    return min(extent, max(BODIES * reach, LEAST_MARK * extent))
+
+
+def _add_vehicles(
+    content: dict[str, Any], cast: Cast, local: Local, numbers: Sequence[Numbers]
+) -> None:
+    """What tells several vehicles apart, and what all of them do together."""
+    times = distance_times(cast.begin, cast.end)
+    nearest = nearest_others(cast.actors, times)
+    for k, one in enumerate(cast.actors):
+        mover = one.mover
+        content["motions"][k] |= {
+            "name": one.name,
+            "label": one.label,
+            "color": hex_color(one.color),
+            "bodies": body_entries(mover.bodies),
+            "goals": goal_entries(mover.goals, local, mover.goal_index),
+            "leaves": bool(np.isfinite(mover.there[1])),
+            "joins": bool(np.isfinite(mover.there[0])) and mover.there[0] > cast.begin,
+            "reason": mover.reason,
+            "others": distance_curve(times, nearest[:, k]),
+            "held": [
+                {"t": time, "plan": motion_entry(track, local, numbers[k])}
+                for time, track in one.held
+            ],
+        }
+    recording = cast.recording
+    fleet: dict[str, Any] = {
+        "begin": cast.begin,
+        "end": cast.end,
+        "margin": recording.world.margin,
+        "distance": distance_curve(times, nearest.min(axis=1)),
+    }
+    for curve in (one for one in recording.curves if one.label == "value" and not one.mover):
+        fleet["value"] = _curve(curve)
+        fleet["steps"] = [
+            {
+                "t": time,
+                "swaps": _told(recording, "exchanged", time),
+                "broken": _told(recording, "broken", time),
+            }
+            for time in curve.time[:-1].tolist()
+        ]
+    content["fleet"] = fleet
+
+
+def _steps(cast: Cast, local: Local, numbers: Numbers) -> list[dict[str, Any]]:
+    """The steps of a closed loop: what each planned, and what came of it."""
+    recording, (one,) = cast.recording, cast.actors
+    values = next(curve for curve in recording.curves if curve.label == "value").value.tolist()
+    return [
+        {
+            "t": time,
+            "value": value,
+            "replanned": any(e.kind == "replanned" and e.time == time for e in recording.events),
+            "broken": _told(recording, "broken", time),
+            "plan": motion_entry(track, local, numbers),
+        }
+        for (time, track), value in zip(one.held, values, strict=False)
+    ]
+
+
+def _told(recording: Recording, kind: str, time: float) -> list[str]:
+    return [one.text for one in recording.events if one.kind == kind and one.time == time]
+
+
+def _search(search: Search, local: Local) -> dict[str, Any]:
+    """How the search went on, and what it expanded if that was asked for."""
+    entry: dict[str, Any] = {
+        "costs": [[float(at), float(cost)] for at, cost in search.improvements],
+        "bounds": [[float(at), float(value)] for at, value in search.bounds],
+        "cost": search.cost,
+        "bound": search.bound,
+        "kind": search.kind,
+    }
+    if search.nodes is not None:
+        some = search.nodes[:: max(1, -(-len(search.nodes) // MOST_NODES))]
+        entry["nodes"] = local.places(some[:, :2])
+        entry["node_costs"] = rounded(some[:, 3], 4) if some.shape[1] > 3 else []
+    for name in ("reached", "narrowest"):
+        if (places := getattr(search, name)) is not None:
+            entry[name] = local.places(places)
+    return entry

@@ -1,0 +1,243 @@
+"""Tracks, bodies, goals and obstacles as numbers from which the browser computes what it draws.
+
+Places are counted from near the start, and all is rounded to what can be seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Polygon, Shape
+from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.outline import outlines, rings_of
+from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.zones import Zone
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
+from maneuver_automaton.plotting.controls import step_curves
+from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton.plotting.labels import control_labels
+from maneuver_automaton.plotting.limits import bound_lines
+from maneuver_automaton.plotting.track import Piece, Track
+from maneuver_automaton.problem import Bounds, Goal
+from maneuver_automaton.recording import Mover
+
+POSE_DIGITS, PLACE_DIGITS, VALUE_DIGITS = 9, 4, 5  # decimals
+ONE_TWIST = 1e-9  # [m, rad] a piece is one arc where its twist meets all samples so closely
+TURN = 0.05  # [rad] of an obstacle that moves on an arc, between two of its poses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Local:
+    """Coordinates from an `origin` (2,) [m]: browsers draw with single precision."""
+
+    origin: Array
+
+    def poses(self, poses: Array) -> list[Any]:
+        """Poses (..., dof) as lists, exact enough to compute with."""
+        near = np.array(poses, dtype=np.float64)
+        near[..., :2] -= self.origin
+        return rounded(near, POSE_DIGITS)
+
+    def places(self, places: Array) -> list[Any]:
+        """Places (..., 2) as lists, exact enough to draw."""
+        return rounded(np.asarray(places) - self.origin, PLACE_DIGITS)
+
+
+def rounded(values: Array | Sequence[float], digits: int = VALUE_DIGITS) -> list[Any]:
+    """Numbers (...,) as lists with so many decimals; no negative zero."""
+    numbers: list[Any] = (np.round(np.asarray(values, dtype=np.float64), digits) + 0.0).tolist()
+    return numbers
+
+
+def hex_color(color: Sequence[float]) -> str:
+    """A colour as the browser reads it.
+
+    Examples
+    --------
+    >>> hex_color((1.0, 0.5, 0.0))
+    '#ff8000'
+    """
+    return "#" + "".join(f"{round(255 * channel):02x}" for channel in color)
+
+
+def motion_entry(track: Track, local: Local, names: Mapping[str, int]) -> dict[str, Any]:
+    """Arcs of a `track`: begin time, first pose, twist, and which of the `names` it belongs to.
+
+    A trim is one arc; a maneuver is one for each step between its samples, as `Plan.pose_at` has
+    it. `times` and `poses` have one entry more than `twists`: where the last arc ends.
+    """
+    times: list[float] = []
+    poses: list[Array] = []
+    twists: list[Array] = []
+    trims: list[int] = []
+    for piece in track.pieces:
+        for begin, pose, twist in _arcs(piece):
+            times.append(begin)
+            poses.append(pose)
+            twists.append(twist)
+            trims.append(names[piece.name])
+    times.append(float(track.pieces[-1].time[-1]) if track.pieces else 0.0)
+    poses.append(track.end)
+    return {
+        "times": rounded(times, POSE_DIGITS),
+        "poses": local.poses(np.array(poses)),
+        "twists": rounded(np.array(twists), POSE_DIGITS) if twists else [],
+        "trims": trims,
+    }
+
+
+def curve_entries(track: Track, mover: Mover) -> list[dict[str, Any]]:
+    """Reduced state and controls of a `track` over time, each with its label."""
+    if not track.pieces:
+        return []
+    states, controls = track.pieces[0].state.shape[1], track.pieces[0].control.shape[1]
+    model = mover.model
+    known = mover.names if model is None else (model.reduced_names, model.control_names)
+    labels = []
+    for names, count, what in zip(known, (states, controls), ("state", "control"), strict=True):
+        counted = [f"{what} {k + 1}" for k in range(count)]
+        labels += control_labels(names) if len(names) == count else counted
+    curves = [
+        np.concatenate([np.stack([one.time, one.state[:, k]], axis=-1) for one in track.pieces])
+        for k in range(states)
+    ]
+    curves += [np.concatenate(step_curves(track, k)) for k in range(controls)]
+    return [{"label": label, **_curve(curve)} for label, curve in zip(labels, curves, strict=True)]
+
+
+def part_entries(track: Track, model: Model, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Poses in time of the parts that a vehicle carries, seen from its body."""
+    if not track.pieces or not names:
+        return []
+    time, poses = part_frames(track, model)
+    return [
+        {"t": rounded(time, POSE_DIGITS), "pose": rounded(poses[:, k])} for k in range(len(names))
+    ]
+
+
+def part_frames(track: Track, model: Model) -> tuple[Array, Array]:
+    """Times (n,) and poses (n, parts, 3) of the parts, seen from the body."""
+    time = np.concatenate([piece.time for piece in track.pieces])
+    state = np.concatenate([piece.state for piece in track.pieces])
+    return time, np.asarray(model.part_poses(state))
+
+
+def _arcs(piece: Piece) -> list[tuple[float, Array, Array]]:
+    """Begin, first pose and twist of the arcs of a piece."""
+    group = group_of(piece.pose.shape[1])
+    since = (piece.time - piece.time[0])[:, None]
+    along = (group(piece.pose[0]) @ group.exp(since * piece.twist)).pose
+    if np.abs(along - piece.pose).max() <= ONE_TWIST:
+        return [(float(piece.time[0]), piece.pose[0], piece.twist)]
+    steps = (group(piece.pose[:-1]).inverse() @ group(piece.pose[1:])).log()
+    spans = np.diff(piece.time)
+    return [
+        (float(piece.time[k]), piece.pose[k], steps[k] / spans[k])
+        for k in np.flatnonzero(spans > 0.0).tolist()
+    ]
+
+
+def _curve(curve: Array) -> dict[str, list[float]]:
+    """Corners of a curve (n, 2) over time, without those on a line of constant value."""
+    flat = np.zeros(len(curve), dtype=np.bool_)
+    flat[1:-1] = (curve[1:-1, 1] == curve[:-2, 1]) & (curve[1:-1, 1] == curve[2:, 1])
+    kept = curve[~flat]
+    return {"t": rounded(kept[:, 0]), "v": rounded(kept[:, 1])}
+
+
+def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: bool) -> list[Any]:
+    """Static and moving obstacles; with `leave`, a moving one is there for its motion only."""
+    return [
+        _map_entry(one, local)
+        if isinstance(one, OccupancyMap)
+        else _obstacle_entry(one, local, leave=leave)
+        for one in obstacles
+    ]
+
+
+def limit_entries(zones: Sequence[Zone], bounds: Bounds, local: Local) -> dict[str, Any]:
+    """Zones, each with what it asks for, and lines along the bounds of the pose."""
+    return {
+        "zones": [
+            {
+                "name": f"zone: {zone.asks}",
+                "rings": [local.places(ring) for ring in shape_rings(zone.shape)],
+            }
+            for zone in zones
+        ],
+        "bounds": [local.places(line) for line in bound_lines(bounds)],
+    }
+
+
+def goal_entries(goals: Sequence[Goal], local: Local, reached: int | None) -> list[Any]:
+    """Goals, and which of them is reached."""
+    return [
+        {
+            "pose": local.poses(goal.pose),
+            "free": goal.free_heading,
+            "tolerance": goal.tolerance_m,
+            "reached": reached is None or k == reached,
+        }
+        for k, goal in enumerate(goals)
+    ]
+
+
+def body_entries(bodies: Mapping[str, Sequence[Shape]]) -> list[Any]:
+    """Outlines of the body, in frame 0, and of what it carries, in frames from 1 on."""
+    outlines = [
+        (k, ring)
+        for k, shapes in enumerate(bodies.values())
+        for ring in footprint_polygons(list(shapes))
+    ]
+    return [
+        {
+            "frame": frame,
+            "ring": rounded(ring, PLACE_DIGITS),
+            "convex": [
+                rounded(corners, PLACE_DIGITS) for corners, _ in convex_pieces(Polygon(ring))
+            ],
+        }
+        for frame, ring in outlines
+    ]
+
+
+def shape_rings(shape: Shape) -> list[Array]:
+    """Rings (n, 2) around a shape and its holes; a disc has many corners."""
+    if isinstance(shape, Disc):
+        return footprint_polygons(shape)
+    return [ring for part in outlines(shape) for ring in rings_of(part)]
+
+
+def _obstacle_entry(one: Obstacle, local: Local, *, leave: bool) -> dict[str, Any]:
+    rings = shape_rings(one.shape)
+    entry: dict[str, Any] = {"name": one.name}
+    if one.height is not None:
+        entry["height"] = list(one.height)
+    if one.motion is None:
+        return entry | {"rings": [local.places(ring) for ring in rings]}
+    if one.present_s is not None:
+        entry["present"] = [time if math.isfinite(time) else None for time in one.present_s]
+    times = one.motion.times_for_lines(TURN)
+    return entry | {
+        "rings": [rounded(ring, PLACE_DIGITS) for ring in rings],
+        "t": rounded(times, POSE_DIGITS),
+        "pose": local.poses(one.motion.at(times)),
+        "leaves": leave,
+    }
+
+
+def _map_entry(cells: OccupancyMap, local: Local) -> dict[str, Any]:
+    """Blocked cells as rectangles [low column, low row, high column, high row]."""
+    return {
+        "name": cells.name,
+        "origin": local.poses(cells.origin),
+        "cell": cells.resolution,
+        "cells": blocked_rectangles(cells.blocked).ravel().tolist(),
+    }
