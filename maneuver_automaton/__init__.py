@@ -12,6 +12,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from maneuver_automaton import _display
 from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
@@ -192,6 +193,9 @@ __all__ = [*_HOMES, "plotting"]
 
 
 _get, _ = lazily(__name__, _HOMES)
+
+
+_display.register(lambda: importlib.import_module("maneuver_automaton.plotting.notebooks"))
 
 
 def __getattr__(name: str) -> Any:

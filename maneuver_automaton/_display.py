@@ -1,8 +1,8 @@
-"""How values show themselves: each hands itself to the pictures, which are imported only then."""
+"""How values show themselves: pictures register here, and are loaded when somebody looks."""
 
 from __future__ import annotations
 
-import importlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -22,24 +22,41 @@ class Player(Protocol):
     def _repr_html_(self) -> str: ...
 
 
-def player_page(value: Any, *, title: str = "") -> Player:
-    """The player of a plan, an answer for one or a fleet, a closed loop, or a plan on roads."""
-    page: Player = _drawing().player_of(value, title=title)
-    return page
+class Drawing(Protocol):
+    """What makes pages and pictures of values."""
+
+    def player_of(self, value: Any, *, title: str) -> Player:
+        """The page that plays a value."""
+
+    def picture_of(self, value: Any) -> bytes:
+        """The picture of a value as a PNG."""
 
 
-def player_frame(value: Any) -> str:
-    """The player of a value in a frame, for notebooks."""
-    return player_page(value)._repr_html_()
+_LOADERS: list[Callable[[], Drawing]] = []
 
 
-def picture(value: Any) -> bytes | None:
-    """The picture of a value as a PNG, for notebooks; None if it holds nothing to draw."""
-    drawn: bytes | None = _drawing().picture_of(value)
-    return drawn
+def register(load: Callable[[], Drawing]) -> None:
+    """Have values shown by what `load` returns; it is called when somebody looks."""
+    _LOADERS[:] = [load]
 
 
-def _drawing() -> Any:
-    # The one import that points up. It is by name: data knows nothing of pictures, for the checks
-    # of types and of imports either, until somebody looks at it.
-    return importlib.import_module("maneuver_automaton.plotting.notebooks")
+class Drawn:
+    """A value with a picture in notebooks."""
+
+    __slots__ = ()
+
+    def _repr_png_(self) -> bytes:
+        return _LOADERS[0]().picture_of(self)
+
+
+class Played(Drawn):
+    """A value with a page that plays it, and a picture where no page can be shown."""
+
+    __slots__ = ()
+
+    def player(self, *, title: str = "") -> Player:
+        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
+        return _LOADERS[0]().player_of(self, title=title)
+
+    def _repr_html_(self) -> str:
+        return self.player()._repr_html_()

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array, vector_text
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import picture
+from maneuver_automaton._display import Drawn
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
 from maneuver_automaton.models.lateral import (
@@ -36,7 +36,7 @@ FITS = 1e-9  # between a course's ends and the reduced states of its trims, over
 
 
 @dataclass(frozen=True, eq=False)
-class Automaton:
+class Automaton(Drawn):
     """Trims of one vehicle, and the maneuvers that join them.
 
     Trims of equal reduced state form one class; a vehicle switches between them at will, by
@@ -119,9 +119,6 @@ class Automaton:
                     f"{float(lateral_acceleration(twists).max()):.4g} m/s^2, need at most the "
                     f"vehicle's max_lateral_acceleration {lateral_limit(self.model):g} m/s^2"
                 )
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
     def _see_from_body(self, model: OnlyTranslated) -> None:
         """Trims and maneuvers that are stated along the world's axes get headings."""

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import SE2, LieGroup, group_of
 from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting
@@ -29,7 +29,7 @@ Primitive: TypeAlias = Trim | Maneuver
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Plan(Played):
     """A word of trims, each with its coasting time, from a start pose.
 
     Between two trims stands a maneuver, or nothing where the vehicle switches at will: `maneuvers`
@@ -460,16 +460,6 @@ class Plan:
     def moved(self, by: LieGroup) -> Plan:
         """A plan of the same word from the start moved by `by`: the law of the project."""
         return replace(self, start=(by @ type(by)(self.start)).pose)
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
 
 def _within(maneuver: Maneuver, since: Array) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, head_of, with_samples_at
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -112,7 +112,7 @@ class FleetStep:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FleetLog:
+class FleetLog(Played):
     """A fleet's closed loop from its begin to where it ended."""
 
     problem: FleetProblem
@@ -128,16 +128,6 @@ class FleetLog:
     counts: dict[str, int] = field(default_factory=dict)
 
     __repr__ = brief
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays all vehicles: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
     @property
     def times(self) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.planning.result import PlanResult
@@ -31,7 +31,7 @@ class Closest(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FleetResult:
+class FleetResult(Played):
     """The answer to a fleet's problem. Who has no plan stands at its start, past which others go.
 
     `results` has the answer of every vehicle by its name: its plan past static obstacles and past
@@ -53,16 +53,6 @@ class FleetResult:
     counts: dict[str, int] = field(default_factory=dict)
 
     __repr__ = brief
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays all vehicles: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
     @property
     def notes(self) -> tuple[str, ...]:

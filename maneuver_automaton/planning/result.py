@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton.audit import Audit, TerminalError
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
@@ -68,7 +68,7 @@ class Alternative:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlanResult:
+class PlanResult(Played):
     """The answer to a problem; without a plan the numbers are None and the tuples empty."""
 
     problem: Problem
@@ -92,16 +92,6 @@ class PlanResult:
     reached: Array | None = None  # (n, 4, 2) squares that the pose never leaves, of that proof
     nodes: Array | None = None  # (n, 4) x, y, heading, cost of what was expanded, if asked for
     notes: tuple[str, ...] = ()  # what was left out or done otherwise, and why: a sentence each
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
     __repr__ = brief
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton.audit import Audit
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import head_of
@@ -134,7 +134,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ClosedLoop:
+class ClosedLoop(Played):
     """A closed loop from its start to where it ended."""
 
     problem: Problem
@@ -190,16 +190,6 @@ class ClosedLoop:
     def solve_s(self) -> Array:
         """Time (n,) that every step took to decide [s]."""
         return np.array([step.solve_s for step in self.steps])
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
 
 def first_part(plan: Plan, until: float) -> Plan:

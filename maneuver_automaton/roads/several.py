@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
@@ -41,7 +41,7 @@ class RoadPair:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RoadFleetResult:
+class RoadFleetResult(Played):
     """Plans of several vehicles on one road, each with its verdict past all others."""
 
     name: str
@@ -66,16 +66,6 @@ class RoadFleetResult:
     def distance_m(self) -> float:
         """Least distance of any two [m]; inf if no two are there at once."""
         return min((one.distance_m for one in self.pairs), default=math.inf)
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
 
 def plan_roads(

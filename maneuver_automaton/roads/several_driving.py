@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
@@ -37,7 +37,7 @@ WORST_FIRST = ("touched", "off_road", "undrivable", "missed", "steps_spent", "re
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RoadFleetDrive:
+class RoadFleetDrive(Played):
     """What several vehicles drove on one road, each with its verdict past all others."""
 
     name: str
@@ -72,16 +72,6 @@ class RoadFleetDrive:
     def distance_m(self) -> float:
         """Least distance of any two [m]; inf if no two were there at once."""
         return min((one.distance_m for one in self.pairs), default=math.inf)
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
 
 def drive_roads(

@@ -9,7 +9,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
-from maneuver_automaton._display import Player, picture, player_frame, player_page
+from maneuver_automaton._display import Played
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.roads.decision import RoadDecision, RoadSettings
@@ -26,7 +26,7 @@ WIDTHS = (100, 400, 0, 1600, 4000)  # 0: driven in closed loop instead
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RoadPlanResult:
+class RoadPlanResult(Played):
     """A plan to a goal and the verdict on it, or why there is none."""
 
     planner: RoadPlanner
@@ -57,16 +57,6 @@ class RoadPlanResult:
             return None
         n, decision = self.decision.lasting, self.decision
         return self.planner.plan_of(decision.states[n], decision.controls[n:], tick=n)
-
-    def player(self, *, title: str = "") -> Player:
-        """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
-        return player_page(self, title=title)
-
-    def _repr_html_(self) -> str:
-        return player_frame(self)
-
-    def _repr_png_(self) -> bytes | None:
-        return picture(self)
 
 
 def plan_road(
