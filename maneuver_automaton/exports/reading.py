@@ -80,7 +80,8 @@ def load_recording(
                 f"{path}: is a closed loop, need --with and the scenario it was driven in"
             )
         return _alone(path, fleet)
-    scenario = load_scenario(beside, case=case, model=model)
+    # Of a road several problems are one scene: those of several vehicles, whichever is read first.
+    scenario = load_scenario(beside, case=case if fleet is None else 0, model=model)
     if isinstance(scenario, RoadScenario):
         if fleet is not None:
             return recording_of(load_road_fleet(path, beside=beside))

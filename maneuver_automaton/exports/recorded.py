@@ -28,13 +28,7 @@ def exported(value: Any, *, model: Model | None = None) -> Recording:
     >>> exported(Plan([1.0, 2.0, 0.5], (), durations=[])).movers[0].end.tolist()
     [1.0, 2.0, 0.5]
     """
-    try:
-        recording = recording_of(value)
-    except TypeError:
-        raise TypeError(
-            f"export: got {type(value).__name__}, in which nobody moves; need a plan or its result,"
-            " a closed loop, a fleet or its loop, or a plan or drive on roads"
-        ) from None
+    recording = recording_of(value)
     if not drivers(recording):
         raise ValueError(f"the result has no plan to write: {recording.reason}")
     if model is None:

@@ -20,6 +20,10 @@ from maneuver_automaton.recording.values import (
 
 def recorded(result: ClosedLoop | Statistics) -> Recording | None:
     """The recording of a closed loop."""
+    if isinstance(result, Statistics):
+        raise TypeError(
+            "recording: got Statistics, which keep no motion of their loops; need one loop"
+        )
     return _loop(result) if isinstance(result, ClosedLoop) else None
 
 
