@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_advancement import free_of_static
 from maneuver_automaton.collision._kernels_moving import free_of_moving
+from maneuver_automaton.collision.arrays import WorldArrays
 from maneuver_automaton.collision.body import Body
-from maneuver_automaton.collision.world import WorldArrays
 
 if TYPE_CHECKING:
     from maneuver_automaton._arrays import Array
