@@ -8,8 +8,8 @@ a whole, so that among solids it may pay more. It knows no bound of the cost to 
 goal. What is measured of the plan is the whole call: search, checks, audit; the median of some
 calls of both. `first` is the first call to a goal of its heading, which has no table of costs
 without obstacles yet; `turned` is the first one after a goal a quarter turn from it, whose table
-serves both where the library looks the same from all four sides; `same tests` is the search of the package without any bound, with its own
-tests.
+serves both where the library looks the same from all four sides; `same tests` is the search of the
+package without any bound, with its own tests.
 """
 
 from __future__ import annotations
@@ -226,8 +226,8 @@ def main(files):
             print(f"{Path(file).name:16} {seed} | {mine} | {peers}", flush=True)
         first, turned, ours, peer, same = sums
         print(
-            f"{Path(file).name:16} sum: {ours:.0f} ms, first calls {first:.0f} ms, turned {turned:.0f} ms, "
-            f"Dijkstra {peer:.0f} ms, with the same tests {same:.0f} ms"
+            f"{Path(file).name:16} sum: {ours:.0f} ms, first calls {first:.0f} ms, "
+            f"turned {turned:.0f} ms, Dijkstra {peer:.0f} ms, with the same tests {same:.0f} ms"
         )
 
 

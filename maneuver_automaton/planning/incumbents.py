@@ -19,8 +19,8 @@ from maneuver_automaton.planning.result import (
     LowerBound,
     PlanResult,
     PlanStatus,
+    Workspace,
 )
-from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import (
@@ -31,7 +31,7 @@ from maneuver_automaton.refinement.fitting import (
     padded,
     with_lasting_coasts,
 )
-from maneuver_automaton.search.inside import stays_inside
+from maneuver_automaton.search.limits import stays_inside
 
 ROUNDING = 1e-12  # relative, of sums of costs
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by

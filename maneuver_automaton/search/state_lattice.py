@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,6 +71,7 @@ class StateLattice(NamedTuple):
     roots: IntArray  # (R, 3) column, row, state
 
 
+_Number = TypeVar("_Number", np.float64, np.int64)
 Frame: TypeAlias = tuple[StateLattice, IntArray]  # seen from it, and there the number of each state
 
 
@@ -331,7 +332,7 @@ def _frames(lattice: StateLattice, directed: int) -> tuple[list[Frame], Array]:
     return frames, least
 
 
-def _turned(places: Array, quarters: int) -> Array:
+def _turned(places: NDArray[_Number], quarters: int) -> NDArray[_Number]:
     """Places (..., 2) turned to the left by some quarter turns, without rounding."""
     for _ in range(quarters % 4):
         places = np.stack([-places[..., 1], places[..., 0]], axis=-1)

@@ -19,8 +19,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import Condition, what_is_hit
 from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
-from maneuver_automaton.planning.result import LowerBound, PlanStatus
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.fitting import COSTLIER, SHORT, with_lasting_coasts
 
