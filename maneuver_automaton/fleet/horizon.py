@@ -31,7 +31,7 @@ from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import Found, Vehicle
 from maneuver_automaton.fleet.vehicles import prepare_vehicles, vehicles_of
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Problem
 
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice_edges import altitude_ranges
+from maneuver_automaton.search.lattice_library import altitude_ranges
 
 STAGES = 8  # into which a climb is cut at most, about, to be an obstacle of one height in each
 THIN = 1e-6  # [m] by which what is flat stands out, either way

@@ -13,9 +13,9 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.limits import outside
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps

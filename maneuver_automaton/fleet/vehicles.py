@@ -9,7 +9,7 @@ from maneuver_automaton.fleet.conflicts import load_meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.vehicle import Vehicle
 from maneuver_automaton.planning.plan import prepare
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.prepared import Prepared
 

@@ -27,8 +27,7 @@ from maneuver_automaton.collision import (
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.many import plan_many_on
 from maneuver_automaton.planning.plan import plan_in, prepare
-from maneuver_automaton.planning.result import PlanResult
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import PlanResult, Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 
 
