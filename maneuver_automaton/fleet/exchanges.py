@@ -7,8 +7,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from maneuver_automaton.fleet.asking import Answer
-from maneuver_automaton.fleet.conflicts import meetings
 from maneuver_automaton.fleet.held import (
     LATER,
     arrival,
@@ -18,11 +16,11 @@ from maneuver_automaton.fleet.held import (
     rejoined,
     resting,
 )
-from maneuver_automaton.fleet.log import Swap
-from maneuver_automaton.fleet.loop_state import Around
-from maneuver_automaton.fleet.moment import Moment
-from maneuver_automaton.fleet.questions import answers_to, question_of, search
-from maneuver_automaton.fleet.vehicle import LONG, QUICK, Found
+from maneuver_automaton.fleet.meetings import meetings
+from maneuver_automaton.fleet.moment import Around, Moment, answers_to, question_of, search
+from maneuver_automaton.fleet.result import Swap
+from maneuver_automaton.fleet.vehicle import LONG, QUICK, OwnPlan
+from maneuver_automaton.fleet.workers import Proposal
 
 WORTH = 1e-6  # share of its cost that another plan saves at least
 AGAIN, AGAIN_LONG = 4, 16  # steps until who has no plan looks again past the same plans
@@ -145,7 +143,7 @@ class Exchanges:
                 now.state.in_vain[k] = around
                 now.state.attempts[k] = now.state.attempts.get(k, 0) + 1
 
-    def _exchanges(self, k: int, base: Found, answer: Answer) -> bool:
+    def _exchanges(self, k: int, base: OwnPlan, answer: Proposal) -> bool:
         """A vehicle exchanges its plan for one that arrives no later; else a group looks for one.
 
         Whether there is one, also if not all agreed to it.
@@ -166,7 +164,7 @@ class Exchanges:
             return self._look_in_group(k, alone)
         return False
 
-    def _look_in_group(self, k: int, alone: Found) -> bool:
+    def _look_in_group(self, k: int, alone: OwnPlan) -> bool:
         """A vehicle and those in its way look for plans whose sum is less."""
         now = self.now
         state = now.state
@@ -189,7 +187,7 @@ class Exchanges:
         """Plans of a group, one after another, exchanged at once if their sum is less."""
         now = self.now
         others = now.expected_by(group[0], but=group)
-        found: dict[int, Found] = {}
+        found: dict[int, OwnPlan] = {}
         for n, j in enumerate(group):
             here = [*others, *found.items()]
             still = [
@@ -204,7 +202,7 @@ class Exchanges:
             found[j] = one
         return self._swap(found)
 
-    def _swap(self, found: dict[int, Found]) -> bool:
+    def _swap(self, found: dict[int, OwnPlan]) -> bool:
         """Exchange plans if these pay and are proven past all that is held now, and each other.
 
         An answer that comes late may be for a plan that was rejoined with other times since: one

@@ -8,16 +8,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from maneuver_automaton.fleet.agreement import Knowledge
-from maneuver_automaton.fleet.conflicts import Course, Encounters, Meeting, meetings
-from maneuver_automaton.fleet.held import (
-    CONTACT,
-    LATER,
-    arrival,
-    left_to_pay,
-    why_not_free,
-)
-from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.held import CONTACT, LATER, arrival, left_to_pay, why_not_free
+from maneuver_automaton.fleet.meetings import Encounters, Meeting, meetings
+from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation, Swap
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan
 from maneuver_automaton.fleet.verdict import nearest
 
 Frame = tuple[float, float, float]
@@ -38,8 +33,8 @@ class Before:
     @classmethod
     def of(
         cls,
-        vehicles: Sequence[Vehicle],
-        held: Mapping[int, Found],
+        vehicles: Sequence[FleetMember],
+        held: Mapping[int, OwnPlan],
         time: float,
         last: FleetStep | None,
     ) -> Before:
@@ -57,8 +52,8 @@ class After:
     """What is held when it ends."""
 
     time: float
-    held: Mapping[int, Found]
-    courses: Mapping[int, Course]  # what is left of those that are looked at
+    held: Mapping[int, OwnPlan]
+    courses: Mapping[int, FleetCourse]  # what is left of those that are looked at
     off: Mapping[int, float]  # [m] beside the plans
     disturbed: set[int]  # who has another plan not by an exchange of its own
     in_group: set[int]  # who has another one by an exchange of several at once
@@ -70,7 +65,7 @@ class After:
 
 
 def broken(
-    vehicles: Sequence[Vehicle], agreement: Knowledge, before: Before, after: After
+    vehicles: Sequence[FleetMember], agreement: Knowledge, before: Before, after: After
 ) -> Iterator[FleetViolation]:
     """The guarantees that a step broke."""
     names = [one.name for one in vehicles]
@@ -115,7 +110,7 @@ def _met(after: After) -> list[Meeting]:
 
 
 def _costlier(
-    vehicles: Sequence[Vehicle], before: Before, after: After
+    vehicles: Sequence[FleetMember], before: Before, after: After
 ) -> Iterator[FleetViolation]:
     """Whose value rose, or who arrives later, and whether the sum did."""
     sum_now = sum_before = 0.0
@@ -161,16 +156,16 @@ class Gap(NamedTuple):
 
     distance: float  # [m]
     nearest: Meeting | None  # that comes within 2 cm more; None: nobody is looked at so far out
-    held: Mapping[int, Course]  # the courses of which it is proven
+    held: Mapping[int, FleetCourse]  # the courses of which it is proven
 
 
 def gap_between(
-    courses: Mapping[int, Course],
+    courses: Mapping[int, FleetCourse],
     *,
     keep: float,
     frame: Frame,
     time: float = -math.inf,
-    held: Mapping[int, Course] | None = None,
+    held: Mapping[int, FleetCourse] | None = None,
     last: Gap | None = None,
 ) -> Gap:
     """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
@@ -179,7 +174,7 @@ def gap_between(
 
     Parameters
     ----------
-    courses : mapping of int to Course
+    courses : mapping of int to FleetCourse
         What is left of those that are held.
     keep : float
         Distance to keep [m].
@@ -187,7 +182,7 @@ def gap_between(
         What places are counted from.
     time : float
         Now [s].
-    held : mapping of int to Course, optional
+    held : mapping of int to FleetCourse, optional
         What is held; what is left of it if omitted.
     last : Gap, optional
         Of a step before. It still holds if those that hold another plan since keep it too, and the
@@ -227,11 +222,11 @@ def gap_between(
 
 def _still_holds(
     last: Gap,
-    courses: Mapping[int, Course],
+    courses: Mapping[int, FleetCourse],
     *,
     frame: Frame,
     time: float,
-    held: Mapping[int, Course],
+    held: Mapping[int, FleetCourse],
 ) -> bool:
     """Whether a distance is what was proven a step before."""
     fresh = {k for k, one in held.items() if last.held.get(k) is not one}

@@ -20,19 +20,123 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Agreement, Knowledge, Lossless, Lost
-from maneuver_automaton.fleet.arriving import tube_of
-from maneuver_automaton.fleet.asking import Workers
-from maneuver_automaton.fleet.held import given_up
-from maneuver_automaton.fleet.horizon_step import step_of
-from maneuver_automaton.fleet.log import FleetStep
-from maneuver_automaton.fleet.loop_state import LoopSettings, LoopState
-from maneuver_automaton.fleet.moment import Moment
+from maneuver_automaton.fleet.exchanges import Exchanges
+from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
+from maneuver_automaton.fleet.held import arrival, given_up, tube_of
+from maneuver_automaton.fleet.moment import MANY, LoopSettings, LoopState, Moment
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
-from maneuver_automaton.fleet.vehicles import prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.result import FleetGuarantee, FleetResult, FleetStep, FleetViolation
+from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
+
+
+def logged(now: Moment, before: Before, exchanges: Exchanges, refused: Sequence[int]) -> FleetStep:
+    """All of the step, and the guarantees that it broke."""
+    state = now.state
+    fresh, few = _fresh(now), len(now.held) <= MANY
+    looked_at = now.held if few else {k for j, near in fresh.items() for k in (j, *near)}
+    courses = {k: now.left_of(now.held[k]) for k in looked_at}
+    after = After(
+        time=now.time,
+        held=now.held,
+        courses=courses,
+        off=now.off,
+        disturbed=now.disturbed,
+        in_group=exchanges.in_group,
+        swaps=exchanges.swaps,
+        tube_m=state.settings.tube_m,
+        keep=now.keep,
+        frame=now.frame,
+        fresh=fresh,
+    )
+    said = list(broken(now.vehicles, state.agreement, before, after))
+    now.violations += said
+    _note_proven(now, said)
+    gap = now.keep
+    if few:
+        held = {k: one.course for k, one in now.held.items()}
+        state.gap = gap_between(
+            courses, keep=now.keep, frame=now.frame, time=now.time, held=held, last=state.gap
+        )
+        gap = state.gap.distance
+    if state.crossing:
+        gap = 0.0
+    names = [one.name for one in now.vehicles]
+    plans = {names[k]: one.plan for k, one in now.held.items()}
+    return FleetStep(
+        number=now.number,
+        time=now.time,
+        poses={names[k]: now.poses[k] for k in now.held},
+        plans=plans,
+        driven={names[k]: now.beside.get(k) or now.from_here(k).plan for k in now.held},
+        values={names[k]: now.left_to_pay(k) for k in now.held},
+        arrivals={names[k]: arrival(one) for k, one in now.held.items()},
+        off_plan={names[k]: now.off[k] for k in now.held},
+        arrived=tuple(names[k] for k in sorted(state.arrived & set(now.held))),
+        swaps=tuple(exchanges.swaps),
+        asked=tuple(names[k] for k in exchanges.asked),
+        void=tuple(names[k] for k in now.void),
+        refused=tuple(names[k] for k in refused),
+        silent=tuple(names[k] for k in sorted(state.silent & set(now.held))),
+        gap_m=gap,
+        violations=tuple(now.violations),
+        solve_s=now.budget.elapsed,
+    )
+
+
+def _fresh(now: Moment) -> dict[int, list[int]]:
+    """Who holds a plan that is not proven yet, and whose plans may come near it."""
+    held, proven = now.held, now.state.proven
+    fresh = {}
+    for k, found in held.items():
+        if proven.get(k) is not found.course:
+            others = [j for j in held if j != k]
+            near = now.nearby.near(found.course, [held[j].course for j in others], keep=now.keep)
+            fresh[k] = [j for j, is_near in zip(others, near, strict=True) if is_near]
+    return fresh
+
+
+def _note_proven(now: Moment, said: Sequence[FleetViolation]) -> None:
+    """Which plans are proven for all later times, and which pairs are not apart."""
+    state, numbers = now.state, {one.name: one.number for one in now.vehicles}
+    unproven = {
+        numbers[name]
+        for one in said
+        if one.guarantee in {FleetGuarantee.APART, FleetGuarantee.STILL}
+        for name in one.names
+    }
+    state.proven = {k: one.course for k, one in now.held.items() if k not in unproven}
+    state.crossing = {
+        (min(pair), max(pair))
+        for one in said
+        if one.guarantee is FleetGuarantee.APART
+        for pair in [[numbers[name] for name in one.names]]
+    }
+
+
+def step_of(now: Moment, broken_down: set[int]) -> FleetStep:
+    """The step from begin to end, which changes the state of its loop; some have broken down."""
+    agreement, held = now.state.agreement, now.held
+    for k in [k for k in held if k not in now.poses]:
+        del held[k]
+    refused = let_in(now)
+    before = Before.of(now.vehicles, held, now.time, now.state.last)
+    agreement.begin(now.number, held)
+    rejoin(now)
+    stop(now, broken_down & set(held))
+    plan_anew(now)
+    note_arrivals(now)
+    exchanges = Exchanges(now)
+    exchanges.exchange_what_is_due()
+    exchanges.go_on()
+    exchanges.exchange()
+    done = now.budget.elapsed
+    log = logged(now, before, exchanges, refused)
+    now.state.note_end(now.budget.elapsed - min(done, now.searches.seconds))
+    return log
 
 
 class FleetHorizon:
@@ -238,7 +342,7 @@ class FleetHorizon:
         key = tuple(map(id, problem.obstacles))
         kept = self._workspaces.setdefault(key, (problem.obstacles, new.workspace))[1]
         own = replace(new.problem, obstacles=kept.obstacles)
-        state.vehicles[k] = Vehicle(k, name, own, old.leaves, old.grown, kept)
+        state.vehicles[k] = FleetMember(k, name, own, old.leaves, old.grown, kept)
         state.arrived.discard(k)
         for known in (state.settled, state.in_vain, state.due, state.attempts, state.gains):
             known.pop(k, None)
@@ -267,7 +371,7 @@ class FleetHorizon:
         return dict(sorted(poses.items()))
 
 
-def _plans_of(first: FleetResult | None, vehicles: Sequence[Vehicle]) -> dict[int, Found]:
+def _plans_of(first: FleetResult | None, vehicles: Sequence[FleetMember]) -> dict[int, OwnPlan]:
     """The plans of an answer, by number."""
     if first is None:
         return {}
@@ -277,7 +381,7 @@ def _plans_of(first: FleetResult | None, vehicles: Sequence[Vehicle]) -> dict[in
         if result is None or result.plan is None:
             continue
         cost = one.problem.cost_of(result.plan)
-        known[one.number] = Found(
+        known[one.number] = OwnPlan(
             result.plan, cost, result.goal_index or 0, one.course_of(result.plan)
         )
     return known

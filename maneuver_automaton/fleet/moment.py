@@ -4,30 +4,101 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+
+import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.agreement import Knowledge
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.guarantees import Gap
 from maneuver_automaton.fleet.held import (
     distance_to_obstacles,
+    is_over,
     left_to_pay,
     off_plan,
     rest_of_plan,
     why_not_free,
 )
-from maneuver_automaton.fleet.log import FleetGuarantee, FleetViolation
-from maneuver_automaton.fleet.loop_state import LoopState
-from maneuver_automaton.fleet.nearby import Nearby
-from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.meetings import Nearby, meetings
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation
+from maneuver_automaton.fleet.vehicle import QUICK, FleetMember, OwnPlan
+from maneuver_automaton.fleet.workers import PlanRequest, Proposal, ToPass, Workers, answered
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT
+
+FADES, MORE = 0.97, 1.15  # of the time that is kept for the end of a step
+AT_FIRST, MOST_KEPT = 0.5, 0.6  # shares of a step's limit
+
+Around = tuple[int, int, int]  # how many are there, and how often plans were exchanged
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LoopSettings:
+    """How a fleet's loop is closed."""
+
+    step: float  # delta [s]
+    margin: float  # that another plan costs less
+    tube_m: float
+    time_limit: float  # [s] per step
+    swaps_per_step: int | None
+    at_once: int
+    group_size: int
+    delay_steps: int
+
+
+@dataclass(slots=True, eq=False)
+class LoopState:
+    """What a fleet's loop knows from step to step; vehicles by number."""
+
+    fleet: FleetProblem
+    settings: LoopSettings
+    vehicles: list[FleetMember]
+    agreement: Knowledge
+    first: dict[int, OwnPlan]  # plans for those that enter
+    held: dict[int, OwnPlan] = field(default_factory=dict)
+    arrived: set[int] = field(default_factory=set)
+    broken: set[int] = field(default_factory=set)
+    versions: dict[int, int] = field(default_factory=dict)  # how often a plan was exchanged
+    # Plans are the same as long as they are only driven, or rejoined at nearly the same cost.
+    lineage: dict[int, int] = field(default_factory=dict)
+    settled: dict[int, int] = field(default_factory=dict)  # no plan alone is cheaper than this one
+    in_vain: dict[int, Around] = field(default_factory=dict)  # past these nothing was found
+    attempts: dict[int, int] = field(default_factory=dict)  # in vain, since its last exchange
+    gains: dict[int, float] = field(default_factory=dict)  # what the way alone would have saved
+    due: dict[int, tuple[int, OwnPlan, OwnPlan]] = field(
+        default_factory=dict
+    )  # when, what, for what
+    workers: Workers | None = None
+    silent: set[int] = field(default_factory=set)  # whose workers do not answer any more
+    stopped: dict[int, OwnPlan] = field(default_factory=dict)  # what was left of their void plans
+    crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
+    assigned: set[int] = field(default_factory=set)  # who got another problem since the last step
+    proven: dict[int, FleetCourse] = field(default_factory=dict)  # apart from all, and free
+    gap: Gap | None = None  # that was proven in the last step
+    kept_s: float = field(init=False)  # of a step's limit for what follows its searches
+    last: FleetStep | None = None
+
+    def __post_init__(self) -> None:
+        self.kept_s = AT_FIRST * self.settings.time_limit
+
+    def note_end(self, seconds: float) -> None:
+        """A step took so much longer than its searches might [s]: that is kept in the next ones.
+
+        As much as the last steps took, and a little more; at most a share of the limit.
+        """
+        kept = max(FADES * self.kept_s, MORE * seconds)
+        self.kept_s = min(kept, MOST_KEPT * self.settings.time_limit)
+
 
 ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
 
-Other = tuple[int, Found]  # a plan that another one may drive, and who that is
+Other = tuple[int, OwnPlan]  # a plan that another one may drive, and who that is
 
 
 class Moment:
@@ -63,9 +134,11 @@ class Moment:
         # stands nearer to an obstacle than its own.
         self.pressed: dict[tuple[int, int], float] = {}
         self.near: dict[int, float] = {}
-        self._left: dict[int, tuple[Found, Course]] = {}  # what is left of courses, by identity
+        self._left: dict[
+            int, tuple[OwnPlan, FleetCourse]
+        ] = {}  # what is left of courses, by identity
 
-    def left_of(self, found: Found) -> Course:
+    def left_of(self, found: OwnPlan) -> FleetCourse:
         """What is left of a plan's course."""
         known = self._left.get(id(found))
         if known is None:
@@ -77,7 +150,7 @@ class Moment:
         return self.pressed.get((min(k, j), max(k, j)), self.keep)
 
     def first_meeting(
-        self, k: int, found: Found, others: Collection[Other], most: float = math.inf
+        self, k: int, found: OwnPlan, others: Collection[Other], most: float = math.inf
     ) -> float:
         """When a plan first comes too near to one of others [s]; inf if never.
 
@@ -94,7 +167,7 @@ class Moment:
             first = min([first, *(row.time for row in met)])
         return first
 
-    def is_proven(self, k: int, found: Found, others: Collection[Other]) -> bool:
+    def is_proven(self, k: int, found: OwnPlan, others: Collection[Other]) -> bool:
         """Whether a plan keeps apart from others, and is free of what is not of the fleet."""
         if self.first_meeting(k, found, others) < math.inf:
             return False
@@ -111,7 +184,7 @@ class Moment:
         names = tuple(self.vehicles[k].name for k in numbers)
         self.violations.append(FleetViolation(guarantee, names, reason))
 
-    def hold(self, k: int, found: Found) -> None:
+    def hold(self, k: int, found: OwnPlan) -> None:
         """Another plan is held, whatever the others say to it."""
         self.held[k] = found
         self.beside.pop(k, None)
@@ -123,7 +196,7 @@ class Moment:
         self.off[k] = self.offset_from(k, found)
         self.state.agreement.announce(k, found)
 
-    def offset_from(self, k: int, found: Found) -> float:
+    def offset_from(self, k: int, found: OwnPlan) -> float:
         """How far a vehicle is beside a plan [m]; 0 if by no more than rounding."""
         pose = self.poses[k]
         off = off_plan(self.vehicles[k], found, self.time, pose)
@@ -143,7 +216,7 @@ class Moment:
             least = min(distance_to_obstacles(vehicle, here), vehicle.problem.margin)
             self.near[k] = max(least - ROUNDING, 0.0)
 
-    def standing(self, k: int) -> Course:
+    def standing(self, k: int) -> FleetCourse:
         """A vehicle as it is where its plans begin, for ever."""
         course = self.held[k].course
         poses = [way.at(self.time) for way in course.motions]
@@ -153,7 +226,7 @@ class Moment:
         ways = tuple(Motion([self.time], [pose]) for pose in poses)
         return replace(course, motions=ways, until=math.inf)
 
-    def agreed(self, k: int, found: Found) -> bool:
+    def agreed(self, k: int, found: OwnPlan) -> bool:
         """Whether all others agree to a plan: it is proven past the one that each of them holds."""
         past = self.state.agreement.others_of(k)
         return self.state.agreement.agree(
@@ -172,7 +245,7 @@ class Moment:
         on_it = self.off[k] <= self.state.settings.tube_m
         return self.held[k].plan.pose_at(self.time) if on_it else self.poses[k]
 
-    def from_here(self, k: int, pose: Array | None = None) -> Found:
+    def from_here(self, k: int, pose: Array | None = None) -> OwnPlan:
         """What a vehicle holds, if it begins at a pose, or where it was measured."""
         vehicle, found = self.vehicles[k], self.held[k]
         rest = rest_of_plan(vehicle, found, self.time)
@@ -183,7 +256,83 @@ class Moment:
         """Cost of what is left of the plan that a vehicle holds."""
         return left_to_pay(self.vehicles[k], self.held[k], self.time)
 
-    def how_many_near(self, k: int, found: Found) -> int:
+    def how_many_near(self, k: int, found: OwnPlan) -> int:
         """How many may come near a vehicle that drives a plan."""
         others = [one.course for j, one in self.held.items() if j != k]
         return sum(self.nearby.near(found.course, others, keep=self.keep))
+
+
+MANY = 40  # others that a search looks at; all that are proven
+AWAY = 0.5  # of its way, from which on others are not looked at if there are many
+
+
+def search(
+    now: Moment,
+    k: int,
+    base: OwnPlan,
+    others: Collection[Other],
+    known: float,
+    *,
+    most: int = QUICK,
+) -> Proposal:
+    """Another plan past the others, and the way alone; None for what does not cost less."""
+    (answer,) = answers_to(now, [question_of(now, k, base, others, known, most=most)])
+    return answer
+
+
+def question_of(
+    now: Moment,
+    k: int,
+    base: OwnPlan,
+    others: Collection[Other],
+    known: float,
+    *,
+    most: int = QUICK,
+    room: bool = True,
+) -> PlanRequest:
+    """What a vehicle is asked for; without room at its goal, noise may lead it out there."""
+    settings = now.state.settings
+    goals = now.vehicles[k].problem.goals
+    if is_over(base, now.time) and any(within(base.plan.end, goal) for goal in goals):
+        base = now.from_here(k)  # its plan says it is there, but it was measured elsewhere
+    return PlanRequest(
+        number=k,
+        base=base,
+        time=now.time,
+        after=0.0 if k in now.void else settings.delay_steps * settings.step,
+        others=tuple(ToPass(j, one, now.keep_of(k, j)) for j, one in _seen(now, k, base, others)),
+        between=now.keep,
+        known=known,
+        most=most,
+        tube_m=settings.tube_m if room else 0.0,
+        keep=now.near.get(k, math.inf),
+    )
+
+
+def _seen(now: Moment, k: int, base: OwnPlan, others: Collection[Other]) -> Collection[Other]:
+    """Of many others those that may come nearest to where a vehicle is, drives and wants to go.
+
+    A plan that is found past these alone is proven past all.
+    """
+    if len(others) <= MANY:
+        return others
+    courses = [one.course for _, one in others]
+    low, high = np.split(now.nearby.box_of(base.course), 2)
+    for goal in now.vehicles[k].problem.goals:
+        low, high = np.minimum(low, goal.pose[:2]), np.maximum(high, goal.pose[:2])
+    gaps = now.nearby.gaps(np.concatenate([low, high]), courses)
+    nearest_first = np.argsort(gaps, kind="stable")[:MANY].tolist()
+    rows = list(others)
+    return [rows[n] for n in sorted(nearest_first) if gaps[n] <= AWAY * (high - low).max()]
+
+
+def answers_to(now: Moment, questions: Sequence[PlanRequest]) -> list[Proposal]:
+    """The answers to questions: of workers, or else found here."""
+    if now.state.workers is None:
+        return [
+            answered(now.vehicles[one.number], one, now.searches, now.left_of) for one in questions
+        ]
+    asked = [one for one in questions if one.number not in now.state.silent]
+    found = dict(zip(map(id, asked), now.state.workers.ask(asked, now.searches), strict=True))
+    now.state.silent |= {one.number for one in asked if found[id(one)] is None}
+    return [found.get(id(one)) or Proposal(None, None) for one in questions]

@@ -22,7 +22,7 @@ from maneuver_automaton.fleet.held import (
     resting,
     stopping,
 )
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.vehicle import vehicles_of
 from tests.inertia import car_automaton, unicycle_automaton
 
 TUBE = 0.05  # [m]

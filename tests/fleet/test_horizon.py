@@ -15,18 +15,12 @@ from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
 from maneuver_automaton.fleet.agreement import Agreement
-from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
-from maneuver_automaton.fleet.held import (
-    left_to_pay,
-    off_plan,
-    proposal,
-    rest_of_plan,
-    resting,
-)
+from maneuver_automaton.fleet.held import left_to_pay, off_plan, proposal, rest_of_plan, resting
+from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.moment import Moment
-from maneuver_automaton.fleet.vehicle import Found
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
 from maneuver_automaton.groups import SE2
 from tests.fleet.robots import (
     at_rest,
@@ -227,7 +221,7 @@ def found_on(vehicle, *, cost=2.0, start=(0.0, 0.0, 0.0), duration=2.0):
     """A robot's plan straight on."""
     trim = vehicle.problem.automaton["on"]
     plan = ma.Plan(start, (trim,), durations=[duration])
-    return Found(plan, cost, 0, vehicle.course_of(plan))
+    return OwnPlan(plan, cost, 0, vehicle.course_of(plan))
 
 
 def after_of(held, *, time=0.0, swaps=(), off=None, keep=0.1):
@@ -339,7 +333,7 @@ def test_a_gap_that_still_holds_is_not_measured_again():
     assert gap_of(courses, time=before, last=proven).nearest is proven.nearest
     assert gap_of(courses, time=after, last=proven).nearest is not proven.nearest
     # Who holds another plan is looked at, and so is what is left where one of the nearest is gone.
-    third = Course(courses[0].shapes, (Motion([0.0], [[0.0, -0.9, 0.0]]),))
+    third = FleetCourse(courses[0].shapes, (Motion([0.0], [[0.0, -0.9, 0.0]]),))
     far = replace(third, motions=(Motion([0.0], [[0.0, -9.0, 0.0]]),))
     near = gap_of({**courses, 2: third}, time=before, last=proven)
     assert near.distance == pytest.approx(0.3, abs=0.02)
@@ -385,7 +379,7 @@ def test_how_far_a_body_is_off_its_plan():
 
 def test_what_is_left_of_a_course():
     motion = Motion([0.0, 2.0, 3.0], [[0, 0, 0], [2, 0, 0], [2, 0, 1.0]], [[1, 0, 0], [0, 0, 1]])
-    course = Course(((Disc(0.3),),), (motion,))
+    course = FleetCourse(((Disc(0.3),),), (motion,))
     for time in (0.0, 0.7, 2.0, 2.5, 3.0, 4.0):
         (left,) = course.after(time).motions
         assert left.time[0] == pytest.approx(time)
@@ -395,7 +389,11 @@ def test_what_is_left_of_a_course():
 
 @pytest.mark.parametrize("first", [0, 1])
 def test_who_begins_later_stands_at_its_start_until_then(first):
-    passing = Course(((Disc(0.3),),), (Motion([0.0, 4.0], [[-2, 0, 0], [2, 0, 0]], [[1, 0, 0]]),))
-    later = Course(((Disc(0.3),),), (Motion([9.0, 10.0], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0]]),))
+    passing = FleetCourse(
+        ((Disc(0.3),),), (Motion([0.0, 4.0], [[-2, 0, 0], [2, 0, 0]], [[1, 0, 0]]),)
+    )
+    later = FleetCourse(
+        ((Disc(0.3),),), (Motion([9.0, 10.0], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0]]),)
+    )
     (met,) = meetings({first: passing, 1 - first: later}, keep=0.0)
     assert met.time == pytest.approx(1.4, abs=1e-3)
