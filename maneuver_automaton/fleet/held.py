@@ -24,11 +24,10 @@ from maneuver_automaton.automaton.cutting import (
     tail_of,
     with_samples_at,
 )
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import Obstacle, Shape
+from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -289,45 +288,7 @@ def _standing(rest: Plan, lasting: float) -> Plan:
     return Plan(rest.start, (trim,), durations=[lasting], start_time=rest.start_time)
 
 
-def proposal(
-    vehicle: FleetMember,
-    found: OwnPlan,
-    *,
-    time: float,
-    after: float,
-    others: list[Obstacle],
-    budget: Budget,
-    known: float,
-    most: int,
-    tube_m: float = 0.0,
-    keep: float = math.inf,
-) -> tuple[OwnPlan | None, OwnPlan | None]:
-    """Another plan past the others that costs less than `known`, and the way alone, if that does.
-
-    Both from a time on, with what is committed. They keep the vehicle's margin, or a distance [m]
-    that is less, and end where it arrives from anywhere in its tube.
-    """
-    head, problem = onward(vehicle, found, time, after)
-    if problem is None:
-        return None, None
-    problem = with_room(problem, tube_m)
-    if keep < problem.margin:
-        problem = replace(problem, margin=keep)
-    there = FleetMember(
-        vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
-    )
-    there.plan_alone(budget, bounded=False)
-    spent = 0.0 if head is None else vehicle.problem.cost_of(head)
-    if there.alone is None or not there.alone.cost + spent < known:
-        return None, None
-    alone = _after(vehicle, head, there.alone)
-    if budget.is_over:
-        return None, alone
-    other = there.past(others, budget, most=most, known=known - spent)
-    return None if other is None else _after(vehicle, head, other), alone
-
-
-def _after(vehicle: FleetMember, head: Plan | None, found: OwnPlan) -> OwnPlan:
+def after_head(vehicle: FleetMember, head: Plan | None, found: OwnPlan) -> OwnPlan:
     """What is committed, then a plan from its end."""
     if head is None:
         return found

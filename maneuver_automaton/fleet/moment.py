@@ -27,7 +27,7 @@ from maneuver_automaton.fleet.meetings import Nearby, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation
 from maneuver_automaton.fleet.vehicle import QUICK, FleetMember, OwnPlan
-from maneuver_automaton.fleet.workers import PlanRequest, Proposal, ToPass, Workers, answered
+from maneuver_automaton.fleet.workers import PlanRequest, Proposal, Terms, ToPass, Workers, answered
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT
@@ -295,18 +295,17 @@ def question_of(
     goals = now.vehicles[k].problem.goals
     if is_over(base, now.time) and any(within(base.plan.end, goal) for goal in goals):
         base = now.from_here(k)  # its plan says it is there, but it was measured elsewhere
-    return PlanRequest(
-        number=k,
-        base=base,
+    terms = Terms(
         time=now.time,
         after=0.0 if k in now.void else settings.delay_steps * settings.step,
-        others=tuple(ToPass(j, one, now.keep_of(k, j)) for j, one in _seen(now, k, base, others)),
         between=now.keep,
         known=known,
         most=most,
         tube_m=settings.tube_m if room else 0.0,
         keep=now.near.get(k, math.inf),
     )
+    passed = tuple(ToPass(j, one, now.keep_of(k, j)) for j, one in _seen(now, k, base, others))
+    return PlanRequest(k, base, passed, terms)
 
 
 def _seen(now: Moment, k: int, base: OwnPlan, others: Collection[Other]) -> Collection[Other]:

@@ -1,12 +1,14 @@
-"""Who does the work of a fleet: this process, others beside it, or a worker for each vehicle."""
+"""Who does the work of a fleet: this process, others beside it, or a worker for each vehicle.
+
+Whoever works keeps the vehicles, so that only plans travel, as numbers of the automaton. Who knows
+the fleet's problem makes the same plan of them, to the last bit: the answers are the same anywhere.
+"""
 
 from __future__ import annotations
 
-import io
 import math
 import os
 import pickle
-import struct
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
@@ -20,83 +22,75 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.fleet.coordination import HeldPlans, Turns
 from maneuver_automaton.fleet.courses import FleetCourse
-from maneuver_automaton.fleet.held import proposal
+from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
 from maneuver_automaton.planning.result import LowerBound
-from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.words.word import Word
 
-WORD, WHOLE = 0, 1  # by numbers of the library, or all of it where it is not of the library alone
-NONE = 0xFFFF  # no maneuver between two trims
-HEAD = struct.Struct("<BBHHd")  # kind, components of a pose, trims, number of the goal, cost
-PIECE = struct.Struct("<Hd")  # number of the trim, duration [s]
+KEPT = 2  # fleets whose vehicles a process keeps
+LEAST_LIMIT = 1e-3  # [s] a limit is positive
+PIECES = 2  # sent to each process at a time, so that none waits long for another
+REFERENCE = 12  # bytes that name a plan that is known already: number of the vehicle, and of it
+SETTINGS = 64  # bytes of the other numbers of a request
 
 
 def encoded(vehicle: FleetMember, found: OwnPlan) -> bytes:
-    """A plan in few bytes.
+    """A plan in some 200 bytes: start, word, durations; all of it if not of the library alone.
 
     Examples
     --------
     >>> from maneuver_automaton import Automaton, Disc, FleetProblem, Problem, Unicycle
     >>> from maneuver_automaton.fleet.held import resting
-    >>> from maneuver_automaton.fleet.vehicle import vehicles_of
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0)})
     >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
     >>> (vehicle,) = vehicles_of(FleetProblem([there]))
     >>> said = encoded(vehicle, resting(vehicle, [1.0, 2.0, 3.0], 0.5))
-    >>> len(said), decoded(vehicle, said).plan.start.tolist()
-    (57, [1.0, 2.0, 3.0])
+    >>> len(said) < 100, decoded(vehicle, said).plan.start.tolist()
+    (True, [1.0, 2.0, 3.0])
     """
-    plan, automaton = found.plan, vehicle.problem.automaton
-    trims = {id(one): n for n, one in enumerate(automaton.trims)}
-    maneuvers = {id(one): n for n, one in enumerate(automaton.maneuvers)}
-    known = all(id(one) in trims for one in plan.trims) and all(
-        one is None or id(one) in maneuvers for one in plan.maneuvers
-    )
-    kind = WORD if known else WHOLE
-    head = HEAD.pack(kind, plan.start.size, len(plan.trims), found.goal_index, found.cost)
-    stays = struct.pack("<B", found.course.until == math.inf)
-    if kind == WHOLE:
-        return head + stays + pickle.dumps(plan)
-    start = struct.pack(f"<{plan.start.size + 1}d", *plan.start, plan.start_time)
-    pieces = b"".join(
-        PIECE.pack(trims[id(trim)], lasting)
-        for trim, lasting in zip(plan.trims, plan.durations.tolist(), strict=True)
-    )
-    between = [NONE if one is None else maneuvers[id(one)] for one in plan.maneuvers]
-    return head + stays + start + pieces + struct.pack(f"<{len(between)}H", *between)
+    plan = found.plan
+    numbers = {id(one): n for n, one in enumerate(_primitives(vehicle))}
+    rows = [numbers.get(id(one), -1) for one in (*plan.trims, *plan.maneuvers)]
+    word: Any = plan
+    if -1 not in rows:
+        parts = plan.start, np.array(rows, dtype=np.uint32), plan.durations
+        word = plan.start_time, len(plan.trims), *(one.tobytes() for one in parts)
+    stays = found.course.until == math.inf
+    return pickle.dumps((word, found.cost, found.goal_index, stays), pickle.HIGHEST_PROTOCOL)
 
 
 def decoded(vehicle: FleetMember, message: bytes) -> OwnPlan:
     """The plan of a message; a ValueError if it is none."""
-    automaton = vehicle.problem.automaton
-    try:
-        kind, dof, count, goal_index, cost = HEAD.unpack_from(message)
-        at = HEAD.size
-        (stays,) = struct.unpack_from("<B", message, at)
-        at += 1
-        if kind == WHOLE:
-            plan = pickle.loads(message[at:])  # of our own making, over a channel of our own
-        else:
-            *start, begin = struct.unpack_from(f"<{dof + 1}d", message, at)
-            at += 8 * (dof + 1)
-            pieces = [PIECE.unpack_from(message, at + n * PIECE.size) for n in range(count)]
-            at += count * PIECE.size
-            between = struct.unpack_from(f"<{(len(message) - at) // 2}H", message, at)
-            plan = Plan(
-                np.array(start),
-                tuple(automaton.trims[number] for number, _ in pieces),
-                durations=[lasting for _, lasting in pieces],
-                maneuvers=tuple(None if n == NONE else automaton.maneuvers[n] for n in between),
-                start_time=begin,
-            )
-    except (struct.error, IndexError) as error:
+    try:  # of our own making, over a channel of our own
+        plan, cost, goal_index, stays = pickle.loads(message)
+    except (pickle.UnpicklingError, EOFError) as error:
         raise ValueError(f"plan of {vehicle.name!r}: a message is cut off ({error})") from error
+    if not isinstance(plan, Plan):
+        begin, count, start, rows, durations = plan
+        known = _primitives(vehicle)
+        word = tuple(known[n] for n in np.frombuffer(rows, dtype=np.uint32).tolist())
+        times = np.frombuffer(durations)
+        plan = Plan(
+            np.frombuffer(start),
+            word[:count],
+            durations=times,
+            maneuvers=word[count:],
+            start_time=begin,
+        )
     course = vehicle.course_of(plan)
     if stays and course.until < math.inf:
         course = replace(course, until=math.inf)
     return OwnPlan(plan, cost, goal_index, course)
+
+
+def _primitives(vehicle: FleetMember) -> tuple[Any, ...]:
+    """Trims and maneuvers by number, and None for a switch."""
+    automaton = vehicle.problem.automaton
+    return (*automaton.trims, *automaton.maneuvers, None)
+
+
+# -- a loop's vehicles that look for better plans
 
 
 class ToPass(NamedTuple):
@@ -107,20 +101,26 @@ class ToPass(NamedTuple):
     keep: float
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Terms(NamedTuple):
+    """The numbers of a request."""
+
+    time: float  # [s]
+    after: float  # [s] that the vehicle drives on with what it holds
+    between: float  # [m] that any two vehicles keep
+    known: float  # what another plan must cost less than
+    most: int  # expansions
+    tube_m: float  # that the vehicle may be beside its plan
+    keep: float  # [m] from obstacles, if that is less than its margin
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PlanRequest:
     """What a vehicle is asked for: a plan past what the others may drive, below a cost."""
 
     number: int
     base: OwnPlan  # what it drives
-    time: float  # [s]
-    after: float  # [s] that it drives on with it
     others: tuple[ToPass, ...]
-    between: float  # [m] that any two vehicles keep
-    known: float  # what it must cost less than
-    most: int  # expansions
-    tube_m: float  # that the vehicle may be beside its plan
-    keep: float  # [m] from obstacles, if that is less than its margin
+    terms: Terms
 
     __repr__ = brief
 
@@ -145,46 +145,51 @@ class Workers(Protocol):
 
 def answered(
     vehicle: FleetMember,
-    question: PlanRequest,
+    request: PlanRequest,
     budget: Budget,
     left_of: Callable[[OwnPlan], FleetCourse],
 ) -> Proposal:
-    """The answer of a vehicle; `left_of` says what is left of a plan's course."""
-    seen: list[Obstacle] = []
-    keep = question.keep
-    for _, one, own in question.others:
+    """Another plan past the others that costs less, and the way alone, if that does.
+
+    Both from a time on, with what is committed. They keep the vehicle's margin, or a distance [m]
+    that is less, and end where it arrives from anywhere in its tube. `left_of` says what is left of
+    a plan's course.
+    """
+    terms, keep = request.terms, request.terms.keep
+    others: list[Obstacle] = []
+    for _, one, own in request.others:
         course = left_of(one)
-        if own < question.between:  # it is seen smaller, so that there is a way out
+        if own < terms.between:  # it is seen smaller, so that there is a way out
             keep = min(keep, own)
-            grown = max(course.grown - (question.between - own), 0.0)
-            course = replace(course, grown=grown)
-        seen += course.obstacles
-    found, alone = proposal(
-        vehicle,
-        question.base,
-        time=question.time,
-        after=question.after,
-        others=seen,
-        budget=budget,
-        known=question.known,
-        most=question.most,
-        tube_m=question.tube_m,
-        keep=keep,
+            course = replace(course, grown=max(course.grown - (terms.between - own), 0.0))
+        others += course.obstacles
+    head, problem = onward(vehicle, request.base, terms.time, terms.after)
+    if problem is None:
+        return Proposal(None, None)
+    problem = with_room(problem, terms.tube_m)
+    if keep < problem.margin:
+        problem = replace(problem, margin=keep)
+    there = FleetMember(
+        vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
     )
-    return Proposal(found, alone)
+    there.plan_alone(budget, bounded=False)
+    spent = 0.0 if head is None else vehicle.problem.cost_of(head)
+    if there.alone is None or not there.alone.cost + spent < terms.known:
+        return Proposal(None, None)
+    other = None
+    if not budget.is_over:
+        other = there.past(others, budget, most=terms.most, known=terms.known - spent)
+    found = None if other is None else after_head(vehicle, head, other)
+    return Proposal(found, after_head(vehicle, head, there.alone))
 
 
-REFERENCE = 12  # bytes that name a plan that is known already: number of the vehicle, and of it
-SETTINGS = 64  # bytes of the other numbers of a question
-
-
-class Asked(NamedTuple):
-    """A question as it is sent: plans by number, and those that are new as bytes."""
+class SentRequest(NamedTuple):
+    """A request as it is sent: plans by number, and those that are new as bytes."""
 
     base: int
     others: tuple[tuple[int, int, float], ...]  # number of a vehicle, of its plan, distance to keep
     new: dict[int, tuple[int, bytes]]  # by its number: whose it is, and the plan
-    settings: tuple[float, float, float, float, int, float, float]
+    terms: Terms
     limit_s: float
 
 
@@ -197,31 +202,18 @@ class VehicleWorker:
         self.known: dict[int, OwnPlan] = {}
         prepare_vehicles([self.vehicles[number]])
 
-    def ask(self, asked: Asked) -> tuple[bytes | None, bytes | None]:
-        """The answer to a question; plans that are not named in it are forgotten."""
-        for name, (owner, said) in asked.new.items():
+    def ask(self, sent: SentRequest) -> tuple[bytes | None, bytes | None]:
+        """The answer to a request; plans that are not named in it are forgotten."""
+        for name, (owner, said) in sent.new.items():
             self.known[name] = decoded(self.vehicles[owner], said)
-        used = {asked.base, *(name for _, name, _ in asked.others)}
+        used = {sent.base, *(name for _, name, _ in sent.others)}
         self.known = {name: found for name, found in self.known.items() if name in used}
-        time, after, between, known, most, tube_m, keep = asked.settings
-        question = PlanRequest(
-            number=self.number,
-            base=self.known[asked.base],
-            time=time,
-            after=after,
-            others=tuple(ToPass(j, self.known[name], own) for j, name, own in asked.others),
-            between=between,
-            known=known,
-            most=most,
-            tube_m=tube_m,
-            keep=keep,
-        )
-        vehicle, budget = self.vehicles[self.number], Budget.from_now(asked.limit_s)
-        found, alone = answered(vehicle, question, budget, lambda one: one.course.after(time))
-        return (
-            None if found is None else encoded(vehicle, found),
-            None if alone is None else encoded(vehicle, alone),
-        )
+        others = tuple(ToPass(j, self.known[name], own) for j, name, own in sent.others)
+        request = PlanRequest(self.number, self.known[sent.base], others, sent.terms)
+        vehicle, budget = self.vehicles[self.number], Budget.from_now(sent.limit_s)
+        proposal = answered(vehicle, request, budget, lambda one: one.course.after(sent.terms.time))
+        found, alone = (None if one is None else encoded(vehicle, one) for one in proposal)
+        return found, alone
 
 
 class DaskWorkers:
@@ -276,18 +268,17 @@ class DaskWorkers:
         limit_s = max(budget.left, 0.0)
         under_way = [self._sent(one, limit_s) for one in questions]
         return [
-            self._answer(question.number, one, limit_s)
-            for question, one in zip(questions, under_way, strict=True)
+            self._answer(one.number, sent, limit_s)
+            for one, sent in zip(questions, under_way, strict=True)
         ]
 
-    def _sent(self, question: PlanRequest, limit_s: float) -> Any:
-        k = question.number
+    def _sent(self, request: PlanRequest, limit_s: float) -> Any:
+        k = request.number
         if k in self.gone:
             return None
         new: dict[int, tuple[int, bytes]] = {}
-        rows = [(k, question.base), *((j, one) for j, one, _ in question.others)]
         names = []
-        for owner, found in rows:
+        for owner, found in [(k, request.base), *((j, one) for j, one, _ in request.others)]:
             name = self._names.get(found)
             if name is None:
                 name = self._names[found] = self._next
@@ -295,29 +286,15 @@ class DaskWorkers:
             names.append(name)
             if name not in self._told[k] and name not in new:
                 new[name] = (owner, encoded(self.vehicles[owner], found))
-        asked = Asked(
-            base=names[0],
-            others=tuple(
-                (j, name, own) for (j, _, own), name in zip(question.others, names[1:], strict=True)
-            ),
-            new=new,
-            settings=(
-                question.time,
-                question.after,
-                question.between,
-                question.known,
-                question.most,
-                question.tube_m,
-                question.keep,
-            ),
-            limit_s=limit_s,
+        others = tuple(
+            (j, name, own) for (j, _, own), name in zip(request.others, names[1:], strict=True)
         )
         self._told[k] = set(names)
         used = set().union(*self._told)
         self._names = {found: name for found, name in self._names.items() if name in used}
         self._count([said for _, said in new.values()], REFERENCE * len(names) + SETTINGS)
         try:
-            return self.actors[k].ask(asked)
+            return self.actors[k].ask(SentRequest(names[0], others, new, request.terms, limit_s))
         except Exception as error:  # noqa: BLE001, whatever it is, the worker is gone
             self.gone[k] = str(error)
             return None
@@ -331,8 +308,7 @@ class DaskWorkers:
             self.gone[k] = str(error) or f"no answer in {limit_s + self.patience_s:g} s"
             return None
         self._count([one for one in said if one is not None], 0)
-        found, alone = (None if one is None else decoded(self.vehicles[k], one) for one in said)
-        return Proposal(found, alone)
+        return Proposal(*(None if one is None else decoded(self.vehicles[k], one) for one in said))
 
     def _count(self, plans: Sequence[bytes], more: int) -> None:
         self._counts["worker_messages"] += 1
@@ -340,17 +316,17 @@ class DaskWorkers:
         self._counts["worker_bytes"] += sum(map(len, plans)) + more
 
 
-KEPT = 2  # fleets whose vehicles a process keeps
-LEAST_S = 1e-3  # [s] a limit is positive
-PIECES = 2  # sent to each process at a time, so that none waits long for another
-
+# -- a fleet's plans, in pieces of work
 
 How: TypeAlias = Literal["alone", "in turn", "by priorities", "by conflicts"]
 """Better plans: of each by itself, one after another, or of a group at once."""
 
 
 class PoolTask(NamedTuple):
-    """A piece of work: whose plans are asked for, and past which."""
+    """A piece of work: whose plans are asked for, and past which.
+
+    It changes nothing but what it returns, and what it finds out of those vehicles alone.
+    """
 
     numbers: tuple[int, ...]
     held: HeldPlans
@@ -368,34 +344,28 @@ class Done(NamedTuple):
 Work: TypeAlias = Callable[[Turns, PoolTask], Done]
 
 
-class _Told(NamedTuple):
-    """A plan found, as it travels."""
-
-    plan: Plan
-    cost: float
-    goal_index: int
-
-
 class _Known(NamedTuple):
     """What is known of one vehicle by itself."""
 
-    alone: _Told | None
+    alone: bytes | None
     ways: tuple[Word, ...]
     bound: LowerBound | None
     why_none: str
 
 
 class _Parcel(NamedTuple):
-    """Pieces of one kind of work for another process."""
+    """Pieces of one kind of work for another process, which keeps fleets by their tokens."""
 
-    work: Work | None  # None: only have all ready
-    tasks: tuple[tuple[PoolTask, dict[int, _Told]], ...]  # without plans, which follow
-    known: dict[int, _Known]
-    seconds: float  # [s] that are left
+    token: str
+    fleet: FleetProblem | None  # None: it is known there
+    work: Work | None = None  # None: only have all ready
+    tasks: tuple[tuple[PoolTask, dict[int, bytes]], ...] = ()  # without plans, which follow
+    known: Mapping[int, _Known] = {}
+    seconds: float = 0.0  # [s] that are left
 
 
 class _Reply(NamedTuple):
-    done: tuple[tuple[dict[int, _Told] | None, int], ...]
+    done: list[tuple[dict[int, bytes] | None, int]]
     known: dict[int, _Known]
     expansions: dict[int, int]
 
@@ -414,9 +384,7 @@ class WorkerPool:
         """Have ready what all need, here and in the other processes, before a clock runs."""
         prepare_vehicles(self.vehicles)
         if self.gathered is not None:
-            ready = _packed(_Parcel(None, (), {}, 0.0), self.vehicles)
-            sent = (self._token, self.fleet, ready)
-            list(self.gathered(_served, [sent] * self.jobs))
+            list(self.gathered(_served, [_Parcel(self._token, self.fleet)] * self.jobs))
 
     def each(self, work: Work, tasks: Sequence[PoolTask], budget: Budget) -> Iterator[Done]:
         """What comes of pieces of work, in their order; nothing of those that a signal broke off.
@@ -426,158 +394,86 @@ class WorkerPool:
         """
         if self.gathered is None or len(tasks) < 2:
             for task in tasks:
-                turns = Turns(self.vehicles, self.fleet.margin, budget)
-                yield work(turns, task)
+                yield work(Turns(self.vehicles, self.fleet.margin, budget), task)
             return
         size = max(1, -(-len(tasks) // (PIECES * self.jobs)))
         chunks = [tasks[k : k + size] for k in range(0, len(tasks), size)]
-        bodies = [self._message(work, chunk, budget.left) for chunk in chunks]
         left = len(tasks)
-        for answer in self._sent(bodies):
-            reply = _unpacked(answer, self.vehicles)
-            assert isinstance(reply, _Reply)
+        for reply in self._replies([self._parcel(work, chunk, budget.left) for chunk in chunks]):
             for k, known in reply.known.items():
                 _learn(self.vehicles[k], known)
             for k, spent in reply.expansions.items():
                 self.vehicles[k].expansions += spent
             for told, queries in reply.done:
-                held = None if told is None else _held(self.vehicles, told)
                 left -= 1
-                yield Done(held, queries)
+                held = {k: decoded(self.vehicles[k], said) for k, said in (told or {}).items()}
+                yield Done(None if told is None else held, queries)
         yield from [Done(None)] * left
 
-    def _message(self, work: Work, tasks: Sequence[PoolTask], seconds: float) -> bytes:
-        numbers = {k for task in tasks for k in task.numbers}
-        known = {k: _known(self.vehicles[k]) for k in sorted(numbers)}
-        rows = tuple((task._replace(held={}), _told(task.held)) for task in tasks)
-        return _packed(_Parcel(work, rows, known, seconds), self.vehicles)
+    def _parcel(self, work: Work, tasks: Sequence[PoolTask], seconds: float) -> _Parcel:
+        numbers = sorted({k for task in tasks for k in task.numbers})
+        known = {k: _known(self.vehicles[k]) for k in numbers}
+        rows = [(task._replace(held={}), _told(self.vehicles, task.held)) for task in tasks]
+        return _Parcel(self._token, None, work, tuple(rows), known, seconds)
 
-    def _sent(self, bodies: Sequence[bytes]) -> Iterator[bytes]:
-        """Answers to messages; who does not know the fleet is told of it."""
+    def _replies(self, parcels: Sequence[_Parcel]) -> Iterator[_Reply]:
+        """Replies to parcels; who does not know the fleet is told of it."""
         assert self.gathered is not None
-        pieces = [(self._token, None, body) for body in bodies]
-        for body, answer in zip(bodies, list(self.gathered(_served, pieces)), strict=False):
-            if answer is None:
-                yield from self.gathered(_served, [(self._token, self.fleet, body)])
+        for parcel, reply in zip(parcels, list(self.gathered(_served, parcels)), strict=False):
+            if reply is None:
+                yield from self.gathered(_served, [parcel._replace(fleet=self.fleet)])
             else:
-                yield answer
+                yield reply
 
 
-class _Fleet(NamedTuple):
+class _KnownFleet(NamedTuple):
     """What a process keeps of a fleet."""
 
-    problem: FleetProblem
+    margin: float  # [m]
     vehicles: list[FleetMember]
-    last: dict[int, OwnPlan]  # plans that were sent last, with all that is prepared for them
+    last: dict[int, tuple[bytes, OwnPlan]]  # sent last, with all that is prepared for them
 
 
-_FLEETS: dict[str, _Fleet] = {}  # the last ones, by their tokens
+_FLEETS: dict[str, _KnownFleet] = {}  # the last ones, by their tokens
 
 
-def _served(piece: tuple[str, FleetProblem | None, bytes]) -> bytes | None:
-    """In another process: the answer to a message; None if the fleet is not known here."""
-    token, fleet, body = piece
-    if token not in _FLEETS:
-        if fleet is None:
+def _served(parcel: _Parcel) -> _Reply | None:
+    """In another process: the reply to a parcel; None if the fleet is not known here."""
+    if parcel.token not in _FLEETS:
+        if parcel.fleet is None:
             return None
-        _FLEETS[token] = _Fleet(fleet, vehicles_of(fleet), {})
-        prepare_vehicles(_FLEETS[token].vehicles)
+        _FLEETS[parcel.token] = _KnownFleet(parcel.fleet.margin, vehicles_of(parcel.fleet), {})
+        prepare_vehicles(_FLEETS[parcel.token].vehicles)
         for old in list(_FLEETS)[:-KEPT]:
             del _FLEETS[old]
-    problem, vehicles, last = _FLEETS[token]
-    message = _unpacked(body, vehicles)
-    assert isinstance(message, _Parcel)
-    for k, known in message.known.items():
+    margin, vehicles, last = _FLEETS[parcel.token]
+    for k, known in parcel.known.items():
         _learn(vehicles[k], known)
     before = [one.expansions for one in vehicles]
-    done: list[tuple[dict[int, _Told] | None, int]] = []
-    budget = Budget.from_now(max(message.seconds, LEAST_S))
-    for task, told in message.tasks:
-        assert message.work is not None
-        turns = Turns(vehicles, problem.margin, budget)
-        last |= {k: _found(vehicles[k], one, last.get(k)) for k, one in told.items()}
-        found = message.work(turns, task._replace(held={k: last[k] for k in told}))
-        done.append((None if found.held is None else _told(found.held), found.queries))
-    known_now = {k: _known(vehicles[k]) for k in message.known}
-    spent = {k: vehicles[k].expansions - before[k] for k in message.known}
-    return _packed(_Reply(tuple(done), known_now, spent), vehicles)
+    done: list[tuple[dict[int, bytes] | None, int]] = []
+    budget = Budget.from_now(max(parcel.seconds, LEAST_LIMIT))
+    for task, told in parcel.tasks:
+        assert parcel.work is not None
+        for k, said in told.items():
+            if k not in last or last[k][0] != said:
+                last[k] = said, decoded(vehicles[k], said)
+        held = {k: last[k][1] for k in told}
+        found = parcel.work(Turns(vehicles, margin, budget), task._replace(held=held))
+        done.append((None if found.held is None else _told(vehicles, found.held), found.queries))
+    known_now = {k: _known(vehicles[k]) for k in parcel.known}
+    return _Reply(done, known_now, {k: vehicles[k].expansions - before[k] for k in parcel.known})
 
 
-def _told(held: Mapping[int, OwnPlan]) -> dict[int, _Told]:
-    return {k: _Told(one.plan, one.cost, one.goal_index) for k, one in held.items()}
-
-
-def _held(vehicles: Sequence[FleetMember], told: Mapping[int, _Told]) -> HeldPlans:
-    return {k: _found(vehicles[k], one) for k, one in told.items()}
-
-
-def _found(vehicle: FleetMember, told: _Told, last: OwnPlan | None = None) -> OwnPlan:
-    """A plan that was sent; the last one of the vehicle if it is the same."""
-    if last is not None and last.cost == told.cost and _signed(last.plan) == _signed(told.plan):
-        return last
-    return OwnPlan(told.plan, told.cost, told.goal_index, vehicle.course_of(told.plan))
-
-
-def _signed(plan: Plan) -> tuple[object, ...]:
-    """What tells plans apart that are made of the same trims and maneuvers."""
-    parts = [*map(id, plan.trims), *map(id, plan.maneuvers)]
-    return *parts, plan.durations.tobytes(), plan.start.tobytes(), plan.start_time
+def _told(vehicles: Sequence[FleetMember], held: Mapping[int, OwnPlan]) -> dict[int, bytes]:
+    return {k: encoded(vehicles[k], one) for k, one in held.items()}
 
 
 def _known(vehicle: FleetMember) -> _Known:
-    one = vehicle.alone
-    alone = None if one is None else _Told(one.plan, one.cost, one.goal_index)
+    alone = None if vehicle.alone is None else encoded(vehicle, vehicle.alone)
     return _Known(alone, tuple(vehicle.ways), vehicle.bound, vehicle.why_none)
 
 
 def _learn(vehicle: FleetMember, known: _Known) -> None:
-    vehicle.alone = None if known.alone is None else _found(vehicle, known.alone)
+    vehicle.alone = None if known.alone is None else decoded(vehicle, known.alone)
     vehicle.ways, vehicle.bound = list(known.ways), known.bound
     vehicle.why_none = known.why_none
-
-
-class _Packer(pickle.Pickler):
-    """Trims and maneuvers of the vehicles' automata travel as numbers."""
-
-    def __init__(self, file: io.BytesIO, vehicles: Sequence[FleetMember]) -> None:
-        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
-        self._names = {id(one): name for name, one in _primitives(vehicles)}
-
-    def persistent_id(self, obj: Any) -> tuple[int, int] | None:
-        """What stands for an object; None if it is sent as it is."""
-        return self._names.get(id(obj))
-
-
-class _Unpacker(pickle.Unpickler):
-    def __init__(self, file: io.BytesIO, vehicles: Sequence[FleetMember]) -> None:
-        super().__init__(file)
-        self._named = dict(_primitives(vehicles))
-
-    def persistent_load(self, pid: Any) -> Trim | Maneuver:
-        """The object that a name stands for."""
-        return self._named[pid]
-
-
-def _primitives(
-    vehicles: Sequence[FleetMember],
-) -> Iterator[tuple[tuple[int, int], Trim | Maneuver]]:
-    """Trims and maneuvers of all automata, by the first vehicle that has each and by number."""
-    seen: set[int] = set()
-    for one in vehicles:
-        automaton = one.problem.automaton
-        if id(automaton) not in seen:
-            seen.add(id(automaton))
-            every: tuple[Trim | Maneuver, ...] = (*automaton.trims, *automaton.maneuvers)
-            for k, primitive in enumerate(every):
-                yield (one.number, k), primitive
-
-
-def _packed(value: _Parcel | _Reply, vehicles: Sequence[FleetMember]) -> bytes:
-    file = io.BytesIO()
-    _Packer(file, vehicles).dump(value)
-    return file.getvalue()
-
-
-def _unpacked(body: bytes, vehicles: Sequence[FleetMember]) -> _Parcel | _Reply:
-    value: _Parcel | _Reply = _Unpacker(io.BytesIO(body), vehicles).load()
-    return value

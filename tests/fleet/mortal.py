@@ -22,9 +22,12 @@ class Mortal:
         self.counts["questions"] += len(questions)
         return [
             None
-            if one.time >= self.dies.get(one.number, math.inf)
+            if one.terms.time >= self.dies.get(one.number, math.inf)
             else answered(
-                self.vehicles[one.number], one, budget, lambda f, at=one.time: f.course.after(at)
+                self.vehicles[one.number],
+                one,
+                budget,
+                lambda f, at=one.terms.time: f.course.after(at),
             )
             for one in questions
         ]

@@ -17,10 +17,11 @@ from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fle
 from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
-from maneuver_automaton.fleet.held import left_to_pay, off_plan, proposal, rest_of_plan, resting
+from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
 from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
+from maneuver_automaton.fleet.workers import PlanRequest, Terms, ToPass, answered
 from maneuver_automaton.groups import SE2
 from tests.fleet.robots import (
     at_rest,
@@ -154,11 +155,13 @@ def test_searches_leave_time_for_what_follows_them():
 def test_without_time_only_the_way_alone_is_looked_for():
     vehicle = vehicles_of(crossing())[0]
     rest = resting(vehicle, vehicle.problem.start, 0.0)
-    numbers = {"time": 0.0, "after": 0.0, "known": math.inf, "most": 1500}
-    other = [ma.Obstacle(Disc(0.3, [0.0, 0.0]))]
-    found, alone = proposal(vehicle, rest, others=other, budget=Budget.from_now(60.0), **numbers)
+    stands = FleetCourse(((Disc(0.3),),), (Motion([0.0], [[0.0, 0.0, 0.0]]),))
+    other = ToPass(1, OwnPlan(rest.plan, math.inf, 0, stands), 0.0)
+    terms = Terms(0.0, 0.0, 0.0, known=math.inf, most=1500, tube_m=0.0, keep=math.inf)
+    request = PlanRequest(0, rest, (other,), terms)
+    found, alone = answered(vehicle, request, Budget.from_now(60.0), lambda one: one.course)
     assert found.cost > alone.cost
-    found, _ = proposal(vehicle, rest, others=other, budget=Budget.from_now(0.0), **numbers)
+    found, _ = answered(vehicle, request, Budget.from_now(0.0), lambda one: one.course)
     assert found is None
 
 
