@@ -104,7 +104,7 @@ class Turns:
             return None, []
         courses = {other: one.course for other, one in held.items()}
         met = meetings({**courses, k: found.course}, keep=self.margin, among=[k])
-        return found, sorted({m.one if m.other == k else m.other for m in met})
+        return found, sorted({m.other_than(k) for m in met})
 
     def past(
         self,
@@ -369,7 +369,7 @@ class _Floor:
         there = {j: one for j, one in self._courses().items() if j != k}
         met = meetings({**there, k: way.course}, keep=self.margin, among=[k])
         for row in met:
-            j = row.one if row.other == k else row.other
+            j = row.other_than(k)
             if self.asides[j] == MOST_ASIDE or not self._drives_aside(j, k, way):
                 return False
         return self._drives_home(k)

@@ -20,123 +20,17 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Agreement, Knowledge, Lossless, Lost
-from maneuver_automaton.fleet.exchanges import Exchanges
-from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
+from maneuver_automaton.fleet.exchanges import exchange, exchange_what_is_due, go_on
+from maneuver_automaton.fleet.guarantees import logged
 from maneuver_automaton.fleet.held import arrival, given_up, tube_of
-from maneuver_automaton.fleet.moment import MANY, LoopSettings, LoopState, Moment
+from maneuver_automaton.fleet.moment import Effort, LoopSettings, LoopState, Moment
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetGuarantee, FleetResult, FleetStep, FleetViolation
+from maneuver_automaton.fleet.result import FleetResult, FleetStep
 from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
 from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
-
-
-def logged(now: Moment, before: Before, exchanges: Exchanges, refused: Sequence[int]) -> FleetStep:
-    """All of the step, and the guarantees that it broke."""
-    state = now.state
-    fresh, few = _fresh(now), len(now.held) <= MANY
-    looked_at = now.held if few else {k for j, near in fresh.items() for k in (j, *near)}
-    courses = {k: now.left_of(now.held[k]) for k in looked_at}
-    after = After(
-        time=now.time,
-        held=now.held,
-        courses=courses,
-        off=now.off,
-        disturbed=now.disturbed,
-        in_group=exchanges.in_group,
-        swaps=exchanges.swaps,
-        tube_m=state.settings.tube_m,
-        keep=now.keep,
-        frame=now.frame,
-        fresh=fresh,
-    )
-    said = list(broken(now.vehicles, state.agreement, before, after))
-    now.violations += said
-    _note_proven(now, said)
-    gap = now.keep
-    if few:
-        held = {k: one.course for k, one in now.held.items()}
-        state.gap = gap_between(
-            courses, keep=now.keep, frame=now.frame, time=now.time, held=held, last=state.gap
-        )
-        gap = state.gap.distance
-    if state.crossing:
-        gap = 0.0
-    names = [one.name for one in now.vehicles]
-    plans = {names[k]: one.plan for k, one in now.held.items()}
-    return FleetStep(
-        number=now.number,
-        time=now.time,
-        poses={names[k]: now.poses[k] for k in now.held},
-        plans=plans,
-        driven={names[k]: now.beside.get(k) or now.from_here(k).plan for k in now.held},
-        values={names[k]: now.left_to_pay(k) for k in now.held},
-        arrivals={names[k]: arrival(one) for k, one in now.held.items()},
-        off_plan={names[k]: now.off[k] for k in now.held},
-        arrived=tuple(names[k] for k in sorted(state.arrived & set(now.held))),
-        swaps=tuple(exchanges.swaps),
-        asked=tuple(names[k] for k in exchanges.asked),
-        void=tuple(names[k] for k in now.void),
-        refused=tuple(names[k] for k in refused),
-        silent=tuple(names[k] for k in sorted(state.silent & set(now.held))),
-        gap_m=gap,
-        violations=tuple(now.violations),
-        solve_s=now.budget.elapsed,
-    )
-
-
-def _fresh(now: Moment) -> dict[int, list[int]]:
-    """Who holds a plan that is not proven yet, and whose plans may come near it."""
-    held, proven = now.held, now.state.proven
-    fresh = {}
-    for k, found in held.items():
-        if proven.get(k) is not found.course:
-            others = [j for j in held if j != k]
-            near = now.nearby.near(found.course, [held[j].course for j in others], keep=now.keep)
-            fresh[k] = [j for j, is_near in zip(others, near, strict=True) if is_near]
-    return fresh
-
-
-def _note_proven(now: Moment, said: Sequence[FleetViolation]) -> None:
-    """Which plans are proven for all later times, and which pairs are not apart."""
-    state, numbers = now.state, {one.name: one.number for one in now.vehicles}
-    unproven = {
-        numbers[name]
-        for one in said
-        if one.guarantee in {FleetGuarantee.APART, FleetGuarantee.STILL}
-        for name in one.names
-    }
-    state.proven = {k: one.course for k, one in now.held.items() if k not in unproven}
-    state.crossing = {
-        (min(pair), max(pair))
-        for one in said
-        if one.guarantee is FleetGuarantee.APART
-        for pair in [[numbers[name] for name in one.names]]
-    }
-
-
-def step_of(now: Moment, broken_down: set[int]) -> FleetStep:
-    """The step from begin to end, which changes the state of its loop; some have broken down."""
-    agreement, held = now.state.agreement, now.held
-    for k in [k for k in held if k not in now.poses]:
-        del held[k]
-    refused = let_in(now)
-    before = Before.of(now.vehicles, held, now.time, now.state.last)
-    agreement.begin(now.number, held)
-    rejoin(now)
-    stop(now, broken_down & set(held))
-    plan_anew(now)
-    note_arrivals(now)
-    exchanges = Exchanges(now)
-    exchanges.exchange_what_is_due()
-    exchanges.go_on()
-    exchanges.exchange()
-    done = now.budget.elapsed
-    log = logged(now, before, exchanges, refused)
-    now.state.note_end(now.budget.elapsed - min(done, now.searches.seconds))
-    return log
 
 
 class FleetHorizon:
@@ -239,32 +133,28 @@ class FleetHorizon:
             raise ValueError(f"fleet horizon: delay_steps must be at least 0, got {delay_steps}")
         vehicles = vehicles_of(fleet)
         self.fleet = fleet
-        self.state = LoopState(
-            fleet,
-            LoopSettings(
-                step=step,
-                margin=margin,
-                tube_m=tube_of(fleet, tube_m),
-                time_limit=time_limit,
-                swaps_per_step=swaps_per_step,
-                at_once=at_once,
-                group_size=group_size if lost is None else 1,
-                delay_steps=delay_steps,
-            ),
-            vehicles,
-            self._knowledge(lost),
-            _plans_of(first, vehicles),
+        settings = LoopSettings(
+            step=step,
+            margin=margin,
+            keep=fleet.margin,
+            tube_m=tube_of(fleet, tube_m),
+            time_limit=time_limit,
+            swaps_per_step=swaps_per_step,
+            at_once=at_once,
+            group_size=group_size if lost is None else 1,
+            delay_steps=delay_steps,
             workers=workers,
         )
+        knowledge: Knowledge
+        if lost is None:
+            knowledge = Lossless(lambda k, found: len(self._now.near_to(k, found)))
+        else:
+            knowledge = Agreement(fleet.names, lost)
+        self.state = LoopState(settings, vehicles, knowledge, _plans_of(first, vehicles))
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
         # What is prepared for obstacles that vehicles have got since, which are kept alive.
         self._workspaces: dict[tuple[int, ...], tuple[tuple[AnyObstacle, ...], Workspace]] = {}
         prepare_vehicles(vehicles)
-
-    def _knowledge(self, lost: Lost | None) -> Knowledge:
-        if lost is not None:
-            return Agreement(self.fleet.names, lost)
-        return Lossless(lambda k, found: self._now.how_many_near(k, found))
 
     def step(
         self,
@@ -305,8 +195,22 @@ class FleetHorizon:
             )
         stopped = {self._number_of(name) for name in broken_down}
         budget = Budget.from_now(state.settings.time_limit)
-        self._now = Moment(state, at, poses, budget)
-        state.last = step_of(self._now, stopped)
+        now = self._now = Moment(state, at, poses, budget)
+        for k in [k for k in now.held if k not in now.poses]:
+            del now.held[k]
+        let_in(now)
+        now.before = {k: (now.left_to_pay(k), arrival(one)) for k, one in now.held.items()}
+        state.agreement.begin(now.number, now.held)
+        rejoin(now)
+        stop(now, stopped & set(now.held))
+        plan_anew(now)
+        note_arrivals(now)
+        exchange_what_is_due(now)
+        go_on(now)
+        exchange(now)
+        searched = budget.elapsed
+        state.last = logged(now)
+        state.note_end(budget.elapsed - min(searched, now.searches.seconds))
         return state.last
 
     def assign(self, name: str, problem: Problem) -> None:
@@ -344,12 +248,13 @@ class FleetHorizon:
         own = replace(new.problem, obstacles=kept.obstacles)
         state.vehicles[k] = FleetMember(k, name, own, old.leaves, old.grown, kept)
         state.arrived.discard(k)
-        for known in (state.settled, state.in_vain, state.due, state.attempts, state.gains):
-            known.pop(k, None)
+        state.due.pop(k, None)
         state.stopped.pop(k, None)
+        known = state.efforts[k]
+        state.efforts[k] = Effort(known.version, known.lineage)
         if k in state.held:
             state.held[k] = given_up(state.held[k])
-            state.lineage[k] += 1
+            state.efforts[k].lineage += 1
             state.assigned.add(k)
 
     def _number_of(self, name: str) -> int:

@@ -23,7 +23,6 @@ PROOF = 1e-4  # [m] more than the distance to keep, wherever two bodies are look
 AFTER = 1.0  # [s] that is looked at once nothing moves any more
 SLOT = 1.0  # [s]
 FIRST = 32  # slots and rows to begin with
-Pair = tuple[int, int]
 NOWHERE = (math.inf, math.inf, -math.inf, -math.inf)
 
 
@@ -33,6 +32,10 @@ class Meeting(NamedTuple):
     one: int
     other: int
     time: float
+
+    def other_than(self, number: int) -> int:
+        """The one that is not the vehicle of that number."""
+        return self.one if self.other == number else self.other
 
 
 def meetings(
@@ -244,7 +247,9 @@ def _places(way: Motion, times: Array) -> Array:
     return np.asarray((SE2(way.pose[piece]) @ SE2.exp(gone)).pose[:, :2])
 
 
-def near_pairs(discs: Sequence[tuple[int, float, float, float]], keep: float) -> list[Pair]:
+def near_pairs(
+    discs: Sequence[tuple[int, float, float, float]], keep: float
+) -> list[tuple[int, int]]:
     """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m].
 
     Examples
@@ -329,3 +334,95 @@ class Nearby:
         after = np.array(NOWHERE) if leaves else boxes[-1]
         rest = np.tile(after, (self._boxes.shape[1] - first - len(boxes), 1))
         return np.concatenate([np.tile(boxes[0], (first, 1)), boxes, rest])
+
+
+Frame = tuple[float, float, float]
+
+FAR = 1.0  # [m] beyond the margin: what keeps more is not measured
+FINE = 0.02  # [m] to which the distance proven is known
+
+
+class Gap(NamedTuple):
+    """A distance that any two vehicles are proven to keep from a time on, and what shows it."""
+
+    distance: float  # [m]
+    nearest: Meeting | None  # that comes within 2 cm more; None: nobody is looked at so far out
+    held: Mapping[int, FleetCourse]  # the courses of which it is proven
+
+
+def gap_between(
+    courses: Mapping[int, FleetCourse],
+    *,
+    keep: float,
+    frame: Frame,
+    time: float = -math.inf,
+    held: Mapping[int, FleetCourse] | None = None,
+    last: Gap | None = None,
+) -> Gap:
+    """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
+
+    At most a metre more than the distance to keep; 0 if not even that is proven.
+
+    Parameters
+    ----------
+    courses : mapping of int to FleetCourse
+        What is left of those that are held.
+    keep : float
+        Distance to keep [m].
+    frame : (x, y, 0)
+        What places are counted from.
+    time : float
+        Now [s].
+    held : mapping of int to FleetCourse, optional
+        What is held; what is left of it if omitted.
+    last : Gap, optional
+        Of a step before. It still holds if those that hold another plan since keep it too, and the
+        two that come nearest have not passed yet: the value is the same as without it.
+    """
+    held = courses if held is None else held
+    if len(courses) < 2:
+        return Gap(math.inf, None, held)
+    if last is not None and _still_holds(last, courses, frame=frame, time=time, held=held):
+        return last._replace(held=held)
+    low, most, more = keep, keep + FAR, 2.0 * FINE
+    rows = meetings(courses, keep=most, frame=frame)
+    if not rows:
+        return Gap(most, None, held)
+    near = sorted({k for row in rows for k in (row.one, row.other)})
+    among = {row.one for row in rows}
+    met = Encounters({k: courses[k] for k in near}, frame).within
+    if met(keep, among):
+        return Gap(0.0, None, held)
+    nearest, high = rows[0], math.inf
+    while high == math.inf:
+        wanted = min(low + more, most)
+        if wanted >= most:
+            high = most
+        elif rows := met(wanted, among):
+            high, nearest = wanted, rows[0]
+        else:
+            low, more = wanted, 2.0 * more
+    while high - low > FINE:
+        middle = 0.5 * (low + high)
+        if rows := met(middle, among):
+            high, nearest = middle, rows[0]
+        else:
+            low = middle
+    return Gap(low, nearest, held)
+
+
+def _still_holds(
+    last: Gap,
+    courses: Mapping[int, FleetCourse],
+    *,
+    frame: Frame,
+    time: float,
+    held: Mapping[int, FleetCourse],
+) -> bool:
+    """Whether a distance is what was proven a step before."""
+    fresh = {k for k, one in held.items() if last.held.get(k) is not one}
+    if last.nearest is None or last.nearest.time < time:
+        return False
+    if {last.nearest.one, last.nearest.other} & (fresh | (set(last.held) - set(held))):
+        return False
+    return not (fresh and meetings(courses, keep=last.distance, among=fresh, frame=frame))

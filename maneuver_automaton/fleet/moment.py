@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,18 +14,19 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet.agreement import Knowledge
 from maneuver_automaton.fleet.courses import FleetCourse
-from maneuver_automaton.fleet.guarantees import Gap
 from maneuver_automaton.fleet.held import (
     distance_to_obstacles,
     is_over,
     left_to_pay,
     off_plan,
+    rejoined,
     rest_of_plan,
+    resting,
+    stopping,
     why_not_free,
 )
-from maneuver_automaton.fleet.meetings import Nearby, meetings
-from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation
+from maneuver_automaton.fleet.meetings import Gap, Nearby, meetings
+from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation, Swap
 from maneuver_automaton.fleet.vehicle import QUICK, FleetMember, OwnPlan
 from maneuver_automaton.fleet.workers import PlanRequest, Proposal, Terms, ToPass, Workers, answered
 from maneuver_automaton.groups import SE2
@@ -44,19 +45,48 @@ class LoopSettings:
 
     step: float  # delta [s]
     margin: float  # that another plan costs less
+    keep: float  # [m] that any two bodies keep
     tube_m: float
     time_limit: float  # [s] per step
     swaps_per_step: int | None
     at_once: int
     group_size: int
     delay_steps: int
+    workers: Workers | None
+
+
+@dataclass(slots=True, eq=False)
+class Effort:
+    """What a vehicle has exchanged, and what it has looked for in vain."""
+
+    version: int = -1  # how often its plan was exchanged; -1: it never joined
+    # Plans are the same as long as they are only driven, or rejoined at nearly the same cost.
+    lineage: int = 0
+    settled: int | None = None  # no plan alone is cheaper than that of this lineage
+    in_vain: Around | None = None  # past these nothing was found
+    attempts: int = 0  # in vain, since its last exchange
+    gain: float = math.inf  # what the way alone would have saved when it looked last
+
+    def exchanged(self) -> None:
+        """Another plan is held."""
+        self.version += 1
+        self.lineage += 1
+        self.attempts = 0
+
+
+@dataclass(slots=True, eq=False)
+class Proofs:
+    """What was proven in the last step."""
+
+    apart: dict[int, FleetCourse] = field(default_factory=dict)  # from all, and free
+    crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
+    gap: Gap | None = None
 
 
 @dataclass(slots=True, eq=False)
 class LoopState:
     """What a fleet's loop knows from step to step; vehicles by number."""
 
-    fleet: FleetProblem
     settings: LoopSettings
     vehicles: list[FleetMember]
     agreement: Knowledge
@@ -64,27 +94,17 @@ class LoopState:
     held: dict[int, OwnPlan] = field(default_factory=dict)
     arrived: set[int] = field(default_factory=set)
     broken: set[int] = field(default_factory=set)
-    versions: dict[int, int] = field(default_factory=dict)  # how often a plan was exchanged
-    # Plans are the same as long as they are only driven, or rejoined at nearly the same cost.
-    lineage: dict[int, int] = field(default_factory=dict)
-    settled: dict[int, int] = field(default_factory=dict)  # no plan alone is cheaper than this one
-    in_vain: dict[int, Around] = field(default_factory=dict)  # past these nothing was found
-    attempts: dict[int, int] = field(default_factory=dict)  # in vain, since its last exchange
-    gains: dict[int, float] = field(default_factory=dict)  # what the way alone would have saved
-    due: dict[int, tuple[int, OwnPlan, OwnPlan]] = field(
-        default_factory=dict
-    )  # when, what, for what
-    workers: Workers | None = None
     silent: set[int] = field(default_factory=set)  # whose workers do not answer any more
-    stopped: dict[int, OwnPlan] = field(default_factory=dict)  # what was left of their void plans
-    crossing: set[tuple[int, int]] = field(default_factory=set)  # whose plans are not apart
     assigned: set[int] = field(default_factory=set)  # who got another problem since the last step
-    proven: dict[int, FleetCourse] = field(default_factory=dict)  # apart from all, and free
-    gap: Gap | None = None  # that was proven in the last step
+    efforts: list[Effort] = field(init=False)
+    due: dict[int, tuple[int, OwnPlan, OwnPlan]] = field(default_factory=dict)  # when, what, for?
+    stopped: dict[int, OwnPlan] = field(default_factory=dict)  # what was left of their void plans
+    proofs: Proofs = field(default_factory=Proofs)
     kept_s: float = field(init=False)  # of a step's limit for what follows its searches
     last: FleetStep | None = None
 
     def __post_init__(self) -> None:
+        self.efforts = [Effort() for _ in self.vehicles]
         self.kept_s = AT_FIRST * self.settings.time_limit
 
     def note_end(self, seconds: float) -> None:
@@ -113,7 +133,7 @@ class Moment:
         self.state = state
         self.held = state.held
         self.vehicles = state.vehicles
-        self.keep = state.fleet.margin
+        self.keep = state.settings.keep
         self.tube = state.settings.tube_m
         start = state.vehicles[0].problem.start
         self.frame = (float(start[0]), float(start[1]), 0.0)
@@ -125,6 +145,11 @@ class Moment:
         self.number = 0 if state.last is None else state.last.number + 1
         self.void: list[int] = []
         self.violations: list[FleetViolation] = []
+        self.refused: list[int] = []  # who could not be let in
+        self.swaps: list[Swap] = []
+        self.in_group: set[int] = set()  # who exchanged its plan with others at once
+        self.asked: list[int] = []  # who looked for a better plan
+        self.before: dict[int, tuple[float, float]] = {}  # what was left to pay, and the arrival
         self.off: dict[int, float] = {}
         # Who has another plan, or another problem, not by an exchange of its own.
         self.disturbed: set[int] = set(state.assigned)
@@ -186,15 +211,17 @@ class Moment:
 
     def hold(self, k: int, found: OwnPlan) -> None:
         """Another plan is held, whatever the others say to it."""
+        self.take(k, found)
+        self.state.efforts[k].gain = math.inf
+        self.disturbed.add(k)
+        self.state.agreement.announce(k, found)
+
+    def take(self, k: int, found: OwnPlan) -> None:
+        """A vehicle holds another plan."""
         self.held[k] = found
         self.beside.pop(k, None)
-        self.state.versions[k] += 1
-        self.state.lineage[k] += 1
-        self.state.attempts[k] = 0
-        self.state.gains.pop(k, None)
-        self.disturbed.add(k)
+        self.state.efforts[k].exchanged()
         self.off[k] = self.offset_from(k, found)
-        self.state.agreement.announce(k, found)
 
     def offset_from(self, k: int, found: OwnPlan) -> float:
         """How far a vehicle is beside a plan [m]; 0 if by no more than rounding."""
@@ -245,21 +272,38 @@ class Moment:
         on_it = self.off[k] <= self.state.settings.tube_m
         return self.held[k].plan.pose_at(self.time) if on_it else self.poses[k]
 
+    def rest_of(self, k: int) -> Plan:
+        """What is left of the plan that a vehicle holds."""
+        return rest_of_plan(self.vehicles[k], self.held[k], self.time)
+
     def from_here(self, k: int, pose: Array | None = None) -> OwnPlan:
         """What a vehicle holds, if it begins at a pose, or where it was measured."""
-        vehicle, found = self.vehicles[k], self.held[k]
-        rest = rest_of_plan(vehicle, found, self.time)
         start = self.poses[k] if pose is None else pose
-        return replace(found, plan=replace(rest, start=start))
+        return replace(self.held[k], plan=replace(self.rest_of(k), start=start))
+
+    def stopping(self, k: int) -> OwnPlan:
+        """The plan by which a vehicle comes to rest soonest."""
+        return stopping(self.vehicles[k], self.held[k], self.time, self.begin_of(k))
+
+    def rejoined(self, k: int, found: OwnPlan, pose: Array | None = None) -> Iterator[OwnPlan]:
+        """A plan made to start at a pose, or where the vehicle was measured, in several ways."""
+        start = self.poses[k] if pose is None else pose
+        return rejoined(self.vehicles[k], found, self.time, start, self.tube)
+
+    def resting(self, k: int, found: OwnPlan | None = None) -> OwnPlan:
+        """A plan to stay where a vehicle was measured, as at the end of another plan."""
+        return resting(self.vehicles[k], self.poses[k], self.time, found)
 
     def left_to_pay(self, k: int) -> float:
         """Cost of what is left of the plan that a vehicle holds."""
         return left_to_pay(self.vehicles[k], self.held[k], self.time)
 
-    def how_many_near(self, k: int, found: OwnPlan) -> int:
-        """How many may come near a vehicle that drives a plan."""
-        others = [one.course for j, one in self.held.items() if j != k]
-        return sum(self.nearby.near(found.course, others, keep=self.keep))
+    def near_to(self, k: int, found: OwnPlan) -> list[int]:
+        """Those that may come near a vehicle that drives a plan."""
+        others = [j for j in self.held if j != k]
+        courses = [self.held[j].course for j in others]
+        near = self.nearby.near(found.course, courses, keep=self.keep)
+        return [j for j, is_near in zip(others, near, strict=True) if is_near]
 
 
 MANY = 40  # others that a search looks at; all that are proven
@@ -276,11 +320,11 @@ def search(
     most: int = QUICK,
 ) -> Proposal:
     """Another plan past the others, and the way alone; None for what does not cost less."""
-    (answer,) = answers_to(now, [question_of(now, k, base, others, known, most=most)])
+    (answer,) = answers_to(now, [request_of(now, k, base, others, known, most=most)])
     return answer
 
 
-def question_of(
+def request_of(
     now: Moment,
     k: int,
     base: OwnPlan,
@@ -325,13 +369,14 @@ def _seen(now: Moment, k: int, base: OwnPlan, others: Collection[Other]) -> Coll
     return [rows[n] for n in sorted(nearest_first) if gaps[n] <= AWAY * (high - low).max()]
 
 
-def answers_to(now: Moment, questions: Sequence[PlanRequest]) -> list[Proposal]:
-    """The answers to questions: of workers, or else found here."""
-    if now.state.workers is None:
+def answers_to(now: Moment, requests: Sequence[PlanRequest]) -> list[Proposal]:
+    """The answers to requests: of workers, or else found here."""
+    workers = now.state.settings.workers
+    if workers is None:
         return [
-            answered(now.vehicles[one.number], one, now.searches, now.left_of) for one in questions
+            answered(now.vehicles[one.number], one, now.searches, now.left_of) for one in requests
         ]
-    asked = [one for one in questions if one.number not in now.state.silent]
-    found = dict(zip(map(id, asked), now.state.workers.ask(asked, now.searches), strict=True))
+    asked = [one for one in requests if one.number not in now.state.silent]
+    found = dict(zip(map(id, asked), workers.ask(asked, now.searches), strict=True))
     now.state.silent |= {one.number for one in asked if found[id(one)] is None}
-    return [found.get(id(one)) or Proposal(None, None) for one in questions]
+    return [found.get(id(one)) or Proposal(None, None) for one in requests]

@@ -386,8 +386,7 @@ class _FleetSearch:
         if alone is not None:
             courses[first] = alone.course
         met = meetings(courses, keep=self.fleet.margin, among=[first])
-        near = [m.one if m.other == first else m.other for m in met]
-        near = [k for k in near if k not in busy]
+        near = [k for k in (m.other_than(first) for m in met) if k not in busy]
         rng.shuffle(near)
         group = [first, *near[: size - 1]]
         if rng.random() < 0.5:
@@ -434,7 +433,7 @@ class _FleetSearch:
         met = meetings({**courses, k: alone.course}, keep=self.fleet.margin, among=[k])
         rows = []
         for one in met:
-            other = self.vehicles[one.other if one.one == k else one.one].name
+            other = self.vehicles[one.other_than(k)].name
             x, y = alone.plan.pose_at(max(one.time, alone.plan.start_time))[:2]
             rows.append(f"{other} at {one.time:.4g} s near ({x:.4g}, {y:.4g})")
         spent = f" within {self.budget.seconds:.4g} s" if self.budget.is_over else ""

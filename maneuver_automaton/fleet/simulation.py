@@ -315,7 +315,7 @@ class _FleetWorld:
         names = {one.vehicle.name for one in self.drives}
         left = names - set(self.arrived_s) - self.broken
         status, reason = "reached", ""
-        of_loop = self.loop.state.workers
+        of_loop = self.loop.state.settings.workers
         workers = {} if of_loop is None else of_loop.counts
         if left:
             status = "steps_spent"

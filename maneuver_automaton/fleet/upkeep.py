@@ -21,10 +21,7 @@ from maneuver_automaton.fleet.held import (
     leads,
     off_plan,
     reach_of,
-    rejoined,
     rest_of_plan,
-    resting,
-    stopping,
     why_not_free,
 )
 from maneuver_automaton.fleet.meetings import meetings, near_pairs
@@ -38,17 +35,16 @@ from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 
 
-def let_in(now: Moment) -> list[int]:
+def let_in(now: Moment) -> None:
     """Let in those that are new, if they keep apart from all: with their first plan, or at rest.
 
-    Who could not be, for now.
+    Who could not be is refused for now.
     """
     agreement, at_first = now.state.agreement, now.state.last is None
-    refused = []
     for k in [k for k in now.poses if k not in now.held]:
-        vehicle, pose = now.vehicles[k], now.poses[k]
+        vehicle = now.vehicles[k]
         stands = switches_at_will(vehicle.problem) or vehicle.problem.first_trim.is_rest
-        choices = [resting(vehicle, pose, now.time)] if stands else []
+        choices = [now.resting(k)] if stands else []
         first = now.state.first.pop(k, None)
         if first is not None and now.offset_from(k, first) == 0.0:
             choices.insert(0, first)
@@ -60,17 +56,17 @@ def let_in(now: Moment) -> list[int]:
             proven = now.is_proven(k, found, list(others.values()))
             if proven and (at_first or agreement.enter(k, found, now.held)):
                 now.held[k] = found
-                for count in (now.state.versions, now.state.lineage):
-                    count[k] = count.get(k, -1) + 1
+                effort = now.state.efforts[k]
+                effort.version += 1
+                effort.lineage += effort.version > 0
                 now.disturbed.add(k)
                 break
         else:
-            refused.append(k)
+            now.refused.append(k)
     if at_first:
         agreement.start(now.held)
-        for k in refused:
+        for k in now.refused:
             now.flag(FleetGuarantee.HELD, [k], "it cannot stay where it begins")
-    return refused
 
 
 def note_arrivals(now: Moment) -> None:
@@ -85,7 +81,7 @@ def note_arrivals(now: Moment) -> None:
             now.state.arrived.add(k)
             continue
         # It stays where it is, or where its plan ends, and looks for another one.
-        stay = resting(now.vehicles[k], now.poses[k], now.time, found)
+        stay = now.resting(k, found)
         if not (now.is_proven(k, stay, now.expected_by(k)) and now.agreed(k, stay)):
             stay = given_up(found)
         now.hold(k, stay)
@@ -130,7 +126,7 @@ def _note_pressed(now: Moment) -> None:
             least = nearest(pair[one], pair[other]).distance
             now.pressed[one, other] = max(min(least, now.keep) - ROUNDING, 0.0)
     for k, found in now.held.items():
-        proven = now.state.proven.get(k) is found.course  # it stands on a plan that is free
+        proven = now.state.proofs.apart.get(k) is found.course  # it stands on a plan that is free
         if not (leads(found) or proven or k in now.state.broken):
             now.note_near(k)
 
@@ -140,7 +136,7 @@ def _note_crossing(now: Moment) -> None:
 
     Who had not received another one's emergency drove on.
     """
-    for one, other in sorted(now.state.crossing):
+    for one, other in sorted(now.state.proofs.crossing):
         if one not in now.held or other not in now.held:
             continue
         if {one, other} & {*now.void} or {one, other} <= now.state.broken:
@@ -161,7 +157,7 @@ def _rejoin_within(now: Moment, k: int, found: OwnPlan) -> None:
         return
     others, left = now.expected_by(k), now.left_to_pay(k)
     choices, again = [], None
-    for one in rejoined(now.vehicles[k], found, now.time, now.poses[k], now.tube):
+    for one in now.rejoined(k, found):
         choices.append(one)
         if now.is_proven(k, one, others):
             again = one
@@ -171,8 +167,8 @@ def _rejoin_within(now: Moment, k: int, found: OwnPlan) -> None:
             now.make_void(k)
         return
     now.held[k] = again
-    now.state.versions[k] += 1
-    now.state.lineage[k] += int(again.cost > left * (1.0 + NEARLY))
+    now.state.efforts[k].version += 1
+    now.state.efforts[k].lineage += again.cost > left * (1.0 + NEARLY)
     now.disturbed.add(k)
     now.off[k] = 0.0
     if k in now.state.due:
@@ -355,7 +351,7 @@ def stop(now: Moment, broken_down: set[int]) -> None:
     tube = now.state.settings.tube_m
     beyond = {k for k in now.state.broken & set(now.held) if now.off[k] > tube}
     for k in sorted(new | beyond):
-        now.hold(k, stopping(now.vehicles[k], now.held[k], now.time, now.begin_of(k)))
+        now.hold(k, now.stopping(k))
     now.state.broken |= new
     now.void = [k for k in now.void if k not in now.state.broken]
     for k, found in now.held.items():
@@ -376,7 +372,7 @@ def plan_anew(now: Moment) -> None:
     stopped, anew = set(now.state.broken), set[int]()
     while waiting:
         k = waiting.pop(0)
-        stop = stopping(now.vehicles[k], now.held[k], now.time, now.begin_of(k))
+        stop = now.stopping(k)
         found = None if k in anew or k in now.state.silent else _another(now, k, waiting)
         anew.add(k)
         if found is None:
@@ -404,12 +400,11 @@ def plan_anew(now: Moment) -> None:
 def _another(now: Moment, k: int, waiting: Sequence[int]) -> OwnPlan | None:
     """A plan for a vehicle whose plan is void; None if none is found.
 
-    ToPass all that others may drive, or else past those whose plans are not void and past where
+    Past all that others may drive, or else past those whose plans are not void and past where
     the others stop.
     """
-    vehicle, pose = now.vehicles[k], now.begin_of(k)
-    everyone = now.expected_by(k)
-    for one in rejoined(vehicle, now.held[k], now.time, pose, now.tube):
+    pose, everyone = now.begin_of(k), now.expected_by(k)
+    for one in now.rejoined(k, now.held[k], pose):
         if now.is_proven(k, one, everyone):
             return one
     past = everyone
@@ -417,9 +412,7 @@ def _another(now: Moment, k: int, waiting: Sequence[int]) -> OwnPlan | None:
         found = search(now, k, now.from_here(k, pose), past, math.inf, most=LONG)[0]
         if found is not None and now.is_proven(k, found, past):
             return found
-        stops = [
-            (j, stopping(now.vehicles[j], now.held[j], now.time, now.begin_of(j))) for j in waiting
-        ]
+        stops = [(j, now.stopping(j)) for j in waiting]
         past = [*now.expected_by(k, but=waiting), *stops]
     return None
 

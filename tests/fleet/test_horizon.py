@@ -16,9 +16,9 @@ from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
 from maneuver_automaton.fleet.agreement import Agreement
 from maneuver_automaton.fleet.courses import FleetCourse
-from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
+from maneuver_automaton.fleet.guarantees import broken
 from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
-from maneuver_automaton.fleet.meetings import meetings
+from maneuver_automaton.fleet.meetings import gap_between, meetings
 from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
 from maneuver_automaton.fleet.workers import PlanRequest, Terms, ToPass, answered
@@ -227,58 +227,46 @@ def found_on(vehicle, *, cost=2.0, start=(0.0, 0.0, 0.0), duration=2.0):
     return OwnPlan(plan, cost, 0, vehicle.course_of(plan))
 
 
-def after_of(held, *, time=0.0, swaps=(), off=None, keep=0.1):
-    return After(
-        time=time,
-        held=held,
-        courses={k: one.course.after(time) for k, one in held.items()},
-        off=off or dict.fromkeys(held, 0.0),
-        disturbed=set(),
-        in_group=set(),
-        swaps=swaps,
-        tube_m=0.05,
-        keep=keep,
-        frame=ORIGIN,
-    )
-
-
 def pair(gap=1.0):
-    """Two robots that drive beside each other, their bodies a distance apart."""
-    ends = ([0, 0, 0], [2, 0, 0]), ([0, 0.6 + gap, 0], [2, 0.6 + gap, 0])
+    """A moment at which two robots hold plans side by side."""
+    ends = [([0, 0, 0], [2, 0, 0]), ([0, 0.6 + gap, 0], [2, 0.6 + gap, 0])]
     fleet = FleetProblem([problem_of(*one) for one in ends], names=("a", "b"), margin=0.1)
-    vehicles = vehicles_of(fleet)
-    held = {k: found_on(one, start=one.problem.start) for k, one in enumerate(vehicles)}
-    agreement = Agreement(fleet.names)
-    agreement.start(held)
-    return vehicles, held, agreement
+    state = FleetHorizon(fleet, step=0.5).state
+    state.agreement = Agreement(fleet.names)
+    for k, one in enumerate(state.vehicles):
+        state.held[k] = found_on(one, start=one.problem.start)
+    state.agreement.start(state.held)
+    now = Moment(state, 0.0, {}, Budget.from_now(1.0))
+    now.before = {k: (one.cost, one.arrival) for k, one in now.held.items()}
+    now.off = dict.fromkeys(now.held, 0.0)
+    return now
 
 
-def broken_by(vehicles, agreement, before, after):
-    return [(one.guarantee, one.names) for one in broken(vehicles, agreement, before, after)]
+def courses_of(now):
+    return {k: one.course for k, one in now.held.items()}
+
+
+def broken_by(now):
+    return [(one.guarantee, one.names) for one in broken(now, courses_of(now))]
 
 
 def test_apart():
     for gap, expected in ((0.2, []), (0.09, [(FleetGuarantee.APART, ("a", "b"))])):
-        vehicles, held, agreement = pair(gap)
-        before = Before.of(vehicles, held, 0.0, None)
-        assert broken_by(vehicles, agreement, before, after_of(held)) == expected
+        assert broken_by(pair(gap)) == expected
 
 
 def test_held():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
-    after = after_of(held, off={0: 0.06, 1: 0.0})
-    assert broken_by(vehicles, agreement, before, after) == [(FleetGuarantee.HELD, ("a",))]
+    now = pair()
+    now.off[0] = 0.06
+    assert broken_by(now) == [(FleetGuarantee.HELD, ("a",))]
 
 
 def test_value_and_arrival():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
-    later = dict(held)
-    later[1] = found_on(vehicles[1], cost=3.0, start=held[1].plan.start, duration=3.0)
-    agreement.start(later)
-    said = broken_by(vehicles, agreement, before, after_of(later))
-    assert said == [
+    now = pair()
+    start = now.held[1].plan.start
+    now.held[1] = found_on(now.vehicles[1], cost=3.0, start=start, duration=3.0)
+    now.state.agreement.start(now.held)
+    assert broken_by(now) == [
         (FleetGuarantee.DECREASE, ("b",)),
         (FleetGuarantee.ARRIVAL, ("b",)),
         (FleetGuarantee.DECREASE, ("a", "b")),
@@ -286,33 +274,29 @@ def test_value_and_arrival():
 
 
 def test_still_is_free():
-    vehicles, held, agreement = pair()
-    wall = replace(vehicles[0].problem, obstacles=(ma.Obstacle(Disc(0.5, [2.0, 0.0])),))
-    vehicles[0].problem = wall
-    before = Before.of(vehicles, held, 0.0, None)
-    said = broken_by(vehicles, agreement, before, after_of(held))
-    assert said == [(FleetGuarantee.STILL, ("a",))]
+    now = pair()
+    vehicle = now.vehicles[0]
+    wall = ma.Obstacle(Disc(0.5, [2.0, 0.0]))
+    vehicle.problem = replace(vehicle.problem, obstacles=(wall,))
+    assert broken_by(now) == [(FleetGuarantee.STILL, ("a",))]
 
 
 def test_commit_order():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
+    now = pair()
     numbers = {"before": 3.0, "after": 2.0}
     one = Swap(names=("a",), past=(("b", 0),), holds=(("a", 1),), order=0, **numbers)
     stale = Swap(names=("b",), past=(("a", 0),), holds=(("b", 1),), order=1, **numbers)
     fresh = replace(stale, past=(("a", 1),))
-    assert not broken_by(vehicles, agreement, before, after_of(held, swaps=(one, fresh)))
-    said = broken_by(vehicles, agreement, before, after_of(held, swaps=(one, stale)))
-    assert said == [(FleetGuarantee.ORDER, ("b",))]
+    now.swaps = [one, fresh]
+    assert not broken_by(now)
+    now.swaps = [one, stale]
+    assert broken_by(now) == [(FleetGuarantee.ORDER, ("b",))]
 
 
 def test_known():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
-    other = dict(held)
-    other[0] = found_on(vehicles[0])
-    said = broken_by(vehicles, agreement, before, after_of(other))
-    assert said == [(FleetGuarantee.KNOWN, ("a",))]
+    now = pair()
+    now.held[0] = found_on(now.vehicles[0])
+    assert broken_by(now) == [(FleetGuarantee.KNOWN, ("a",))]
 
 
 def gap_of(courses, **more):
@@ -321,16 +305,16 @@ def gap_of(courses, **more):
 
 def test_the_gap_that_is_proven():
     for gap in (0.15, 0.4, 0.9):
-        _, held, _ = pair(gap)
-        proven = gap_of({k: one.course for k, one in held.items()}).distance
+        now = pair(gap)
+        proven = gap_of(courses_of(now)).distance
         assert gap - 0.05 < proven <= gap
-    _, held, _ = pair(0.05)
-    assert gap_of({k: one.course for k, one in held.items()}).distance == 0.0
+    now = pair(0.05)
+    assert gap_of(courses_of(now)).distance == 0.0
 
 
 def test_a_gap_that_still_holds_is_not_measured_again():
-    _, held, _ = pair(0.4)
-    courses = {k: one.course for k, one in held.items()}
+    now = pair(0.4)
+    courses = courses_of(now)
     proven = gap_of(courses)
     before, after = proven.nearest.time - 0.1, proven.nearest.time + 0.1
     assert gap_of(courses, time=before, last=proven).nearest is proven.nearest
@@ -365,8 +349,8 @@ def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
 
 
 def test_what_is_left_of_a_plan():
-    (vehicle, _), held, _ = pair()
-    found = held[0]
+    now = pair()
+    vehicle, found = now.vehicles[0], now.held[0]
     assert left_to_pay(vehicle, found, 0.5) == pytest.approx(1.5)
     assert left_to_pay(vehicle, found, 5.0) == 0.0
     assert math.isinf(left_to_pay(vehicle, resting(vehicle, found.plan.start, 0.0), 1.0))
@@ -374,7 +358,8 @@ def test_what_is_left_of_a_plan():
 
 
 def test_how_far_a_body_is_off_its_plan():
-    (vehicle, _), held, _ = pair()
+    now = pair()
+    vehicle, held = now.vehicles[0], now.held
     assert off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.1, 0.0])) == pytest.approx(0.1)
     turned = off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.0, 0.2]))
     assert turned == pytest.approx(2.0 * 0.3 * math.sin(0.1))  # a disc that turns does not move
