@@ -6,8 +6,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from maneuver_automaton.collision.arrays import WorldArrays
 from maneuver_automaton.collision.body import Body
-from maneuver_automaton.collision.world import WorldArrays
 
 # x, y [m], heading [rad] of the rear axle, speed [m/s], steering angle [rad]
 State: TypeAlias = tuple[float, float, float, float, float]
