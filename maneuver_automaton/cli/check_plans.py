@@ -20,8 +20,8 @@ from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import Closest, DrivenVerdict, FleetLog, verify_driven, verify_fleet
 from maneuver_automaton.fleet.driven import FINE
-from maneuver_automaton.formats.driven_json import read_closed_loop_document
-from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop, read_fleet_loop_document
+from maneuver_automaton.formats.closed_loop_json import read_closed_loop_document
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, read_fleet_loop_document
 from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,
