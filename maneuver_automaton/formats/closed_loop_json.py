@@ -29,8 +29,8 @@ from maneuver_automaton.formats.documents import (
     Document,
     Flag,
     Known,
+    ModelEntry,
     Number,
-    VehicleEntry,
     Whole,
     document_if,
     misstated,
@@ -142,7 +142,7 @@ def tag_of(row: Any, applied: str, ended: str) -> str:
 class LoopDocument(Document):
     """What a closed loop of one vehicle did."""
 
-    vehicle: NotRequired[VehicleEntry | None]
+    vehicle: NotRequired[ModelEntry | None]
     automaton_hash: NotRequired[Annotated[str, says("what the library was")]]
     status: NotRequired[Annotated[str, says("reached, steps_spent or no_plan")]]
     reached: Flag

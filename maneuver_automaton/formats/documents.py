@@ -53,7 +53,7 @@ Flag = Annotated[bool, Strict()]
 Pairs = list[tuple[Number, Number]]
 
 
-class VehicleEntry(TypedDict):
+class ModelEntry(TypedDict):
     """The vehicle by name, and what the columns of a trajectory are."""
 
     model: str
@@ -113,7 +113,7 @@ def package_version() -> str:
         return "0"
 
 
-def vehicle_entry(model: Model) -> VehicleEntry:
+def vehicle_entry(model: Model) -> ModelEntry:
     """The vehicle by name, and what the columns of a trajectory are."""
     return {
         "model": model.name,

@@ -42,8 +42,8 @@ from maneuver_automaton.formats.documents import (
     Document,
     Flag,
     Known,
+    ModelEntry,
     Number,
-    VehicleEntry,
     Whole,
     document_if,
     number,
@@ -153,7 +153,7 @@ VehicleStep = Annotated[
 class VehicleLoopEntry(TypedDict):
     """What one vehicle did."""
 
-    vehicle: VehicleEntry
+    vehicle: ModelEntry
     automaton_hash: str
     status: Annotated[str, says("arrived, under_way, broken_down or not_there")]
     reached: Flag

@@ -24,9 +24,9 @@ from maneuver_automaton.formats.documents import (
     Document,
     Flag,
     Known,
+    ModelEntry,
     Number,
     Pairs,
-    VehicleEntry,
     Whole,
     checked,
     kind_of,
@@ -117,7 +117,7 @@ class AlternativeEntry(TypedDict):
 class PlanDocument(Document):
     """The answer to a problem."""
 
-    vehicle: NotRequired[VehicleEntry | None]
+    vehicle: NotRequired[ModelEntry | None]
     automaton_hash: NotRequired[Annotated[str, says("what the library was")]]
     status: Annotated[str, says("how planning ended")]
     narrowest: NotRequired[Annotated[NarrowestEntry | None, says("only where one is known")]]

@@ -23,8 +23,8 @@ from maneuver_automaton.formats.documents import (
     Document,
     Flag,
     Known,
+    ModelEntry,
     Number,
-    VehicleEntry,
     Whole,
     number,
     package_version,
@@ -102,7 +102,7 @@ class DriveStepEntry(TypedDict):
 class DriveDocument(Document):
     """A drive on a road."""
 
-    vehicle: NotRequired[VehicleEntry | None]
+    vehicle: NotRequired[ModelEntry | None]
     automaton_hash: NotRequired[str]
     status: NotRequired[str]
     reached: Flag
