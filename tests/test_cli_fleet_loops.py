@@ -319,5 +319,5 @@ class TestPlot:
         driven["vehicles"]["east"]["steps"][0].pop("plan")
         Path("out/closed_loop.json").write_text(json.dumps(driven))
         assert run(["plot", "out/closed_loop.json"]) == 2
-        said = "out/closed_loop.json: vehicles.east: misses the key 'plan'\n"
+        said = "out/closed_loop.json: vehicles.east.steps[0].plan: is missing, need a list\n"
         assert capsys.readouterr().err == said

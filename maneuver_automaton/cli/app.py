@@ -346,7 +346,7 @@ def check(
 
     FILE may be a plan.json: its plans are proven again, in the world of the file that they were
     planned from, which is that of --with or, of several vehicles, the one that they name. So is
-    what was driven in a closed_loop.json of several vehicles.
+    what was driven in a closed_loop.json, of one vehicle or several, on roads too.
     """
     from maneuver_automaton.cli import check_command
     from maneuver_automaton.cli.inputs import Parts

@@ -151,7 +151,7 @@ def read_document(path: Path | str, *kinds: str) -> dict[str, Any]:
     """
     file = file_of(kinds[0]) if kinds else "plan.json"
     value = parsed(path, file)
-    kind = kind_of(value)
+    kind = kind_of(value) or "plan"
     if kinds and kind not in kinds:
         if isinstance(value, dict) and {"schema", *KINDS[kind][1]} <= value.keys():
             whose = "several vehicles" if "fleet" in kinds[0] else "one vehicle"
@@ -199,12 +199,12 @@ def _refuse_constant(word: str) -> float:
 
 
 def kind_of(value: Any) -> str:
-    """The kind of document that the value of a file states; "plan" if it states none.
+    """The kind of document that the value of a file states; empty if it states none.
 
     Examples
     --------
     >>> kind_of({"kind": "fleet", "steps": []}), kind_of({"loops": []}), kind_of(None)
-    ('fleet-loop', 'statistics', 'plan')
+    ('fleet-loop', 'statistics', '')
     """
     keys = value.keys() if isinstance(value, dict) else set()
     if "loops" in keys:
@@ -216,6 +216,8 @@ def kind_of(value: Any) -> str:
         steps = value["steps"]
         first = steps[0] if isinstance(steps, list) and steps else None
         return "drive" if isinstance(first, dict) and "reduced_state" in first else "loop"
+    if not {"primitives", "trajectory"} & keys:
+        return ""
     return "road-plan" if "stop" in keys else "plan"
 
 

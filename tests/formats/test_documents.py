@@ -49,7 +49,7 @@ def write_fleet_loop(folder, file):
 
 
 def write_road_fleet(folder, file):
-    result = plan_roads({"1": scene_of(folder)})
+    result = plan_roads({"100": scene_of(folder)})
     write_document(road_fleet_to_dict(result, status="found", reason=""), file)
 
 
@@ -67,7 +67,7 @@ WRITERS = {
     ),
     "road-fleet": write_road_fleet,
     "road-fleet-drive": lambda folder, file: write_document(
-        road_fleet_drive_to_dict(drive_roads({"1": scene_of(folder)})), file
+        road_fleet_drive_to_dict(drive_roads({"100": scene_of(folder)})), file
     ),
 }
 
