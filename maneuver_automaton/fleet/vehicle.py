@@ -32,7 +32,7 @@ from maneuver_automaton.planning.blocked import (
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in, prepare
-from maneuver_automaton.planning.result import LowerBound, PlanResult
+from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.shifting import followed_by
