@@ -59,6 +59,7 @@ FILMED = "parallel_parking"
 FIGURES = ("symmetry", "feasible", "uniform_effort", "unconstrained", "turnpike")
 TABLES = {  # between a line <!-- word --> and <!-- end -->
     "reference/keys.md": ("keys", reference.keys),
+    "reference/documents.md": ("documents", reference.documents),
     "reference/options.md": ("options", reference.options),
     "reference/python.md": ("names", reference.names),
     "gallery.md": ("scenarios", gallery.table),

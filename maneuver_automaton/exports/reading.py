@@ -13,9 +13,9 @@ from maneuver_automaton._arrays import as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
+from maneuver_automaton.formats.closed_loop_json import load_closed_loop, read_closed_loop_document
 from maneuver_automaton.formats.fleet_json import load_fleet
-from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,
