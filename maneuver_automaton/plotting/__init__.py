@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import draw_motions as draw_motions
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
-    from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
     from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
     from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
@@ -63,7 +62,6 @@ _HOMES = {
     "draw_motions": "automata",
     "save_automaton_figure": "automata",
     "trim_colors": "colors",
-    "draw_altitude": "controls",
     "draw_controls": "controls",
     "draw_efforts": "effort",
     "draw_node_efforts": "effort",

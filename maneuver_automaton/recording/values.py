@@ -67,7 +67,9 @@ class Curve:
 
     def __post_init__(self) -> None:
         freeze(self, "time")
-        freeze(self, "value")
+        value = np.array(self.value, dtype=np.float64)  # nan and inf are allowed
+        value.flags.writeable = False
+        object.__setattr__(self, "value", value)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
