@@ -29,15 +29,11 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
     from maneuver_automaton.plotting.films import film_of as film_of
     from maneuver_automaton.plotting.films import save_film as save_film
-    from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
-    from maneuver_automaton.plotting.labels import control_labels as control_labels
     from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
     from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
     from maneuver_automaton.plotting.look import Look as Look
     from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
-    from maneuver_automaton.plotting.motions import track_colors as track_colors
-    from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
     from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
     from maneuver_automaton.plotting.pictures import figure_of as figure_of
     from maneuver_automaton.plotting.pictures import save_picture as save_picture
@@ -73,15 +69,11 @@ _HOMES = {
     "save_feasible_figure": "feasible",
     "film_of": "films",
     "save_film": "films",
-    "footprint_polygons": "footprint",
-    "control_labels": "labels",
     "figure_shift": "lessons",
     "figure_symmetry": "lessons",
     "Look": "look",
     "draw_maneuvers": "maneuvers",
     "save_maneuvers_figure": "maneuvers",
-    "track_colors": "motions",
-    "draw_nodes": "nodes",
     "draw_obstacles": "obstacles",
     "figure_of": "pictures",
     "save_picture": "pictures",

@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from maneuver_automaton.plotting import draw_plane
 from maneuver_automaton.plotting.colors import twist_color
 from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
-from maneuver_automaton.plotting import draw_plane
 from tests.plotting.cases import plan_of_trims
 
 GRID = {

@@ -69,7 +69,7 @@ def test_a_trim_has_its_colour_everywhere():
 
 
 def test_the_legend_names_the_trims_of_the_plan_once():
-    ax, artists = drawn(plan_of(["straight", "spin", "straight", "rest"], [1.0, 1.0, 1.0, 1.0]))
+    ax, _ = drawn(plan_of(["straight", "spin", "straight", "rest"], [1.0, 1.0, 1.0, 1.0]))
     assert names(ax) == ["straight", "spin", "rest", "start", "goal"]
     assert drawn(parking_plan(), legend=False)[0].get_legend() is None
 
@@ -148,8 +148,7 @@ def test_a_moved_plan_has_moved_artists(footprint, by):
             np.testing.assert_allclose(move.act(np.asarray(points)), moved, atol=1e-9)
     np.testing.assert_array_equal(here["path"].get_colors(), there["path"].get_colors())
     tips = [
-        np.stack([quiver.U, quiver.V], axis=-1)
-        for quiver in (here["headings"], there["headings"])
+        np.stack([quiver.U, quiver.V], axis=-1) for quiver in (here["headings"], there["headings"])
     ]
     turn = SE2(np.array([0.0, 0.0, by[2]]))
     np.testing.assert_allclose(turn.act(tips[0]), tips[1], atol=1e-9)
@@ -246,7 +245,7 @@ def test_names_are_shown_as_they_are():
         type(trim)(name=name, body_velocity=trim.body_velocity, control=trim.control)
         for trim, name in zip(plan.trims, ["$x_1", "_hidden"], strict=True)
     ]
-    ax, artists = drawn(type(plan)(plan.start, tuple(named), durations=plan.durations))
+    ax, _ = drawn(type(plan)(plan.start, tuple(named), durations=plan.durations))
     ax.figure.canvas.draw()
     assert names(ax)[:2] == ["$x_1", "_hidden"]
 

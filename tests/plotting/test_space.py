@@ -18,6 +18,7 @@ from tests.plotting.cases import TOWN, assert_picture, flight, parking_plan, res
 from tests.plotting.fleets import fleet_of
 from tests.plotting.loops import flight_loop
 
+
 @pytest.mark.slow
 @pytest.mark.parametrize("obstacles", [TOWN, TOWN[:1], ()], ids=["town", "one", "none"])
 def test_flights_are_written(obstacles, tmp_path):
