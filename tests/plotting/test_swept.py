@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from maneuver_automaton.plotting.bodies import swept_area
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.bodies import swept_area
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.scene import plan_scene
 from maneuver_automaton.plotting.swept import swept_region
