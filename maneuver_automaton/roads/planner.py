@@ -130,6 +130,21 @@ class RoadPlanner:
         settings = replace(self.settings, width=width, horizon_s=horizon_s)
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
+    def hurried(self) -> RoadPlanner:
+        """A planner like this one, limits of speed no rule: what is beyond them has a price."""
+        route = self.horizon.route
+        freed = route._replace(slowing=-math.inf, time=np.zeros_like(route.time))
+        return replace(self, horizon=self.horizon._replace(route=freed))
+
+    @property
+    def limits_leave_time(self) -> bool:
+        """Whether limits of speed leave time for a goal, as the cost to go estimates it."""
+        route, goals = self.horizon.route, self.horizon.goals
+        here = np.argmin(np.hypot(*(route.point - self.local.start.middle[:2]).T))
+        stations = route.spacing * np.arange(len(route.time))
+        lasts = np.interp(goals.extent[:, 0], stations, route.time) - route.time[here]
+        return bool((lasts <= goals.tick[:, 1] * self.tick).any())
+
     def past(self, others: Sequence[Obstacle]) -> RoadPlanner:
         """A planner like this one, among others of its kind besides: what these hold is known.
 
@@ -443,7 +458,7 @@ def road_planner(
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
-        route=route_arrays(local, route)._replace(
+        route=route_arrays(route)._replace(
             closed=closed_lines(closed, route, vehicle, local.start.time, settings.off_traffic_m)
         ),
         goals=goals,

@@ -27,7 +27,6 @@ from maneuver_automaton.roads.route import (
     SPACING,
     Route,
     extent_on,
-    limits_allow,
 )
 from maneuver_automaton.roads.rules import Barrier
 from maneuver_automaton.roads.scene import RoadScene
@@ -37,10 +36,9 @@ STRIPS = 17  # along the route, side by side
 LONGEST = 60.0  # [s] that is looked ahead from its begin on to a goal without a last time
 
 
-def route_arrays(scene: RoadScene, route: Route) -> RouteArrays:
-    """The route for the kernels, no line closed; limits that no goal allows have a price only."""
+def route_arrays(route: Route) -> RouteArrays:
+    """The route for the kernels, no line closed."""
     speed = np.array(route.limit[:, COLUMNS])
-    kept = limits_allow(route, scene)
     for k in range(1, len(speed)):
         speed[k] = min(speed[k], math.sqrt(speed[k - 1] ** 2 + 2.0 * GAINING * SPACING))
     return RouteArrays(
@@ -48,9 +46,9 @@ def route_arrays(scene: RoadScene, route: Route) -> RouteArrays:
         heading=np.array(route.heading),
         direction=np.stack([np.cos(route.heading), np.sin(route.heading)], axis=-1),
         limit=np.array(route.limit),
-        time=np.cumsum(SPACING / speed) if kept else np.zeros(len(speed)),
+        time=np.cumsum(SPACING / speed),
         closed=np.zeros((0, 3)),
-        slowing=SLOWING if kept else -math.inf,
+        slowing=SLOWING,
         spacing=SPACING,
         aside=ASIDE,
     )

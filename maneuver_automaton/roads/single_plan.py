@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,22 +81,34 @@ def plan_road(
 
     It is polished, and passes the judge. No search begins after `time_limit` [s].
     """
+    return _widened(road_planner(scene, vehicle, settings), time_limit)
+
+
+def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPlanResult:
+    """A plan within limits of speed, looked for in half of the time [s]; else one beyond them.
+
+    Without `loop` nothing is driven in closed loop within limits: that is what comes next anyway.
+    """
     begin = time.perf_counter()
+    if (why := planner.hopeless()) is not None:
+        return _without(planner, why[1])
+    limited = bool(np.isfinite(planner.route.limit).any())
     with patient():
-        best = _widened(road_planner(scene, vehicle, settings), begin + time_limit)
+        widths = WIDTHS if planner.limits_leave_time else WIDTHS[:2]
+        best = _wider(planner, begin + (0.5 if limited else 1.0) * limit, widths, loop=loop)
+        if limited and best.plan is None and not stopped():
+            hurried = _wider(planner.hurried(), begin + limit, WIDTHS, loop=True)
+            best = best if hurried.plan is None else hurried
     return replace(best, search_s=time.perf_counter() - begin)
 
 
-def _widened(planner: RoadPlanner, deadline: float, *, loop: bool = True) -> RoadPlanResult:
-    """The better one of the first search that finds a plan, and of the next wider one.
-
-    Without `loop` nothing is driven in closed loop, which is what comes next anyway.
-    """
-    if (why := planner.hopeless()) is not None:
-        return _without(planner, why[1])
+def _wider(
+    planner: RoadPlanner, deadline: float, widths: Sequence[int], *, loop: bool
+) -> RoadPlanResult:
+    """The better one of the first search that finds a plan, and of the next wider one."""
     best, driven = _without(planner, ""), ""
-    for width in WIDTHS:
-        if width != WIDTHS[0] and (stopped() or time.perf_counter() > deadline):
+    for width in widths:
+        if width != widths[0] and (stopped() or time.perf_counter() > deadline):
             break
         cost = best.cost
         if width:
@@ -208,10 +221,7 @@ def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanRe
     first = None if planner.hopeless() else planner.search(planner.start_state, tick=0)
     if first is not None and first.reaches:
         return None
-    begin = time.perf_counter()
-    with patient():
-        best = _widened(planner, begin + time_limit, loop=False)
-    return replace(best, search_s=time.perf_counter() - begin)
+    return _widened(planner, time_limit, loop=False)
 
 
 def drive_road(
