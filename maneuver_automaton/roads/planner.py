@@ -27,17 +27,22 @@ from maneuver_automaton.roads.arrays import (
     Horizon,
     HorizonTask,
 )
-from maneuver_automaton.roads.clearing import clearing_of
-from maneuver_automaton.roads.decision import AT_REST, RoadDecision, RoadSettings
 from maneuver_automaton.roads.judge import hopeless
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
-from maneuver_automaton.roads.plans import plan_of_controls
-from maneuver_automaton.roads.polishing import ROUND, polished_controls
+from maneuver_automaton.roads.plans import (
+    AT_REST,
+    ROUND,
+    RoadDecision,
+    RoadSettings,
+    plan_of_controls,
+    polished_controls,
+)
 from maneuver_automaton.roads.route import Route, route_of
 from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
+    clearing_of,
     closed_lines,
     goal_arrays,
     route_arrays,

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
 from maneuver_automaton.roads.lanelets import Lanelet, along
-from maneuver_automaton.roads.scene import RoadScene
+from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
 
 if TYPE_CHECKING:
     import networkx
