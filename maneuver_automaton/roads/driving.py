@@ -171,7 +171,8 @@ class Driver:
         """The drive, judged among the traffic of a scene."""
         planner, at_goal, driven = self.planner, self.reached, self.driven
         states = np.array([*(step.state for step in self.done), self.state])
-        status, reason = _ending(planner, states, stood=_stood(self.done), reached=at_goal)
+        stood = [step.time for step in self.done if step.decision.stands]
+        status, reason = _ending(planner, states, stood=stood, reached=at_goal)
         reason += ", when the drive was interrupted" if stopped() and not at_goal else ""
         verdict = judged(scene, planner.vehicle, driven)
         if self.hopeless is not None:
@@ -219,16 +220,10 @@ def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
     return np.array([*pose, 0.0 if abs(speed) <= AT_REST else speed, steering])
 
 
-def _stood(steps: Sequence[RoadStep]) -> tuple[float, float] | None:
-    """First and last time at which the vehicle stood, as no motion was free [s]."""
-    times = [step.time for step in steps if step.decision.stands]
-    return (times[0], times[-1]) if times else None
-
-
 def _ending(
-    planner: RoadPlanner, states: Array, *, stood: tuple[float, float] | None, reached: bool
+    planner: RoadPlanner, states: Array, *, stood: Sequence[float], reached: bool
 ) -> tuple[str, str]:
-    """Status and reason after the `states` (n, 5) at all ticks."""
+    """Status and reason after the `states` (n, 5) at all ticks, some of them `stood` at [s]."""
     if reached:
         return "reached", ""
     tick = len(states) - 1
@@ -236,8 +231,8 @@ def _ending(
     looked_at = np.arange(0, len(states), planner.horizon.goals.every)
     times = np.array([planner.time_of(k) for k in looked_at.tolist()])
     why = nearest_miss(planner.local.goals, planner.vehicle, times, states[looked_at])
-    if stood is not None:
-        first, last = stood
+    if stood:
+        first, last = stood[0], stood[-1]
         since = f"at {first:.6g} s" if first == last else f"from {first:.6g} s to {last:.6g} s"
         why += f"; no continuation was found {since}"
     why += planner.waits(states[-1], tick=tick)

@@ -14,7 +14,7 @@ from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.roads import _kernels_polish
-from maneuver_automaton.roads.arrays import Horizon, Moves
+from maneuver_automaton.roads.arrays import Moves, RoadArrays
 
 AT_REST = 1e-9  # [m/s]
 # Weights of the blocks of a move. All keep the speed, or the steering angle, after it; of the
@@ -193,7 +193,7 @@ class RoadDecision:
 
 
 def polished_controls(
-    horizon: Horizon, plan: RoadDecision, *, passes: int = ROUND, rounds: int = 1
+    horizon: RoadArrays, plan: RoadDecision, *, passes: int = ROUND, rounds: int = 1
 ) -> Array | None:
     """Controls (n, 2) of a plan to a goal that cost less; None if no move makes it cheaper.
 
@@ -202,7 +202,7 @@ def polished_controls(
 
     Parameters
     ----------
-    horizon : Horizon
+    horizon : RoadArrays
     plan : RoadDecision
     passes : int
         Each tries one pattern in one size.

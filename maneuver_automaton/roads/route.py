@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.roads.lanelets import Lanelet, along
 from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
-
-if TYPE_CHECKING:
-    import networkx
 
 SPACING = 1.0  # [m] of the points of the line
 LONGEST = 1e5  # [m] of a route, and of the outline of a goal
@@ -108,26 +105,17 @@ def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]
     return found
 
 
-def lanelet_graph(lanelets: Sequence[Lanelet]) -> networkx.DiGraph[int]:
-    """Lanelets as nodes; edges to successors cost the length driven, lane changes a constant."""
-    import networkx
-
-    known = {lanelet.number for lanelet in lanelets}
-    graph: networkx.DiGraph[int] = networkx.DiGraph()
-    graph.add_nodes_from(known)
-    for lanelet in lanelets:
-        for number in known.intersection(lanelet.successors):
-            graph.add_edge(lanelet.number, number, cost=lanelet.length, beside=False)
-        for number in known.intersection(lanelet.beside):
-            graph.add_edge(lanelet.number, number, cost=LANE_CHANGE, beside=True)
-    return graph
-
-
 def _path(lanelets: dict[int, Lanelet], sources: list[int], targets: list[int]) -> list[int]:
     """Numbers of the lanelets of the line: those that are left by a lane change are left out."""
     import networkx
 
-    graph = lanelet_graph(list(lanelets.values()))
+    graph: networkx.DiGraph[int] = networkx.DiGraph()  # a lane change costs a constant
+    graph.add_nodes_from(lanelets)
+    for lanelet in lanelets.values():
+        for number in lanelets.keys() & lanelet.successors:
+            graph.add_edge(lanelet.number, number, cost=lanelet.length, beside=False)
+        for number in lanelets.keys() & lanelet.beside:
+            graph.add_edge(lanelet.number, number, cost=LANE_CHANGE, beside=True)
     best: tuple[float, list[int]] | None = None
     for source in sources:
         costs, paths = networkx.single_source_dijkstra(graph, source, weight="cost")

@@ -164,22 +164,17 @@ def _in_order(
     """Plans one after another, past those before; by name in the order of the scenes."""
     results, others = dict[str, RoadPlanResult](), list[Obstacle]()
     for name in order:
-        scene = scenes[name]
-        past = replace(scene, traffic=(*scene.traffic, *others))
-        results[name] = one = plan_road(past, vehicle, time_limit=time_limit / len(order))
+        scene = _among(scenes[name], others)
+        results[name] = one = plan_road(scene, vehicle, time_limit=time_limit / len(order))
         if one.plan is not None:
-            others.append(_seen_by_others(vehicle, one.plan, name))
+            plan = one.plan
+            steps = max(math.ceil(plan.duration / SAMPLE_S), 1)
+            times = np.linspace(plan.start_time, plan.start_time + plan.duration, steps + 1)
+            others.append(_seen_by_others(vehicle, times, plan.pose_at(times), name))
     return {name: results[name] for name in scenes}
 
 
-def _seen_by_others(vehicle: RoadVehicle, plan: Plan, name: str) -> Obstacle:
-    """A plan as a road user for those that are planned after it."""
-    steps = max(math.ceil(plan.duration / SAMPLE_S), 1)
-    times = np.linspace(plan.start_time, plan.start_time + plan.duration, steps + 1)
-    return seen_by_others(vehicle, times, plan.pose_at(times), name)
-
-
-def seen_by_others(vehicle: RoadVehicle, times: Array, poses: Array, name: str) -> Obstacle:
+def _seen_by_others(vehicle: RoadVehicle, times: Array, poses: Array, name: str) -> Obstacle:
     """What a vehicle is going to do as a road user for others, a little larger than it is.
 
     It is there between the first and the last of the times (n,) [s] of its poses (n, 3).
@@ -200,17 +195,7 @@ def judged_together(
     """The verdict on each plan past all others."""
     there = {name: driving(vehicle, plan, name) for name, plan in plans.items()}
     return {
-        name: judged(
-            replace(
-                scenes[name],
-                traffic=(
-                    *scenes[name].traffic,
-                    *(there[other] for other in plans if other != name),
-                ),
-            ),
-            vehicle,
-            plan,
-        )
+        name: judged(_among(scenes[name], _others(there, name)), vehicle, plan)
         for name, plan in plans.items()
     }
 
@@ -352,10 +337,11 @@ def drive_roads(
     before = plan_roads(scenes, vehicle, name=name, time_limit=time_limit)
     planners = {one: road_planner(scene, vehicle, settings) for one, scene in scenes.items()}
     first = {one: found.decision for one, found in before.results.items() if found.plan is not None}
-    starts = {
-        one: driving(vehicle, planner.plan_of(planner.start_state, np.zeros((1, 2))), one)
+    begins = {
+        one: planner.plan_of(planner.start_state, np.zeros((1, 2)))
         for one, planner in planners.items()
     }
+    starts = {one: driving(vehicle, begin, one) for one, begin in begins.items()}
     drivers = {
         one: Driver(planner, first.get(one), steps, _others(starts, one))
         for one, planner in planners.items()
@@ -364,20 +350,24 @@ def drive_roads(
         for planner in planners.values():
             planner.warm()
         _drive(drivers, progress)
-    there = {one: driving(vehicle, driver.driven, one) for one, driver in drivers.items()}
-    there = {one: body for one, body in there.items() if drivers[one].done}
     # Who does not set off, as it touches another at the start, is there all the same.
-    there |= {one: starts[one] for one, driver in drivers.items() if driver.hopeless}
+    driven = {
+        one: begins[one] if driver.hopeless else driver.driven
+        for one, driver in drivers.items()
+        if driver.done or driver.hopeless
+    }
+    there = {one: driving(vehicle, plan, one) for one, plan in driven.items()}
     drives = {
-        one: driver.drive(
-            replace(scenes[one], traffic=(*scenes[one].traffic, *_others(there, one)))
-        )
+        one: driver.drive(_among(scenes[one], _others(there, one)))
         for one, driver in drivers.items()
     }
-    driven = {one: drive.driven for one, drive in drives.items() if drive.steps}
     return RoadFleetDrive(
         name=name, results=drives, pairs=nearest_pairs(vehicle, driven), before=before
     )
+
+
+def _among(scene: RoadScene, others: Sequence[Obstacle]) -> RoadScene:
+    return replace(scene, traffic=(*scene.traffic, *others))
 
 
 def _others(bodies: Mapping[str, Obstacle], name: str) -> list[Obstacle]:
@@ -431,4 +421,4 @@ def _held(name: str, driver: Driver, last: float) -> Obstacle | None:
     poses = planner.world(states[:, :3])
     if not reaches:
         times, poses = np.append(times, last), np.concatenate([poses, poses[-1:]])
-    return seen_by_others(planner.vehicle, times, poses, name)
+    return _seen_by_others(planner.vehicle, times, poses, name)
