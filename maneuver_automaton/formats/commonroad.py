@@ -38,8 +38,7 @@ from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag, tags_below_root
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import GoalRegion, Lanelet, RoadBenchmark, RoadScene, RoadStart
-from maneuver_automaton.roads.goal_region import outlines_of
-from maneuver_automaton.roads.scene import unwrapped
+from maneuver_automaton.roads.scene import outlines_of, unwrapped
 
 FORMAT = "CommonRoad"
 MOST_BYTES = 50_000_000

@@ -26,7 +26,7 @@ from maneuver_automaton.roads._kernels_costs import (
     stage_rate,
 )
 from maneuver_automaton.roads._kernels_motion import first_free_stop, free_tick, one_tick
-from maneuver_automaton.roads.arrays import BeamArrays, Horizon, HorizonTask, Maneuvers
+from maneuver_automaton.roads.arrays import BeamArrays, HorizonTask, Maneuvers, RoadArrays
 from maneuver_automaton.search._kernels_cells import EMPTY, enter
 from maneuver_automaton.search._kernels_distance import pop, push
 
@@ -52,7 +52,7 @@ def is_new(
 
 
 @bare_inner_kernel
-def strip_of(horizon: Horizon, search: BeamArrays, node: int) -> int:
+def strip_of(horizon: RoadArrays, search: BeamArrays, node: int) -> int:
     """Which strip along the route a node is in."""
     pose, near = search.pose, search.links[node, NEAR]
     _, offset = on_route(horizon.route, pose[node, 0], pose[node, 1], near)
@@ -61,7 +61,7 @@ def strip_of(horizon: Horizon, search: BeamArrays, node: int) -> int:
 
 
 @bare_inner_kernel
-def speed_of(task: HorizonTask, horizon: Horizon, search: BeamArrays, node: int) -> float:
+def speed_of(task: HorizonTask, horizon: RoadArrays, search: BeamArrays, node: int) -> float:
     """Speed at a node [m/s]: of its trim, or, at the start, that of the vehicle."""
     return task.speed if node == 0 else float(horizon.trims.speed[search.links[node, TRIM]])
 
@@ -69,7 +69,7 @@ def speed_of(task: HorizonTask, horizon: Horizon, search: BeamArrays, node: int)
 @bare_inner_kernel
 def add_children(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     search: BeamArrays,
     node: int,
     maneuvers: Maneuvers,
@@ -121,7 +121,7 @@ def add_children(
 @bare_inner_kernel
 def prove_edge(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     search: BeamArrays,
     maneuvers: Maneuvers,
     node: int,
@@ -151,7 +151,7 @@ def prove_edge(
 @bare_inner_kernel
 def cost_along(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     search: BeamArrays,
     maneuvers: Maneuvers,
     node: int,
@@ -203,7 +203,7 @@ def word_to(
 @bare_inner_kernel
 def finish(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     search: BeamArrays,
     first: Maneuvers,
     node: int,
@@ -235,7 +235,7 @@ def keep_node(search: BeamArrays, node: int, row: int) -> None:
 
 
 @bare_inner_kernel
-def begin(task: HorizonTask, horizon: Horizon, search: BeamArrays, first: Maneuvers) -> None:
+def begin(task: HorizonTask, horizon: RoadArrays, search: BeamArrays, first: Maneuvers) -> None:
     """The node that the vehicle is at, and its children."""
     state, links, pose = search.state, search.links, search.pose
     for k in range(state.shape[0]):
@@ -257,7 +257,7 @@ def begin(task: HorizonTask, horizon: Horizon, search: BeamArrays, first: Maneuv
 @bare_inner_kernel
 def furthest(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     search: BeamArrays,
     first: Maneuvers,
     levels: int,
@@ -287,7 +287,7 @@ def furthest(
 @bare_inner_kernel
 def note_goal(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     search: BeamArrays,
     first: Maneuvers,
     node: int,
@@ -307,7 +307,7 @@ def note_goal(
 @bare_kernel
 def search_beam(
     task: HorizonTask,
-    horizon: Horizon,
+    horizon: RoadArrays,
     first: Maneuvers,
     search: BeamArrays,
     shares: Array,

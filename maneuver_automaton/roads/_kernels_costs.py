@@ -15,7 +15,7 @@ from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.groups._kernels import nearest_turn
 from maneuver_automaton.roads.arrays import (
     GoalArrays,
-    Horizon,
+    RoadArrays,
     RouteArrays,
     StaticObstacles,
     Weights,
@@ -109,7 +109,9 @@ def in_ring(goals: GoalArrays, ring: int, x: float, y: float) -> bool:
 
 
 @bare_inner_kernel
-def goal_at(horizon: Horizon, x: float, y: float, heading: float, speed: float, tick: int) -> int:
+def goal_at(
+    horizon: RoadArrays, x: float, y: float, heading: float, speed: float, tick: int
+) -> int:
     """Number of the goal that a state of the rear axle meets at a tick, -1 for none."""
     goals, ahead = horizon.goals, horizon.clearing.car.ahead
     m_x, m_y = x + ahead * math.cos(heading), y + ahead * math.sin(heading)
@@ -132,7 +134,7 @@ def goal_at(horizon: Horizon, x: float, y: float, heading: float, speed: float, 
 
 
 @bare_kernel
-def first_goal(horizon: Horizon, states: Array, tick: int) -> int:
+def first_goal(horizon: RoadArrays, states: Array, tick: int) -> int:
     """First of the states (n, 5) at ticks from `tick` on that meets a goal, -1 if none does."""
     for k in range(states.shape[0]):
         if goal_at(horizon, states[k, 0], states[k, 1], states[k, 2], states[k, 3], tick + k) >= 0:
@@ -153,7 +155,7 @@ def stage_rate(weights: Weights, limit: float, offset: float, turned: float, spe
 
 @bare_inner_kernel
 def rate_at(
-    horizon: Horizon, x: float, y: float, heading: float, speed: float, guess: int
+    horizon: RoadArrays, x: float, y: float, heading: float, speed: float, guess: int
 ) -> tuple[float, int, float]:
     """`stage_rate` of a state, the point of the route that is nearest to a guess, the limit."""
     ahead, route = horizon.clearing.car.ahead, horizon.route
@@ -222,7 +224,7 @@ def in_time(
 
 @bare_inner_kernel
 def along_to_goal(
-    horizon: Horizon, g: int, station: float, speed: float, least: float, most: float
+    horizon: RoadArrays, g: int, station: float, speed: float, least: float, most: float
 ) -> tuple[float, float]:
     """Cost to be at the stations of goal `g` between two times from now [s], and that time [s].
 
@@ -261,7 +263,7 @@ def along_to_goal(
 
 @bare_inner_kernel
 def past_lines(
-    horizon: Horizon, station: float, speed: float, tick: int, end: float
+    horizon: RoadArrays, station: float, speed: float, tick: int, end: float
 ) -> tuple[float, float, float, float]:
     """Cost to come past closed lines before a station, and from where it goes on after the last.
 
@@ -305,7 +307,13 @@ def sideways(weights: Weights, acceleration: float, time: float) -> float:
 
 @bare_inner_kernel
 def cost_to_goal(
-    horizon: Horizon, g: int, station: float, offset: float, turned: float, speed: float, tick: int
+    horizon: RoadArrays,
+    g: int,
+    station: float,
+    offset: float,
+    turned: float,
+    speed: float,
+    tick: int,
 ) -> float:
     """Estimate of the cost to be at goal `g` in its time.
 
@@ -392,7 +400,7 @@ def cost_past_obstacles(
 
 @bare_inner_kernel
 def cost_to_go(
-    horizon: Horizon, station: float, offset: float, turned: float, speed: float, tick: int
+    horizon: RoadArrays, station: float, offset: float, turned: float, speed: float, tick: int
 ) -> float:
     """Estimate of the cost-to-go, to the goal that is cheapest to reach."""
     goals, weights = horizon.goals, horizon.weights
@@ -412,7 +420,7 @@ def cost_to_go(
 
 @bare_inner_kernel
 def cost_of_tick(
-    horizon: Horizon, states: Array, controls: Array, k: int, guess: int
+    horizon: RoadArrays, states: Array, controls: Array, k: int, guess: int
 ) -> tuple[float, int, bool]:
     """Cost (stage and effort) of tick `k` of a motion, the nearest point of the route after it.
 
@@ -432,7 +440,7 @@ def cost_of_tick(
 
 
 @bare_kernel
-def price(horizon: Horizon, states: Array, controls: Array) -> float:
+def price(horizon: RoadArrays, states: Array, controls: Array) -> float:
     """Cost (stage and effort) of a motion with states (n + 1, 5) and controls (n, 2)."""
     total, near = 0.0, nearest_of_all(horizon.route, states[0, 0], states[0, 1])
     for k in range(controls.shape[0]):

@@ -17,7 +17,14 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_advancement import free_of_static
 from maneuver_automaton.collision._kernels_moving import free_of_moving
-from maneuver_automaton.roads.arrays import Clearing, Horizon, Limits, Maneuvers, State, Trims
+from maneuver_automaton.roads.arrays import (
+    Clearing,
+    Limits,
+    Maneuvers,
+    RoadArrays,
+    RoadTrims,
+    State,
+)
 
 STEPS = 2  # of the quadrature in one tick: 1e-6 m off the equations after 0.5 s at 12 m/s
 ROUNDING = 1e-9  # [m/s^2, rad/s] that a ramp may be beyond its limits
@@ -118,7 +125,7 @@ def write_course(
 @inner_kernel
 def leading_from(
     limits: Limits,
-    trims: Trims,
+    trims: RoadTrims,
     begin: tuple[float, float],
     low: int,
     high: int,
@@ -144,7 +151,7 @@ def leading_from(
 
 
 @kernel
-def maneuvers_from(limits: Limits, trims: Trims, speed: float, steering: float) -> Maneuvers:
+def maneuvers_from(limits: Limits, trims: RoadTrims, speed: float, steering: float) -> Maneuvers:
     """All maneuvers from one state, which need not be a trim."""
     most = trims.speed.shape[0]
     found = np.empty(most, dtype=np.int64)
@@ -158,7 +165,7 @@ def maneuvers_from(limits: Limits, trims: Trims, speed: float, steering: float) 
 
 
 @kernel
-def maneuvers_between(limits: Limits, trims: Trims, most: int) -> Maneuvers:
+def maneuvers_between(limits: Limits, trims: RoadTrims, most: int) -> Maneuvers:
     """All maneuvers between trims, at most `most` of them."""
     count = trims.speed.shape[0]
     found = np.empty(most, dtype=np.int64)
@@ -242,7 +249,7 @@ def free_ticks(clearing: Clearing, states: Array, tick: int) -> int:
 
 
 @bare_inner_kernel
-def stays_free(horizon: Horizon, x: float, y: float, heading: float, tick: int) -> bool:
+def stays_free(horizon: RoadArrays, x: float, y: float, heading: float, tick: int) -> bool:
     """Whether nobody comes where the vehicle stands from a tick on until the goals are over."""
     clearing, last = horizon.clearing, tick
     for g in range(horizon.goals.tick.shape[0]):
@@ -257,7 +264,7 @@ def stays_free(horizon: Horizon, x: float, y: float, heading: float, tick: int) 
 
 @bare_inner_kernel
 def stop_with(
-    horizon: Horizon,
+    horizon: RoadArrays,
     state: State,
     share: float,
     tick: int,
@@ -299,7 +306,7 @@ def stop_with(
 
 @bare_inner_kernel
 def first_free_stop(
-    horizon: Horizon,
+    horizon: RoadArrays,
     state: State,
     tick: int,
     shares: Array,

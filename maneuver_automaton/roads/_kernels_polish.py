@@ -15,14 +15,14 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, kernel
 from maneuver_automaton.roads._kernels_costs import cost_of_tick, goal_at, nearest_of_all
 from maneuver_automaton.roads._kernels_motion import admitted, drive_tick, free_from
-from maneuver_automaton.roads.arrays import Course, Horizon, Moves
+from maneuver_automaton.roads.arrays import Moves, RoadArrays, TickPlan
 
 GAIN = 1e-6  # share of the cost that a move has to save
 LONG = 64  # ticks of a plan from which on a pass leaves places out
 
 
 @bare_inner_kernel
-def drive_on(horizon: Horizon, course: Course, begin: int, lasting: int, most: float) -> bool:
+def drive_on(horizon: RoadArrays, course: TickPlan, begin: int, lasting: int, most: float) -> bool:
     """Drive the controls from the tick `begin` on; whether limits hold and it costs less.
 
     Costs only rise, so the drive ends where they reach `most`.
@@ -49,7 +49,7 @@ def drive_on(horizon: Horizon, course: Course, begin: int, lasting: int, most: f
 
 
 @bare_inner_kernel
-def take_over(source: Course, course: Course, begin: int) -> None:
+def take_over(source: TickPlan, course: TickPlan, begin: int) -> None:
     """Copy all of a course from a tick on, the state there included."""
     for k in range(begin, course.states.shape[0]):
         for i in range(5):
@@ -61,7 +61,7 @@ def take_over(source: Course, course: Course, begin: int) -> None:
 
 @bare_inner_kernel
 def is_better(
-    horizon: Horizon, course: Course, trial: Course, begin: int, lasting: int, tick: int
+    horizon: RoadArrays, course: TickPlan, trial: TickPlan, begin: int, lasting: int, tick: int
 ) -> bool:
     """Whether a trial, its controls changed from `begin` on, is cheaper, free, and at the goal."""
     if not drive_on(horizon, trial, begin, lasting, (1.0 - GAIN) * course.cost[lasting]):
@@ -74,10 +74,10 @@ def is_better(
 
 @bare_inner_kernel
 def try_pass(
-    horizon: Horizon,
+    horizon: RoadArrays,
     moves: Moves,
-    course: Course,
-    trial: Course,
+    course: TickPlan,
+    trial: TickPlan,
     lasting: int,
     tick: int,
     number: int,
@@ -107,7 +107,7 @@ def try_pass(
 
 @kernel
 def polish(
-    horizon: Horizon,
+    horizon: RoadArrays,
     moves: Moves,
     state: Array,
     controls: Array,
@@ -122,8 +122,8 @@ def polish(
     number `first` on each try one pattern in one size along all of it.
     """
     m = controls.shape[0]
-    course = Course(np.empty((m + 1, 5)), controls, np.zeros(m + 1), np.zeros(m + 1, np.int64))
-    trial = Course(
+    course = TickPlan(np.empty((m + 1, 5)), controls, np.zeros(m + 1), np.zeros(m + 1, np.int64))
+    trial = TickPlan(
         np.empty((m + 1, 5)), np.empty((m, 2)), np.zeros(m + 1), np.zeros(m + 1, np.int64)
     )
     course.states[0] = state

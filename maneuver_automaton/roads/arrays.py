@@ -33,7 +33,7 @@ class Limits(NamedTuple):
     weight_jerk: float  # per (m/s^3)^2 s, across
 
 
-class Trims(NamedTuple):
+class RoadTrims(NamedTuple):
     """S trims: pairs of a speed and a steering angle, speed by speed."""
 
     speed: np.ndarray  # (S,) [m/s]
@@ -135,12 +135,12 @@ class Clearing(NamedTuple):
     tick: float  # [s]
 
 
-class Horizon(NamedTuple):
+class RoadArrays(NamedTuple):
     """Everything that stays the same from step to step."""
 
     clearing: Clearing
     limits: Limits
-    trims: Trims
+    trims: RoadTrims
     maneuvers: Maneuvers
     route: RouteArrays
     goals: GoalArrays
@@ -199,7 +199,7 @@ class Moves(NamedTuple):
     size: np.ndarray  # (S, 2) of acceleration [m/s^2] and steering rate [rad/s]
 
 
-class Course(NamedTuple):
+class TickPlan(NamedTuple):
     """A plan tick by tick, the stop after it included."""
 
     states: np.ndarray  # (m + 1, 5)

@@ -22,7 +22,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.roads import _kernels_motion
-from maneuver_automaton.roads.arrays import Limits, Maneuvers, Trims
+from maneuver_automaton.roads.arrays import Limits, Maneuvers, RoadTrims
 from maneuver_automaton.roads.plans import ramps, trim_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -41,7 +41,7 @@ class RoadLibrary:
     """Trims and maneuvers of one vehicle."""
 
     limits: Limits
-    trims: Trims
+    trims: RoadTrims
     maneuvers: Maneuvers
 
     def automaton(self, model: SecondOrderCar) -> Automaton:
@@ -136,7 +136,7 @@ def road_library(
         weight_across=0.05,
         weight_jerk=0.002,
     )
-    trims = Trims(
+    trims = RoadTrims(
         speed=np.repeat(speeds, counts),
         steering=np.concatenate(angles),
         first=np.cumsum([0, *counts]).astype(np.int64),

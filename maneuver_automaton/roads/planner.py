@@ -24,20 +24,25 @@ from maneuver_automaton.roads.arrays import (
     BeamArrays,
     Clearing,
     GoalArrays,
-    Horizon,
     HorizonTask,
+    RoadArrays,
 )
-from maneuver_automaton.roads.clearing import clearing_of
-from maneuver_automaton.roads.decision import AT_REST, RoadDecision, RoadSettings
 from maneuver_automaton.roads.judge import hopeless
 from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
-from maneuver_automaton.roads.plans import plan_of_controls
-from maneuver_automaton.roads.polishing import ROUND, polished_controls
+from maneuver_automaton.roads.plans import (
+    AT_REST,
+    ROUND,
+    RoadDecision,
+    RoadSettings,
+    plan_of_controls,
+    polished_controls,
+)
 from maneuver_automaton.roads.route import Route, route_of
 from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
+    clearing_of,
     closed_lines,
     goal_arrays,
     route_arrays,
@@ -71,7 +76,7 @@ class RoadPlanner:
     settings: RoadSettings
     route: Route
     library: RoadLibrary
-    horizon: Horizon
+    horizon: RoadArrays
     room: BeamArrays = field(repr=False)
     kind: tuple[Obstacle, ...] = ()  # of the scene's traffic what drives by plans like its own
     barriers: tuple[Barrier, ...] = ()  # closed stop lines that it can keep, in the frame
@@ -130,6 +135,21 @@ class RoadPlanner:
         settings = replace(self.settings, width=width, horizon_s=horizon_s)
         return replace(self, settings=settings, room=beam_arrays(settings, self.library))
 
+    def hurried(self) -> RoadPlanner:
+        """A planner like this one, limits of speed no rule: what is beyond them has a price."""
+        route = self.horizon.route
+        freed = route._replace(slowing=-math.inf, time=np.zeros_like(route.time))
+        return replace(self, horizon=self.horizon._replace(route=freed))
+
+    @property
+    def limits_leave_time(self) -> bool:
+        """Whether limits of speed leave time for a goal, as the cost to go estimates it."""
+        route, goals = self.horizon.route, self.horizon.goals
+        here = np.argmin(np.hypot(*(route.point - self.local.start.middle[:2]).T))
+        stations = route.spacing * np.arange(len(route.time))
+        lasts = np.interp(goals.extent[:, 0], stations, route.time) - route.time[here]
+        return bool((lasts <= goals.tick[:, 1] * self.tick).any())
+
     def past(self, others: Sequence[Obstacle]) -> RoadPlanner:
         """A planner like this one, among others of its kind besides: what these hold is known.
 
@@ -156,22 +176,11 @@ class RoadPlanner:
         return replace(self, barriers=tuple(left))._cleared()
 
     def _cleared(self) -> RoadPlanner:
-        clearing = _clearing(
-            self.local,
-            self.vehicle,
-            self.settings,
-            self.barriers,
-            self.horizon.goals,
-            tick=self.tick,
+        """The same once traffic or barriers are others."""
+        clearing, closed = _kept_clear_of(
+            self.local, self.vehicle, self.settings, self.barriers, self.route, self.horizon.goals
         )
-        lines = closed_lines(
-            self.barriers,
-            self.route,
-            self.vehicle,
-            self.local.start.time,
-            self.settings.off_traffic_m,
-        )
-        route = self.horizon.route._replace(closed=lines)
+        route = self.horizon.route._replace(closed=closed)
         return replace(self, horizon=self.horizon._replace(clearing=clearing, route=route))
 
     def waits(self, state: Array, *, tick: int) -> str:
@@ -438,14 +447,13 @@ def road_planner(
         for one in barriers(local, vehicle, route.lanelets, until=until)
         if not one.comes_too_late(vehicle, local.start, settings.off_traffic_m + DEEP)
     )
-    horizon = Horizon(
-        clearing=_clearing(local, vehicle, settings, closed, goals, tick=tick),
+    clearing, lines = _kept_clear_of(local, vehicle, settings, closed, route, goals)
+    horizon = RoadArrays(
+        clearing=clearing,
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
-        route=route_arrays(local, route)._replace(
-            closed=closed_lines(closed, route, vehicle, local.start.time, settings.off_traffic_m)
-        ),
+        route=route_arrays(route)._replace(closed=lines),
         goals=goals,
         obstacles=static_obstacles(local, route, vehicle),
         weights=weights_of(scene, vehicle),
@@ -471,22 +479,22 @@ def _last_tick(goals: GoalArrays, settings: RoadSettings, tick: float) -> int:
     )
 
 
-def _clearing(
+def _kept_clear_of(
     local: RoadScene,
     vehicle: RoadVehicle,
     settings: RoadSettings,
     closed: Sequence[Barrier],
+    route: Route,
     goals: GoalArrays,
-    *,
-    tick: float,
-) -> Clearing:
-    """What has to be kept clear of, until the last stop."""
-    seen = (*local.traffic, *(one.obstacle for one in closed))
-    return clearing_of(
-        replace(local, traffic=seen),
+) -> tuple[Clearing, Array]:
+    """What has to be kept clear of until the last stop, and `RouteArrays.closed`."""
+    tick, keep = tick_of(local.step), settings.off_traffic_m
+    clearing = clearing_of(
+        replace(local, traffic=(*local.traffic, *(one.obstacle for one in closed))),
         vehicle,
         tick=tick,
         last_tick=_last_tick(goals, settings, tick),
         off_edge=settings.off_edge_m,
-        off_traffic=settings.off_traffic_m,
+        off_traffic=keep,
     )
+    return clearing, closed_lines(closed, route, vehicle, local.start.time, keep)

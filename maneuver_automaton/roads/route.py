@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.roads.goal_region import GoalRegion, outlines_of
 from maneuver_automaton.roads.lanelets import Lanelet, along
-from maneuver_automaton.roads.scene import RoadScene
-
-if TYPE_CHECKING:
-    import networkx
+from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
 
 SPACING = 1.0  # [m] of the points of the line
 LONGEST = 1e5  # [m] of a route, and of the outline of a goal
@@ -37,7 +33,6 @@ class Route:
     # [m/s] at offsets `ASIDE` apart, from right to left: the limit there, and no more than what
     # braking to those ahead leaves; inf where there is none.
     limit: Array  # (n, 2 `COLUMNS` + 1)
-    fastest: Array  # (n,) [m/s] the greatest limit at each point, whatever is ahead
     extents: Array  # (goals, 4) least and greatest station, least and greatest offset of each
 
 
@@ -62,7 +57,7 @@ def route_of(scene: RoadScene) -> Route:
     path = _path(lanelets, sources, targets)
     line, limits = _line([lanelets[k] for k in path], lanelets)
     points, heading, own = _spaced(line, limits)
-    limit, fastest = _limits_around(scene.lanelets, points, heading, own)
+    limit = _limits_around(scene.lanelets, points, heading, own)
     # A route that returns to where it starts passes a goal there at its end.
     here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
     extents = np.array([_extent_of(goal, points, heading, here) for goal in scene.goals])
@@ -71,7 +66,6 @@ def route_of(scene: RoadScene) -> Route:
         points=points,
         heading=heading,
         limit=limit,
-        fastest=fastest,
         extents=extents,
     )
 
@@ -111,26 +105,17 @@ def lanelets_of_goal(lanelets: Sequence[Lanelet], goal: GoalRegion) -> list[int]
     return found
 
 
-def lanelet_graph(lanelets: Sequence[Lanelet]) -> networkx.DiGraph[int]:
-    """Lanelets as nodes; edges to successors cost the length driven, lane changes a constant."""
-    import networkx
-
-    known = {lanelet.number for lanelet in lanelets}
-    graph: networkx.DiGraph[int] = networkx.DiGraph()
-    graph.add_nodes_from(known)
-    for lanelet in lanelets:
-        for number in known.intersection(lanelet.successors):
-            graph.add_edge(lanelet.number, number, cost=lanelet.length, beside=False)
-        for number in known.intersection(lanelet.beside):
-            graph.add_edge(lanelet.number, number, cost=LANE_CHANGE, beside=True)
-    return graph
-
-
 def _path(lanelets: dict[int, Lanelet], sources: list[int], targets: list[int]) -> list[int]:
     """Numbers of the lanelets of the line: those that are left by a lane change are left out."""
     import networkx
 
-    graph = lanelet_graph(list(lanelets.values()))
+    graph: networkx.DiGraph[int] = networkx.DiGraph()  # a lane change costs a constant
+    graph.add_nodes_from(lanelets)
+    for lanelet in lanelets.values():
+        for number in lanelets.keys() & lanelet.successors:
+            graph.add_edge(lanelet.number, number, cost=lanelet.length, beside=False)
+        for number in lanelets.keys() & lanelet.beside:
+            graph.add_edge(lanelet.number, number, cost=LANE_CHANGE, beside=True)
     best: tuple[float, list[int]] | None = None
     for source in sources:
         costs, paths = networkx.single_source_dijkstra(graph, source, weight="cost")
@@ -208,10 +193,8 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     return points, heading, limit
 
 
-def _limits_around(
-    lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array
-) -> tuple[Array, Array]:
-    """`Route.limit` and `Route.fastest`: of lanelets that overlap the greatest limit holds.
+def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array) -> Array:
+    """`Route.limit`: of lanelets that overlap the greatest holds.
 
     Beside all lanelets it is that of the route's `own` one (n,).
     """
@@ -220,7 +203,7 @@ def _limits_around(
     offsets = ASIDE * np.arange(-COLUMNS, COLUMNS + 1)
     limit = np.full((len(points), len(offsets)), -np.inf)
     if all(one.speed_limit is None for one in lanelets):
-        return np.full_like(limit, np.inf), np.full(len(points), np.inf)
+        return np.full_like(limit, np.inf)
     aside = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
     places = points[:, None] + offsets[:, None] * aside[:, None]
     tree = shapely.STRtree(shapely.points(places.reshape(-1, 2)))
@@ -230,45 +213,13 @@ def _limits_around(
         allowed = np.inf if one.speed_limit is None else one.speed_limit
         limit[inside] = np.maximum(limit[inside], allowed)
     limit = np.where(np.isfinite(limit) | (limit > 0.0), limit, own[:, None])
-    fastest = limit.max(axis=1)
     for axis in range(2):  # a point stands for what is around it
         padded = np.pad(limit, [(1, 1) if k == axis else (0, 0) for k in range(2)], mode="edge")
         limit = np.lib.stride_tricks.sliding_window_view(padded, 3, axis=axis).min(axis=-1)
     limit = np.array(limit)
     for k in range(len(limit) - 2, -1, -1):  # so fast that braking keeps the limits ahead
         limit[k] = np.minimum(limit[k], np.sqrt(limit[k + 1] ** 2 + 2.0 * BRAKING * SPACING))
-    return limit, fastest
-
-
-def limits_allow(route: Route, scene: RoadScene) -> bool:
-    """Whether limits of speed leave a goal that can be reached, as far as its time and speed show.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Box
-    >>> from maneuver_automaton.roads import RoadStart
-    >>> lane = Lanelet(1, [[0, 2], [90, 2]], [[0, -2], [90, -2]], speed_limit=8.0)
-    >>> def allowed(last):
-    ...     goal = GoalRegion(places=(Box([4, 4], [70, 0]),), time=(0.0, last))
-    ...     scene = RoadScene(name="lane", lanelets=(lane,), goals=(goal,),
-    ...                       start=RoadStart(middle=[5.0, 0.0, 0.0], speed=8.0))
-    ...     return limits_allow(route_of(scene), scene)
-    >>> allowed(9.0), allowed(6.0)
-    (True, False)
-    """
-    start, last = scene.start, len(route.points) - 1
-    here = int(np.argmin(np.hypot(*(route.points - start.middle[:2]).T)))
-    driven = np.cumsum(np.append(0.0, SPACING / route.fastest))
-    over = max(start.speed - float(route.fastest[here]), 0.0)
-    braked = 0.0 if not over else 0.5 * over**2 / BRAKING / float(route.fastest[here])
-    for goal, extent in zip(scene.goals, route.extents, strict=True):
-        anywhere = not np.isfinite(extent[0])
-        begin, end = (0, last) if anywhere else np.clip((extent[:2] / SPACING).astype(int), 0, last)
-        lasts = 0.0 if anywhere else float(driven[begin] - driven[min(here + 1, begin)]) - braked
-        slowest = goal.speed[0] if goal.speed else -np.inf
-        if lasts <= goal.time[1] - start.time and slowest <= route.fastest[begin : end + 1].max():
-            return True
-    return False
+    return limit
 
 
 def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:

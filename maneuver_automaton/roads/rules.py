@@ -17,8 +17,8 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads.decision import AT_REST
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area
+from maneuver_automaton.roads.plans import AT_REST
 from maneuver_automaton.roads.scene import RoadScene, RoadStart
 from maneuver_automaton.roads.vehicle import RoadVehicle
 

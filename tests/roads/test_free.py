@@ -22,7 +22,7 @@ from maneuver_automaton.roads import (
     _kernels_motion,
     drivable_area,
 )
-from maneuver_automaton.roads.clearing import clearing_of
+from maneuver_automaton.roads.search_arrays import clearing_of
 from tests.quickly import draws
 
 TICK = 0.1

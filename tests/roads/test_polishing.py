@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.roads import RoadSettings, _kernels_costs, _kernels_motion, road_planner
-from maneuver_automaton.roads.polishing import ROUNDS
+from maneuver_automaton.roads.plans import ROUNDS
 from tests.roads.files import LANES, car, parked, problem, scene_of
 
 QUICK = RoadSettings(width=40, narrow=20)

@@ -259,3 +259,32 @@ def test_the_given_files(command, tmp_path):
     if command == "mpc":
         assert light["steps"][-1]["pose"][0] + RoadVehicle().ahead + FRONT < 60.0
         assert phantom["collisions"] == 0
+
+
+@BOTH
+@pytest.mark.parametrize(("limit", "speed", "beside"), [(8.3, 8.0, 8.3), (13.9, 5.0, 22.0)])
+def test_no_limit_is_exceeded_to_be_in_time(tmp_path, drive, limit, speed, beside):
+    """A wide window whose end is near: who dawdles would have to hurry."""
+    lanes = (
+        piece(1, 0, 70, f'<successor ref="2"/><speedLimit>{limit}</speedLimit>'),
+        piece(2, 70, 400, "<speedLimit>6</speedLimit>"),
+        piece(3, 0, 400, f"<speedLimit>{beside}</speedLimit>", y=(4.0, 8.0)),
+    )
+    end = int(10 * (60.0 / limit + 50.0 / 6.0 + 3.0))
+    scene = scene_of(tmp_path, *lanes, problem(goal=place(130.0, end), speed=speed))
+    result = drive(scene)
+    assert result.notes == ()
+    _, middle, speeds = driven_of(result)
+    assert middle[-1, 0] > 118.0
+    assert (speeds <= np.where(middle[:, 0] > 70.0, 6.0, limit) + 1e-6).all()
+
+
+@BOTH
+def test_a_start_beyond_the_limit_brakes_at_once(tmp_path, drive):
+    lane = piece(1, 0, 400, "<speedLimit>8</speedLimit>")
+    result = drive(scene_of(tmp_path, lane, problem(goal=place(130.0, 300), speed=14.0)))
+    _, _, speeds = driven_of(result)
+    beyond = int((speeds > 8.0).sum())
+    assert beyond <= 18
+    assert (np.diff(speeds[: beyond + 1]) <= -0.34).all()
+    assert speeds[beyond:].max() <= 8.0 + 1e-6

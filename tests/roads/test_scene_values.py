@@ -19,8 +19,8 @@ from maneuver_automaton.roads import (
     RoadVehicle,
     drivable_area,
 )
-from maneuver_automaton.roads.goal_region import turns_within
 from maneuver_automaton.roads.route import lanelets_at, lanelets_of_goal, route_of
+from maneuver_automaton.roads.scene import turns_within
 from tests.roads.files import scene_of
 
 

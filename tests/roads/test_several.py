@@ -135,6 +135,19 @@ class TestLoop:
                 (by @ SE2(plan.end)).pose[:2], other.plans[name].end[:2], atol=1e-6
             )
 
+    def test_who_touches_another_at_the_start_is_not_driven(self, folder):
+        Path("road.xml").write_text(
+            commonroad(*LANES, problem(100, x=10.0), problem(101, x=11.0), problem(102, x=60.0))
+        )
+        drive = drive_roads(scenes_of("road.xml"), time_limit=1.0)
+        for name, other in (("100", "101"), ("101", "100")):
+            one = drive.results[name]
+            assert (one.status, len(one.steps)) == ("touched", 0)
+            assert one.reason == f"collision with {other} at the start"
+            assert one.verdict.hit == (other,)
+        assert drive.status == "touched"
+        assert drive.results["102"].reached
+
     def test_alone_is_as_one_vehicle(self, folder):
         scene = scenes_of("road.xml")["100"]
         several, alone = drive_roads({"100": scene}), ma.drive_road(scene)
