@@ -119,6 +119,28 @@ def _floats(values: Any) -> tuple[float, ...]:
     return tuple(map(_float, values))
 
 
+def as_number(name: str, value: Any) -> float:
+    """A number that is handed in, as Python's own, whatever type it is written in.
+
+    Raises
+    ------
+    ValueError
+        If it is none: the `name` says which.
+    """
+    try:
+        return _float(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: got {value!r}, need a number") from error
+
+
+def as_whole(name: str, value: Any) -> int:
+    """A whole number that is handed in, as `as_number` reads numbers."""
+    try:
+        return _int(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: got {value!r}, need a whole number") from error
+
+
 NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "float": (_float, "a number"),
     "int": (_int, "a whole number"),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._limits import MOST_TURNS, check_heading, check_size
@@ -538,7 +538,7 @@ class Problem:
         >>> later.start.tolist(), later.start_time, later.goals[0].pose.tolist()
         ([1.0, 1.0, 1.0], 0.5, [1.0, 1.0, 0.0])
         """
-        changed: dict[str, Any] = {"start": start, "start_time": float(time)}
+        changed: dict[str, Any] = {"start": start, "start_time": as_number("time", time)}
         if goals is not None:
             changed["goals"] = goals
         if trim is not None:

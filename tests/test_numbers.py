@@ -6,6 +6,7 @@ import random
 import subprocess
 import sys
 from collections.abc import Callable
+from decimal import Decimal
 from fractions import Fraction
 from typing import Any
 
@@ -13,10 +14,11 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
+from maneuver_automaton import analysis
 from maneuver_automaton._kernel_cache import KernelCache, _is_listed
 from maneuver_automaton.receding_horizon import RecedingHorizon
 
-NUMBERS = (int, float, np.int32, np.int64, np.float32, np.float64, Fraction, np.array)
+NUMBERS = (int, float, np.int32, np.int64, np.float32, np.float64, Fraction, Decimal, np.array)
 ARRAYS: tuple[Callable[[Any], Any], ...] = (
     lambda rows: np.array(rows, dtype=np.int64).tolist(),
     lambda rows: np.array(rows, dtype=np.int16),
@@ -201,3 +203,38 @@ def test_no_kernel_is_compiled_for_numbers_as_people_write_them(name):
 def test_what_is_no_number_is_named(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+FREE = ma.Problem(robot(Plain()), [0, 0, 0], [3, 1, 0])
+PLANNER = ma.Planner(FREE.automaton)
+ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
+    "time_limit": (lambda v: ma.plan(FREE, time_limit=v).cost, 60),
+    "alternatives": (lambda v: len(ma.plan(FREE, alternatives=v).alternatives), 1),
+    "gap": (lambda v: [one.cost for one in ma.plans(FREE, gap=v)][-1:], 1 / 2),
+    "jobs": (lambda v: [one.cost for one in ma.plan_many([FREE], jobs=v)], 1),
+    "limit of many": (
+        lambda v: [one.cost for one in PLANNER.plan_many([0, 0, 0], [3, 1, 0], time_limit=v)],
+        60,
+    ),
+    "start_time": (lambda v: PLANNER.plan([0, 0, 0], [3, 1, 0], start_time=v).cost, 1),
+    "time": (lambda v: FREE.starting_at([0, 0, 0], time=v).start_time, 1),
+    "incumbent": (lambda v: ma.lower_bound(FREE, incumbent=v, gap=1, max_work=100).value, 4),
+    "gap of a bound": (lambda v: ma.lower_bound(FREE, gap=v, max_work=100).value, 1),
+    "max_work": (lambda v: ma.lower_bound(FREE, max_work=v, gap=1).value, 100),
+    "step": (lambda v: ma.simulate(FREE, step=v, steps=2).cost, 1),
+    "steps": (lambda v: ma.simulate(FREE, step=1, steps=v).cost, 2),
+    "applied": (lambda v: analysis.discrete_index([1, 1.5, 1.7, 1.8], applied=v), 1),
+    "horizon": (lambda v: analysis.continuous_index([1, 4], [1, 1], horizon=v, step=2), 4),
+}
+
+
+@pytest.mark.parametrize("name", ARGUMENTS)
+def test_arguments_are_numbers_of_any_type_and_nothing_else(name):
+    ask, value = ARGUMENTS[name]
+    expected = ask(value)
+    for kind in NUMBERS:
+        if value == kind(value):
+            assert ask(kind(value)) == expected, kind
+    for wrong in (str(value), [value], 1j):
+        with pytest.raises(ValueError, match=r": got .*, need a (whole )?number"):
+            ask(wrong)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.choose import load_search, search_goal
@@ -148,6 +148,8 @@ def feasible_set(
     >>> found.feasible[0, 0].tolist(), found.exhaustive
     ([False, True, True, True], True)
     """
+    within = as_number("feasible set: within", within)
+    resolution = as_number("feasible set: resolution", resolution)
     if not (math.isfinite(within) and within > 0.0):
         raise ValueError(f"feasible set: the time must be positive, got {within} s")
     if not (math.isfinite(resolution) and resolution > 0.0):

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze, wrapped
+from maneuver_automaton._arrays import Array, as_array, as_whole, freeze, wrapped
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 
@@ -94,6 +94,7 @@ def ring_poses(
     [[0.0, 0.0, -2.0], [0.0, 0.0, 2.0], [0.0, -2.0, 0.0]]
     """
     rates = as_array("levels", levels)
+    parts = as_whole("parts", parts)
     if rates.ndim != 1 or not (rates > 0.0).all() or parts < 1:
         raise ValueError(f"levels: got {rates.tolist()} in {parts} parts, need positive numbers")
     shares = [s for s in itertools.product(range(parts + 1), repeat=3) if sum(s) == parts]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, freeze
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole, freeze
 from maneuver_automaton.analysis.growth import GrowthBound
 from maneuver_automaton.analysis.suboptimality import continuous_index, discrete_index
 
@@ -64,6 +64,7 @@ def certified_horizon(growth: GrowthBound, *, step: float) -> CertifiedHorizon:
     >>> certified_horizon(growth, step=1.0).horizon
     3.0
     """
+    step = as_number("step", step)
     horizons = growth.times[growth.times > step]
     if not (step > 0.0 and horizons.size):
         raise ValueError(
@@ -98,7 +99,7 @@ def certified_intervals(growth: GrowthBound, *, applied: int = 1) -> CertifiedHo
     >>> certified_intervals(growth).horizon
     3.0
     """
-    count = growth.times.size
+    count, applied = growth.times.size, as_whole("applied", applied)
     if not np.array_equal(growth.times, np.arange(1, count + 1)) or not 1 <= applied < count:
         raise ValueError(
             f"growth bound: got times {growth.times.tolist()} for {applied} applied intervals, "

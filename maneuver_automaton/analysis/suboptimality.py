@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
 
 
 def discrete_index(growth: ArrayLike, *, applied: int = 1) -> float:
@@ -43,6 +43,7 @@ def discrete_index(growth: ArrayLike, *, applied: int = 1) -> float:
     gamma = as_array("growth", growth)
     if gamma.ndim != 1 or not (gamma > 0.0).all() or (np.diff(gamma) < 0.0).any():
         raise ValueError(f"growth: got {gamma.tolist()}, need positive numbers that rise")
+    applied = as_whole("applied", applied)
     if not 1 <= applied < gamma.size:
         raise ValueError(f"applied: got {applied}, need 1 to {gamma.size - 1} for this horizon")
     shares = np.maximum(gamma - 1.0, 0.0) / gamma  # below 1 it holds with 1 as well
@@ -88,6 +89,7 @@ def continuous_index(times: ArrayLike, growth: ArrayLike, *, horizon: float, ste
         raise ValueError("times: need one axis of rising positive times, with one growth each")
     if not (b > 0.0).all() or (np.diff(b) < 0.0).any():
         raise ValueError(f"growth: got {b.tolist()}, need positive numbers that rise")
+    horizon, step = as_number("horizon", horizon), as_number("step", step)
     if not 0.0 < step < horizon <= t[-1] * (1.0 + 1e-12):
         raise ValueError(
             f"horizon: got step {step} s and horizon {horizon} s, need 0 < step < horizon and a "

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, as_number
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import (
     Grid,
@@ -102,6 +102,8 @@ def turnpike(
     for maneuver in (up, down):
         if maneuver.course is None:
             raise ValueError(f"turnpike: maneuver {maneuver.name!r} has no course")
+    distance, step = as_number("distance", distance), as_number("step", step)
+    coasts = [as_number("coasts", coast) for coast in coasts]
     if not len(coasts) or not min(coasts) > 0.0:
         raise ValueError(f"turnpike: coasts must be positive times, got {list(coasts)} s")
     unit_cost = float(stage_cost(list(trim.reduced_state), list(trim.control)))

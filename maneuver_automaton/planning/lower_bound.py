@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
@@ -130,6 +131,11 @@ def lower_bound(
     >>> bound.kind, 0.0 <= bound.gap(cost) < 0.05
     ('cells', True)
     """
+    time_limit, gap = as_number("time_limit", time_limit), as_number("gap", gap)
+    incumbent = as_number("incumbent", incumbent)
+    max_work = None if max_work is None else as_whole("max_work", max_work)
+    if max_direction_changes is not None:
+        max_direction_changes = as_whole("max_direction_changes", max_direction_changes)
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if not 0.0 <= gap <= 1.0:

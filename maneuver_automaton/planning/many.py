@@ -16,7 +16,7 @@ from typing import Any, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.planning.plan import plan
 from maneuver_automaton.planning.result import PlanResult
@@ -130,7 +130,7 @@ def plan_many(
     >>> [round(cost, 6) for cost in plan_many(problems, take=lambda result: result.cost)]
     [1.0, 2.0]
     """
-    asked = _Asked(None, list(problems), time_limit, take)
+    asked = _Asked(None, list(problems), as_number("time_limit", time_limit), take)
     return _answers(asked, jobs, scheduler, journal, progress)
 
 
@@ -147,6 +147,7 @@ def plan_many_on(
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[Any]:
     """The answers of a planner to many queries: see `Planner.plan_many`."""
+    time_limit = as_number("time_limit", time_limit)
     asked = _Asked(planner, _queries(planner, starts, goals), time_limit, take)
     return _answers(asked, jobs, scheduler, journal, progress)
 
@@ -178,6 +179,7 @@ def _answers(
     journal: str | Path | None,
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[Any]:
+    jobs = as_whole("jobs", jobs)
     if not asked.time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {asked.time_limit} s")
     if journal is not None and asked.take is None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from queue import SimpleQueue
 from typing import Any
 
+from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, Watch
@@ -123,6 +124,9 @@ def plan_in(
     shows: Callable[..., None] | None = None,
 ) -> PlanResult:
     """Plan as `plan` does, with arrays prepared for the problem's map."""
+    time_limit = as_number("time_limit", time_limit)
+    alternatives = as_whole("alternatives", alternatives)
+    gap = None if gap is None else as_number("gap", gap)
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if alternatives < 0:

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, as_number
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
@@ -216,6 +216,7 @@ class RecedingHorizon:
             load_search(self.problem)
         budget = Budget.from_now(self.settings.time_limit)
         last = self.last
+        elapsed = None if elapsed is None else as_number("elapsed", elapsed)
         passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
         if not 0.0 <= passed < math.inf:
             raise ValueError(f"elapsed must be at least 0, got {passed} s")

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
@@ -101,6 +101,7 @@ def simulate(
     >>> loop.reached, len(loop.steps), round(loop.cost, 3)
     (True, 35, 2.182)
     """
+    step, steps = as_number("step", step), as_whole("steps", steps)
     if steps < 1:
         raise ValueError(f"steps must be at least 1, got {steps}")
     upset = checked(Disturbance() if disturbance is None else disturbance, problem.start.size)

@@ -5,8 +5,8 @@ whichever trim of the whole library pays most, where it pays most, as `search.fr
 it. What comes out takes the place of the section if it is proven free and the word is cheaper. Most
 sections have a via-point, which moves a little: so a word slides along an obstacle.
 
-The searches of the lattice use few trims (`search.lattice_trims`). They take as long as those of a
-small library, and know nothing of the words found here, whose trims they lack.
+The searches of the lattice use a few trims (`search.lattice_trims`). They take as long as those of
+a small library, and know nothing of the words found here, whose trims they lack.
 """
 
 from __future__ import annotations

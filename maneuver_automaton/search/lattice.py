@@ -116,7 +116,10 @@ def first_plan(
             break
         if stages and (not alive or total >= stages[0][0]):
             _, resolutions = stages.pop(0)
-            if any(one.backwards for one in resolutions) and budget.left < to_reverse(query):
+            # To make the reversed library cannot be stopped: all maneuvers are sampled and priced.
+            words = len(query.library.arrays.library.words)
+            takes = SECONDS_A_MANEUVER * len(query.automaton.maneuvers) + SECONDS_A_WORD * words
+            if any(one.backwards for one in resolutions) and budget.left < takes:
                 left_out = True
                 continue
             turns += _turns(guides, schedule, resolutions)
@@ -303,15 +306,6 @@ def plane_bound(query: LatticeQuery) -> float:
 
 
 SECONDS_A_MANEUVER, SECONDS_A_WORD = 1e-3, 2e-6  # measured, generous
-
-
-def to_reverse(query: LatticeQuery) -> float:
-    """Time [s] that it may take to make the reversed library of a query, which cannot be stopped.
-
-    By the number of maneuvers, whose courses are sampled and priced anew, and of words.
-    """
-    words = len(query.library.arrays.library.words)
-    return SECONDS_A_MANEUVER * len(query.automaton.maneuvers) + SECONDS_A_WORD * words
 
 
 def reversed_query(query: LatticeQuery) -> LatticeQuery | None:

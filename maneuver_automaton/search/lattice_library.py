@@ -133,6 +133,8 @@ def library_of_trims(
     twists, rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
     edges = edges_of(library)
     motion, spans = motion_along(library, parts, edges, timed=waits, close=close)
+    edge_of = np.full(len(library.maneuver_costs) + 1, SWITCH)  # the last is that of none
+    edge_of[edges.maneuver] = np.arange(len(edges.maneuver))
     radius = length_scale(twists, body_of(parts[0].shapes), wide=priced.wide)
     speed = np.hypot(twists[:, 0], twists[:, 1])
     lengths = np.array([path_length(library.automaton, k) for k in edges.maneuver])
@@ -147,7 +149,7 @@ def library_of_trims(
         edges,
         motion,
         edge_durations=durations,
-        via_edge=via_edges(library, edges),
+        via_edge=np.asarray(edge_of[library.transitions.first], dtype=np.int64),
     )
     return LatticeLibrary(
         arrays=made,
@@ -269,13 +271,6 @@ def motion_along(
         edge_high=high,
     )
     return motion, np.concatenate(spans)
-
-
-def via_edges(library: Library, edges: EdgeArrays) -> IntArray:
-    """Edge (C, C) of the first maneuver of the transition between two classes, -1 for none."""
-    edge_of = np.full(len(library.maneuver_costs) + 1, SWITCH)  # the last is that of none
-    edge_of[edges.maneuver] = np.arange(len(edges.maneuver))
-    return np.asarray(edge_of[library.transitions.first], dtype=np.int64)
 
 
 def lags(library: Library, surplus: Array, edges: EdgeArrays) -> Array:

@@ -62,11 +62,6 @@ def give_back(prepared: Prepared, library: LatticeLibrary, arrays: SearchArrays)
         spare.append(arrays)
 
 
-def room_takes(search: SearchArrays, nodes: int) -> float:
-    """About how long `with_room` takes [s]."""
-    return 0.0 if nodes <= len(search.nodes) else GROWN_S * max(nodes, 2 * len(search.nodes))
-
-
 def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
     """A copy of a search in arrays that hold at least so many nodes; itself if it has room."""
     n = len(search.nodes)

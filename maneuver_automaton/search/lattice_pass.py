@@ -16,9 +16,13 @@ from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays, Task
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, coasts_of
-from maneuver_automaton.search.lattice_memory import arrays_for, room_takes, with_room
+from maneuver_automaton.search.lattice_memory import (
+    GROWN_S,
+    arrays_for,
+    with_room,
+)
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import Resolution, goal_of_root, task_of
+from maneuver_automaton.search.lattice_task import SAMPLED_HEADINGS, Resolution, task_of
 from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.transitions import SWITCH
@@ -112,7 +116,9 @@ class Pass:
         while self.alive and (step := self.pace.take(left - self.expansions)):
             used = int(self.arrays.state[layout.N_NODES])
             most = used + self.library.most_children * (step + 1) + 2
-            self.is_late = room_takes(self.arrays, most) > self.pace.budget.left
+            room = len(self.arrays.nodes)
+            takes = GROWN_S * max(most, 2 * room)  # [s], to copy what there is
+            self.is_late = most > room and takes > self.pace.budget.left
             if self.is_late:
                 return
             self.arrays = with_room(self.arrays, most)
@@ -203,7 +209,8 @@ def _word(one: Pass) -> Word:
         link = links[node].tolist()
     goal = state[layout.GOAL]
     if one.task.sign < 0.0:
-        goal = goal_of_root(query, link[layout.ROOT])
+        roots = np.cumsum(np.where(query.free_heading, SAMPLED_HEADINGS, 1))
+        goal = int(np.searchsorted(roots, link[layout.ROOT], side="right"))
         return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)
     end = int(one.task.aim_trims[goal])
     return query.word_of(_with_maneuvers(query, path[::-1] + connection, end), goal)

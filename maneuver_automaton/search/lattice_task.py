@@ -164,12 +164,6 @@ def goal_roots(query: LatticeQuery) -> tuple[Array, IntArray]:
     return np.array(rows), np.array(trims, dtype=np.int64)
 
 
-def goal_of_root(query: LatticeQuery, root: int) -> int:
-    """Which goal a root at the goals belongs to."""
-    counts = np.where(query.free_heading, SAMPLED_HEADINGS, 1)
-    return int(np.searchsorted(np.cumsum(counts), root, side="right"))
-
-
 _End = tuple[Array, IntArray, NDArray[np.bool_]]
 
 
