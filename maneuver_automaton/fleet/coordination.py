@@ -45,6 +45,11 @@ HeldPlans: TypeAlias = dict[int, OwnPlan]
 """Plans by the numbers of their vehicles."""
 
 MOST_EVICTED = 8  # times that plans are given up for one vehicle
+MOST_QUERIES = 30  # searches for one vehicle, of one tree
+LOOKS = 400  # at a conflict, to see how long it lasts
+WORTH = 1e-6  # share of the value that another leaf has to save
+MOST_ASIDE = 3  # times that one vehicle makes room for others
+BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
 
 
 @dataclass(slots=True, eq=False)
@@ -125,11 +130,6 @@ class Turns:
             others += course.obstacles
         others += besides
         return self.vehicles[k].past(others, self.budget, most=most, known=known, again=again)
-
-
-MOST_QUERIES = 30  # searches for one vehicle, of one tree
-LOOKS = 400  # at a conflict, to see how long it lasts
-WORTH = 1e-6  # share of the value that another leaf has to save
 
 
 def by_priorities(
@@ -312,10 +312,6 @@ def _until(one: FleetCourse, other: FleetCourse, begin: float, keep: float) -> f
         near |= clearances(world, world.into(poses), times=times) <= keep
     clear = np.flatnonzero(~near[1:])
     return float(times[clear[0] + 1]) if clear.size else math.inf
-
-
-MOST_ASIDE = 3  # times that one vehicle makes room for others
-BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
 
 
 def one_at_a_time(

@@ -42,19 +42,15 @@ from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on
 
 LEFT = 0.5  # share of a tolerance that is left at least
+CONTACT = 1e-9  # [m] what is closer touches
+LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
 
 
 def with_room(problem: Problem, tube_m: float) -> Problem:
     """The problem with goals whose tolerances are less by what a vehicle may be beside its plan.
 
     A plan that ends at the edge of a tolerance arrives only where nothing disturbs it; one that
-    ends within these arrives from anywhere in its tube. At least half of a tolerance is left.
-
-    Parameters
-    ----------
-    problem : Problem
-    tube_m : float
-        How far any point of the body may be from where its plan has it [m].
+    ends within these arrives from anywhere in its tube [m]. At least half of a tolerance is left.
 
     Examples
     --------
@@ -102,10 +98,6 @@ def aimed_at(plan: Plan, goal: Goal) -> Goal:
     ):
         return goal
     return replace(goal, pose=plan.end)
-
-
-CONTACT = 1e-9  # [m] what is closer touches
-LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
 
 
 def resting(

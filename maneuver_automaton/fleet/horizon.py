@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
-from maneuver_automaton.fleet.agreement import Agreement, Knowledge, Lossless, Lost
+from maneuver_automaton.fleet.agreement import Lost, knowledge_of
 from maneuver_automaton.fleet.exchanges import exchange, exchange_what_is_due, go_on
 from maneuver_automaton.fleet.guarantees import logged
 from maneuver_automaton.fleet.held import arrival, given_up, tube_of
@@ -145,11 +145,7 @@ class FleetHorizon:
             delay_steps=delay_steps,
             workers=workers,
         )
-        knowledge: Knowledge
-        if lost is None:
-            knowledge = Lossless(lambda k, found: len(self._now.near_to(k, found)))
-        else:
-            knowledge = Agreement(fleet.names, lost)
+        knowledge = knowledge_of(fleet.names, lost, lambda k, one: len(self._now.near_to(k, one)))
         self.state = LoopState(settings, vehicles, knowledge, _plans_of(first, vehicles))
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
         # What is prepared for obstacles that vehicles have got since, which are kept alive.

@@ -37,6 +37,10 @@ FADES, MORE = 0.97, 1.15  # of the time that is kept for the end of a step
 AT_FIRST, MOST_KEPT = 0.5, 0.6  # shares of a step's limit
 
 Around = tuple[int, int, int]  # how many are there, and how often plans were exchanged
+ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
+Other = tuple[int, OwnPlan]  # a plan that another one may drive, and who that is
+MANY = 40  # others that a search looks at; all that are proven
+AWAY = 0.5  # of its way, from which on others are not looked at if there are many
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -114,11 +118,6 @@ class LoopState:
         """
         kept = max(FADES * self.kept_s, MORE * seconds)
         self.kept_s = min(kept, MOST_KEPT * self.settings.time_limit)
-
-
-ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
-
-Other = tuple[int, OwnPlan]  # a plan that another one may drive, and who that is
 
 
 class Moment:
@@ -304,10 +303,6 @@ class Moment:
         courses = [self.held[j].course for j in others]
         near = self.nearby.near(found.course, courses, keep=self.keep)
         return [j for j, is_near in zip(others, near, strict=True) if is_near]
-
-
-MANY = 40  # others that a search looks at; all that are proven
-AWAY = 0.5  # of its way, from which on others are not looked at if there are many
 
 
 def search(

@@ -34,6 +34,19 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 
+NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
+LOOK_AT = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
+REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
+IN_TIME = 0.4  # share of a step's limit, after which it does not where it can do without
+TENTHS = 10  # of the tube, by which it is said who is farthest beside its plan
+MOST = 16  # trims that are tried, those most like what the plan drives
+SWITCHES = 8  # of a step, at which one trim follows another
+WIDE, NARROW = 24, 8  # pairs of trims that are refined, and again
+SIDEWAYS = 0.5  # how much a heading counts
+LOOKS = 8  # within a step, at which it is looked at how far beside the plan it leads
+EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
+LEAST = 1e-3  # [m] kept even then
+
 
 def let_in(now: Moment) -> None:
     """Let in those that are new, if they keep apart from all: with their first plan, or at rest.
@@ -85,13 +98,6 @@ def note_arrivals(now: Moment) -> None:
         if not (now.is_proven(k, stay, now.expected_by(k)) and now.agreed(k, stay)):
             stay = given_up(found)
         now.hold(k, stay)
-
-
-NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
-LOOK_AT = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
-REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
-IN_TIME = 0.4  # share of a step's limit, after which it does not where it can do without
-TENTHS = 10  # of the tube, by which it is said who is farthest beside its plan
 
 
 def rejoin(now: Moment) -> None:
@@ -221,34 +227,13 @@ def _drives_beside(now: Moment, k: int, found: OwnPlan, choices: Sequence[OwnPla
     return False
 
 
-MOST = 16  # trims that are tried, those most like what the plan drives
-SWITCHES = 8  # of a step, at which one trim follows another
-WIDE, NARROW = 24, 8  # pairs of trims that are refined, and again
-SIDEWAYS = 0.5  # how much a heading counts
-LOOKS = 8  # within a step, at which it is looked at how far beside the plan it leads
-
-
 def back_onto(
     vehicle: FleetMember, found: OwnPlan, time: float, pose: Array, step: float, tube: float
 ) -> Plan | None:
     """Two trims for a step that lead nearest to where a plan then is, and where it then heads.
 
     They are followed by what is left of the plan. None for what does not switch at will in a plane,
-    and where none of them stays within the tube.
-
-    Parameters
-    ----------
-    vehicle : FleetMember
-    found : OwnPlan
-        The plan that is held.
-    time : float
-        [s]
-    pose : (3,) array
-        Where the vehicle is.
-    step : float
-        [s]
-    tube : float
-        How far beside its plan the vehicle may be [m].
+    and where none of them stays within the tube [m].
     """
     problem = vehicle.problem
     if not switches_at_will(problem) or pose.size != 3 or problem.horizon.min_coast > 0.0:
@@ -336,10 +321,6 @@ def _off(poses: SE2, wanted: SE2) -> Array:
     """Squares of distances [m^2]."""
     gap = poses.pose[..., :2] - wanted.pose[..., :2]
     return np.asarray((gap * gap).sum(axis=-1))
-
-
-EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
-LEAST = 1e-3  # [m] kept even then
 
 
 def stop(now: Moment, broken_down: set[int]) -> None:

@@ -55,6 +55,16 @@ ALIKE, TURNED = 0.5, 0.8  # [lengths of the body], [rad]: of refuges so near onl
 SEED = 14  # of the places
 FAR = 8.0  # [lengths of the body] from the way alone
 EXPANSIONS = 4000  # of the way to a refuge, and of that from there
+WAYS = 6  # alone, that are tried with rests
+QUICK = 1500  # expansions in space and time at first ...
+LONG = 20_000  # ... and where nothing else helps
+AT_ONCE = Patience(attempts=0, passes=0)
+WITH_TIME = Patience(attempts=400, passes=2)
+NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
+MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
+LONGEST = 400_000  # expansions for a way alone
+LEAST_S = 0.01  # [s] of a whole query
+POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
 
 
 def by_a_refuge(
@@ -137,18 +147,6 @@ def refuges(problem: Problem, query: LatticeQuery, way: Plan, *, off: bool = Fal
             if len(found) == MOST_TRIED:
                 break
     return found
-
-
-WAYS = 6  # alone, that are tried with rests
-QUICK = 1500  # expansions in space and time at first ...
-LONG = 20_000  # ... and where nothing else helps
-AT_ONCE = Patience(attempts=0, passes=0)
-WITH_TIME = Patience(attempts=400, passes=2)
-NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
-MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
-LONGEST = 400_000  # expansions for a way alone
-LEAST_S = 0.01  # [s] of a whole query
-POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
