@@ -10,6 +10,7 @@ anybody on more than the order of swaps, and no plan is ever lost.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
@@ -25,12 +26,13 @@ from maneuver_automaton.fleet.guarantees import logged
 from maneuver_automaton.fleet.held import arrival, given_up, tube_of
 from maneuver_automaton.fleet.moment import Effort, LoopSettings, LoopState, Moment
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetResult, FleetStep
+from maneuver_automaton.fleet.result import FleetLog, FleetResult, FleetStep
 from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
 from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.candidates import within
 
 
 class FleetHorizon:
@@ -78,11 +80,14 @@ class FleetHorizon:
     workers : Workers, optional
         Who looks for the vehicles' plans, such as `DaskWorkers`; this process if omitted. Whose
         worker does not answer any more drives the plan that it holds.
+    log : FleetLog, optional
+        To go on after the last step of another loop: with the plans that were held then, and
+        without the vehicles that have broken down; what was looked for in vain is looked for again.
 
     Raises
     ------
     ValueError
-        If a number is out of its range.
+        If a number is out of its range, or the log is one of other vehicles.
 
     Examples
     --------
@@ -114,6 +119,7 @@ class FleetHorizon:
         delay_steps: int = 0,
         lost: Lost | None = None,
         workers: Workers | None = None,
+        log: FleetLog | None = None,
     ) -> None:
         for name, value in (("step", step), ("time_limit", time_limit)):
             if not value > 0.0:
@@ -148,9 +154,35 @@ class FleetHorizon:
         knowledge = knowledge_of(fleet.names, lost, lambda k, one: len(self._now.near_to(k, one)))
         self.state = LoopState(settings, vehicles, knowledge, _plans_of(first, vehicles))
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
+        if log is not None:
+            self._go_on_from(log)
         # What is prepared for obstacles that vehicles have got since, which are kept alive.
         self._workspaces: dict[tuple[int, ...], tuple[tuple[AnyObstacle, ...], Workspace]] = {}
         prepare_vehicles(vehicles)
+
+    def _go_on_from(self, log: FleetLog) -> None:
+        """Hold what was held in the last step of a log, which everybody knows."""
+        if log.problem.names != self.fleet.names:
+            raise ValueError(
+                f"fleet horizon: log is one of {', '.join(log.problem.names)}, need one of "
+                f"{', '.join(self.fleet.names)}"
+            )
+        if not log.steps:
+            return
+        state, last = self.state, log.steps[-1]
+        for name, plan in last.plans.items():
+            one = state.vehicles[self._numbers[name]]
+            goals = enumerate(one.problem.goals)
+            goal_index = next((n for n, goal in goals if within(plan.end, goal)), 0)
+            cost = one.problem.cost_of(plan) if plan.trims else 0.0
+            found = OwnPlan(plan, cost, goal_index, one.course_of(plan))
+            leads = last.values[name] < math.inf
+            state.held[one.number] = found if leads else given_up(found)
+            state.efforts[one.number].version = 0
+        state.last = last
+        state.arrived = {self._numbers[name] for name in last.arrived}
+        state.broken = {self._numbers[name] for name in log.broken_down if name in last.plans}
+        state.agreement.start(state.held)
 
     def step(
         self,
