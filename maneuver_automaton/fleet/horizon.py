@@ -23,7 +23,7 @@ from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Lost, knowledge_of
 from maneuver_automaton.fleet.exchanges import exchange, exchange_what_is_due, go_on
 from maneuver_automaton.fleet.guarantees import logged
-from maneuver_automaton.fleet.held import arrival, given_up, tube_of
+from maneuver_automaton.fleet.held import tube_of
 from maneuver_automaton.fleet.moment import Effort, LoopSettings, LoopState, Moment
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetLog, FleetResult, FleetStep
@@ -174,10 +174,9 @@ class FleetHorizon:
             one = state.vehicles[self._numbers[name]]
             goals = enumerate(one.problem.goals)
             goal_index = next((n for n, goal in goals if within(plan.end, goal)), 0)
-            cost = one.problem.cost_of(plan) if plan.trims else 0.0
-            found = OwnPlan(plan, cost, goal_index, one.course_of(plan))
+            found = one.own(plan, goal_index, cost=None if plan.trims else 0.0)
             leads = last.values[name] < math.inf
-            state.held[one.number] = found if leads else given_up(found)
+            state.held[one.number] = found if leads else found.given_up()
             state.efforts[one.number].version = 0
         state.last = last
         state.arrived = {self._numbers[name] for name in last.arrived}
@@ -227,7 +226,7 @@ class FleetHorizon:
         for k in [k for k in now.held if k not in now.poses]:
             del now.held[k]
         let_in(now)
-        now.before = {k: (now.left_to_pay(k), arrival(one)) for k, one in now.held.items()}
+        now.before = {k: (now.left_to_pay(k), one.arrives) for k, one in now.held.items()}
         state.agreement.begin(now.number, now.held)
         rejoin(now)
         stop(now, stopped & set(now.held))
@@ -281,7 +280,7 @@ class FleetHorizon:
         known = state.efforts[k]
         state.efforts[k] = Effort(known.version, known.lineage)
         if k in state.held:
-            state.held[k] = given_up(state.held[k])
+            state.held[k] = state.held[k].given_up()
             state.efforts[k].lineage += 1
             state.assigned.add(k)
 
@@ -313,8 +312,5 @@ def _plans_of(first: FleetResult | None, vehicles: Sequence[FleetMember]) -> dic
         result = first.results.get(one.name)
         if result is None or result.plan is None:
             continue
-        cost = one.problem.cost_of(result.plan)
-        known[one.number] = OwnPlan(
-            result.plan, cost, result.goal_index or 0, one.course_of(result.plan)
-        )
+        known[one.number] = one.own(result.plan, result.goal_index)
     return known

@@ -153,13 +153,7 @@ def load_meetings() -> None:
 
 
 def components(numbers: Sequence[int], found: Sequence[Meeting]) -> list[tuple[int, ...]]:
-    """Groups of vehicles that meet, directly or by way of others; the largest first.
-
-    Examples
-    --------
-    >>> components([0, 1, 2, 3], [Meeting(0, 2, 1.0)])
-    [(0, 2), (1,), (3,)]
-    """
+    """Groups of vehicles that meet, directly or by way of others; the largest first."""
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(numbers)
     graph.add_edges_from((row.one, row.other) for row in found)
@@ -181,13 +175,6 @@ def swept(course: FleetCourse) -> Swept:
 
     Between two times on a path of length L, whose ends are a distance d apart, no point is farther
     than ``sqrt(L^2 - d^2) / 2`` from the box around the ends.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Disc
-    >>> way = Motion([0.0, 2.0], [[0, 0, 0], [4, 0, 0]], twist=[[2, 0, 0]])
-    >>> swept(FleetCourse(((Disc(1.0),),), (way,))).boxes.tolist()
-    [[-1.0, -1.0, 3.0, 1.0], [1.0, -1.0, 5.0, 1.0], [3.0, -1.0, 5.0, 1.0]]
     """
     begin = min(float(way.time[0]) for way in course.motions)
     first = math.floor(begin / SLOT)
@@ -245,13 +232,7 @@ def _places(way: Motion, times: Array) -> Array:
 def near_pairs(
     discs: Sequence[tuple[int, float, float, float]], keep: float
 ) -> list[tuple[int, int]]:
-    """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m].
-
-    Examples
-    --------
-    >>> near_pairs([(4, 0.0, 0.0, 1.0), (2, 2.5, 0.0, 1.0), (7, 9.0, 0.0, 1.0)], 1.0)
-    [(2, 4)]
-    """
+    """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m]."""
     if len(discs) < 2:
         return []
     import shapely

@@ -16,7 +16,6 @@ from maneuver_automaton.fleet.agreement import Knowledge
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import (
     distance_to_obstacles,
-    is_over,
     left_to_pay,
     off_plan,
     rejoined,
@@ -332,7 +331,7 @@ def request_of(
     """What a vehicle is asked for; without room at its goal, noise may lead it out there."""
     settings = now.state.settings
     goals = now.vehicles[k].problem.goals
-    if is_over(base, now.time) and any(within(base.plan.end, goal) for goal in goals):
+    if base.is_over(now.time) and any(within(base.plan.end, goal) for goal in goals):
         base = now.from_here(k)  # its plan says it is there, but it was measured elsewhere
     terms = Terms(
         time=now.time,

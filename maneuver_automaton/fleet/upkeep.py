@@ -13,17 +13,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import NOTHING, end_state, tail_of, with_samples_at
-from maneuver_automaton.fleet.held import (
-    begin_of,
-    beside,
-    given_up,
-    is_over,
-    leads,
-    off_plan,
-    reach_of,
-    rest_of_plan,
-    why_not_free,
-)
+from maneuver_automaton.fleet.held import begin_of, beside, off_plan, reach_of, why_not_free
 from maneuver_automaton.fleet.meetings import meetings, near_pairs
 from maneuver_automaton.fleet.moment import ROUNDING, Moment, search
 from maneuver_automaton.fleet.result import FleetGuarantee
@@ -85,7 +75,7 @@ def let_in(now: Moment) -> None:
 def note_arrivals(now: Moment) -> None:
     """Whose plan is over: at the goal, or it has none that arrives."""
     for k, found in now.held.items():
-        if k in now.state.arrived or not leads(found) or not is_over(found, now.time):
+        if k in now.state.arrived or not found.leads or not found.is_over(now.time):
             continue
         vehicle = now.vehicles[k]
         there = within(now.poses[k], vehicle.problem.goals[found.goal_index])
@@ -96,7 +86,7 @@ def note_arrivals(now: Moment) -> None:
         # It stays where it is, or where its plan ends, and looks for another one.
         stay = now.resting(k, found)
         if not (now.is_proven(k, stay, now.expected_by(k)) and now.agreed(k, stay)):
-            stay = given_up(found)
+            stay = found.given_up()
         now.hold(k, stay)
 
 
@@ -133,7 +123,7 @@ def _note_pressed(now: Moment) -> None:
             now.pressed[one, other] = max(min(least, now.keep) - ROUNDING, 0.0)
     for k, found in now.held.items():
         proven = now.state.proofs.apart.get(k) is found.course  # it stands on a plan that is free
-        if not (leads(found) or proven or k in now.state.broken):
+        if not (found.leads or proven or k in now.state.broken):
             now.note_near(k)
 
 
@@ -150,7 +140,7 @@ def _note_crossing(now: Moment) -> None:
         if now.first_meeting(one, now.held[one], [(other, now.held[other])]) == math.inf:
             continue
         able = [k for k in (other, one) if k not in now.state.broken]
-        moves = [k for k in able if not is_over(now.held[k], now.time)]
+        moves = [k for k in able if not now.held[k].is_over(now.time)]
         for k, j in ((one, other), (other, one)):
             if k in (moves or able) and now.state.agreement.knows(k, j, now.held[j]):
                 now.make_void(k)
@@ -191,7 +181,7 @@ def _tracks(now: Moment, k: int, found: OwnPlan, share: float = 1.0) -> bool:
     tube = share * now.state.settings.tube_m
     if vehicle.problem.obstacles:
         tube = min(tube, vehicle.problem.margin)
-    if now.off[k] > tube or not leads(found):
+    if now.off[k] > tube or not found.leads:
         return False
     back = back_onto(vehicle, found, now.time, now.poses[k], step, tube)
     if back is not None:
@@ -357,9 +347,8 @@ def plan_anew(now: Moment) -> None:
         found = None if k in anew or k in now.state.silent else _another(now, k, waiting)
         anew.add(k)
         if found is None:
-            if leads(held := now.held[k]):
-                left = rest_of_plan(now.vehicles[k], held, now.time)
-                now.state.stopped[k] = replace(held, plan=left)
+            if now.held[k].leads:
+                now.state.stopped[k] = replace(now.held[k], plan=now.rest_of(k))
             found = _stopped(now, k, stop, stopped)
             stopped.add(k)
         now.hold(k, found)
