@@ -38,7 +38,7 @@ from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import Meeting, meetings
-from maneuver_automaton.fleet.vehicle import LONG, QUICK, FleetMember, OwnPlan
+from maneuver_automaton.fleet.vehicle import LONG, QUICK, FleetMember, OwnPlan, courses_of
 from maneuver_automaton.problem import Goal
 
 HeldPlans: TypeAlias = dict[int, OwnPlan]
@@ -188,9 +188,12 @@ class _Priorities:
         """Plans in which one, and all behind it that meet those before them, give way."""
         plans = dict(plans)
         behind = {k for one, k in pairs if one == first}
-        for k in _sorted_by(pairs, [first, *sorted(behind)]):
+        # Those before others first.
+        turn = [first, *sorted(behind)]
+        for k in sorted(turn, key=lambda k: (sum(other == k for _, other in pairs), k)):
             above = {one: plans[one] for one, other in sorted(pairs) if other == k}
-            if k != first and not _meet(plans, k, above, self.turns.margin):
+            courses = {j: plans[j].course for j in (k, *above)}
+            if k != first and not meetings(courses, keep=self.turns.margin, among=[k]):
                 continue
             found = self._past(k, above)
             if found is None:
@@ -222,18 +225,8 @@ def _closed(pairs: frozenset[tuple[int, int]]) -> frozenset[tuple[int, int]]:
         closed |= more
 
 
-def _sorted_by(pairs: frozenset[tuple[int, int]], numbers: Sequence[int]) -> list[int]:
-    """Numbers, those before others first."""
-    return sorted(numbers, key=lambda k: (sum(other == k for _, other in pairs), k))
-
-
 def _cost(plans: Mapping[int, OwnPlan]) -> float:
     return math.fsum(one.cost for one in plans.values())
-
-
-def _meet(plans: HeldPlans, k: int, others: Mapping[int, OwnPlan], margin: float) -> bool:
-    courses = {k: plans[k].course} | {other: one.course for other, one in others.items()}
-    return bool(meetings(courses, keep=margin, among=[k]))
 
 
 def _first_meeting(plans: HeldPlans, margin: float) -> Meeting | None:
@@ -422,10 +415,7 @@ class _Floor:
 
     def _courses(self) -> dict[int, FleetCourse]:
         """What everybody has driven so far."""
-        return {
-            k: self.driven[k].course if k in self.driven else one.standing
-            for k, one in enumerate(self.vehicles)
-        }
+        return courses_of(self.vehicles, self.driven)
 
     def _standing(self, *, but: int) -> list[Obstacle]:
         """All others where they stand now."""

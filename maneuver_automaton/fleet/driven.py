@@ -132,24 +132,20 @@ def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
     What it carries then stands as it did at the end of the piece before.
     """
     problem = log.problem.problems[log.problem.names.index(name)]
-    stands, pieces = _at_first(problem), dict[int, Plan]()
+    automaton, pieces = problem.automaton, dict[int, Plan]()
+    if problem.start_trim is not None or automaton.rest is not None:
+        stands = problem.first_trim
+    else:  # what switches at will may just stand
+        still = np.zeros(len(automaton.model.control_names))
+        stands = Trim(name="stands", body_velocity=np.zeros(problem.start.size), control=still)
     for step, piece in log.pieces_of(name).items():
         if piece.trims:
             stands = piece.trims[-1]
             pieces[step] = piece
         else:
-            still = Plan(piece.start, (stands,), durations=[0.0], start_time=piece.start_time)
-            pieces[step] = still
+            begin = piece.start_time
+            pieces[step] = Plan(piece.start, (stands,), durations=[0.0], start_time=begin)
     return pieces
-
-
-def _at_first(problem: Problem) -> Trim:
-    """The trim of a vehicle that has done nothing yet; one that switches at will may just stand."""
-    automaton = problem.automaton
-    if problem.start_trim is not None or automaton.rest is not None:
-        return problem.first_trim
-    still = np.zeros(len(automaton.model.control_names))
-    return Trim(name="stands", body_velocity=np.zeros(problem.start.size), control=still)
 
 
 # -- one vehicle

@@ -11,7 +11,7 @@ anybody on more than the order of swaps, and no plan is ever lost.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -28,7 +28,7 @@ from maneuver_automaton.fleet.moment import Effort, LoopSettings, LoopState, Mom
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetLog, FleetResult, FleetStep
 from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
-from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.vehicle import FleetMember, prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
@@ -152,7 +152,13 @@ class FleetHorizon:
             workers=workers,
         )
         knowledge = knowledge_of(fleet.names, lost, lambda k, one: len(self._now.near_to(k, one)))
-        self.state = LoopState(settings, vehicles, knowledge, _plans_of(first, vehicles))
+        answers = {} if first is None else first.results
+        plans = {
+            one.number: one.own(answer.plan, answer.goal_index)
+            for one in vehicles
+            if (answer := answers.get(one.name)) is not None and answer.plan is not None
+        }
+        self.state = LoopState(settings, vehicles, knowledge, plans)
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
         if log is not None:
             self._go_on_from(log)
@@ -301,16 +307,3 @@ class FleetHorizon:
                 raise ValueError(f"state of {name!r}: got shape {pose.shape}, need ({dof},)")
             poses[k] = pose
         return dict(sorted(poses.items()))
-
-
-def _plans_of(first: FleetResult | None, vehicles: Sequence[FleetMember]) -> dict[int, OwnPlan]:
-    """The plans of an answer, by number."""
-    if first is None:
-        return {}
-    known = {}
-    for one in vehicles:
-        result = first.results.get(one.name)
-        if result is None or result.plan is None:
-            continue
-        known[one.number] = one.own(result.plan, result.goal_index)
-    return known

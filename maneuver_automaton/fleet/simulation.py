@@ -129,8 +129,10 @@ def simulate_fleet(
     if log is not None and log.step != step:
         raise ValueError(f"step is {step:g} s, need that of the log to go on from, {log.step:g} s")
     if first is None and not (log and log.steps):
-        tube = tube_of(fleet, tube_m)
-        first = _first_plans(fleet, set(joins_s), tube, first_time_limit, seed)
+        there = set(fleet.names) - set(joins_s)
+        if there:  # with room for noise where they end
+            roomy = fleet_with_room(fleet.only(there), tube_of(fleet, tube_m))
+            first = plan_fleet(roomy, time_limit=first_time_limit, seed=seed)
     loop = FleetHorizon(
         fleet,
         step=step,
@@ -161,16 +163,6 @@ def simulate_fleet(
             if progress is not None:
                 progress(now)
     return world.log()
-
-
-def _first_plans(
-    fleet: FleetProblem, later: set[str], tube: float, time_limit: float, seed: int
-) -> FleetResult | None:
-    """Plans of those that are there from the begin on, with room for noise where they end."""
-    there = set(fleet.names) - later
-    if not there:
-        return None
-    return plan_fleet(fleet_with_room(fleet.only(there), tube), time_limit=time_limit, seed=seed)
 
 
 def _upsets(

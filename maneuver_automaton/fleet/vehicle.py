@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -505,6 +505,16 @@ class FleetMember:
         first = first_plan(query, budget=replace(budget, expansions=most))
         self.expansions += first.expansions
         return first
+
+
+def courses_of(
+    vehicles: Sequence[FleetMember], plans: Mapping[int, OwnPlan]
+) -> dict[int, FleetCourse]:
+    """The courses of all, by number: who has no plan stands at its start."""
+    return {
+        one.number: plans[one.number].course if one.number in plans else one.standing
+        for one in vehicles
+    }
 
 
 def prepare_vehicles(vehicles: Sequence[FleetMember]) -> None:
