@@ -63,7 +63,7 @@ class Knowledge(Protocol):
 
 
 @dataclass(slots=True, eq=False)
-class Lossless:
+class _Lossless:
     """No message is lost: everybody knows what all hold. Messages are counted, but not stored.
 
     `near` says who may come near a vehicle with a plan: it speaks to nobody else.
@@ -74,20 +74,16 @@ class Lossless:
     sent: int = 0
 
     def start(self, held: Mapping[int, OwnPlan]) -> None:
-        """All know the plans that are driven at first."""
         self.held = held
 
     def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
-        """A step begins; nobody has to say what all know."""
         self.held = held
 
     def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
-        """Let a vehicle in that holds a plan."""
         self.sent += 2 * self.near(k, found)
         return True
 
     def everything(self) -> Iterator[tuple[int, OwnPlan]]:
-        """All plans that are held."""
         return iter(self.held.items())
 
     def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
@@ -100,20 +96,17 @@ class Lossless:
         self.sent += 2 * self.near(k, found)
 
     def knows(self, j: int, k: int, found: OwnPlan) -> bool:
-        """Everybody knows."""
         return True
 
     def others_of(self, k: int) -> Mapping[int, Sequence[OwnPlan]]:
-        """The plans that all others hold."""
         return {j: (one,) for j, one in self.held.items() if j != k}
 
     def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
-        """Nothing is unknown."""
         return []
 
 
 @dataclass(slots=True, eq=False)
-class Agreement:
+class _Agreement:
     """What every vehicle expects of every other one: the plans that it may drive."""
 
     names: Sequence[str]
@@ -126,11 +119,9 @@ class Agreement:
     sent: int = 0
 
     def start(self, held: Mapping[int, OwnPlan]) -> None:
-        """All know the plans that are driven at first."""
         self.expected = {j: {k: [one] for k, one in held.items() if k != j} for j in held}
 
     def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
-        """A step begins: everybody says which plan it holds."""
         self.step = step
         for k in [*self.expected]:
             if k not in held:
@@ -139,7 +130,6 @@ class Agreement:
             self._tell(sender, held[sender], "holds")
 
     def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
-        """Let a vehicle in that holds a plan, if all others say that they know of it."""
         others = [j for j in self.expected if j != k]
         known = [j for j in others if self._say(k, j, "asks")]
         for j in known:
@@ -150,22 +140,17 @@ class Agreement:
         return True
 
     def everything(self) -> Iterator[tuple[int, OwnPlan]]:
-        """All plans that somebody expects of a vehicle, with its number."""
         for known in self.expected.values():
             yield from ((j, one) for j, some in known.items() for one in some)
 
     def leave(self, k: int) -> None:
-        """A vehicle is gone."""
         self.expected.pop(k, None)
         for others in self.expected.values():
             others.pop(k, None)
         self.unacknowledged = {pair for pair in self.unacknowledged if k not in pair}
 
     def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
-        """Whether all others agree that a vehicle drives another plan than the one it holds.
-
-        Who holds a plan that the other one is not proven past refuses.
-        """
+        """Who holds a plan that the other one is not proven past refuses."""
         others = [j for j in self.expected if j != k]
         agreed = all(self._agrees(j, k, found, holds, refuses) for j in others)
         if agreed:
@@ -191,10 +176,10 @@ class Agreement:
         return False
 
     def announce(self, k: int, found: OwnPlan) -> None:
-        """A vehicle drives another plan, whether the others agree or not.
+        """It is repeated some times, until each acknowledges it.
 
-        It repeats that some times, until each acknowledges it. Who has not received it asks in vain
-        for another plan of its own: the vehicle refuses, as that is proven past its old one.
+        Who has not received it asks in vain for another plan of its own: the vehicle refuses, as
+        that is proven past its old one.
         """
         for j in self.expected:
             if j == k:
@@ -208,7 +193,6 @@ class Agreement:
                     break
 
     def knows(self, j: int, k: int, found: OwnPlan) -> bool:
-        """Whether a vehicle expects a plan of another one."""
         return any(one.course is found.course for one in self.expected[j].get(k, ()))
 
     def _expect(self, j: int, k: int, found: OwnPlan) -> None:
@@ -217,14 +201,10 @@ class Agreement:
         self.unacknowledged.discard((k, j))
 
     def others_of(self, k: int) -> dict[int, list[OwnPlan]]:
-        """The plans that a vehicle expects of each of the others."""
         return self.expected[k]
 
     def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
-        """Pairs of which the first does not expect of the second what that drives.
-
-        But for those that have not acknowledged an emergency.
-        """
+        """Those that have not acknowledged an emergency are left out."""
         return [
             (j, k)
             for j in self.expected
@@ -244,3 +224,10 @@ class Agreement:
         if self.lost is None:
             return True
         return not self.lost(Message(self.step, self.names[sender], self.names[receiver], kind))
+
+
+def knowledge_of(
+    names: Sequence[str], lost: Lost | None, near: Callable[[int, OwnPlan], int]
+) -> Knowledge:
+    """What all know of each other: everything, unless messages may be lost."""
+    return _Lossless(near) if lost is None else _Agreement(names, lost)

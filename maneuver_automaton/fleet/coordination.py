@@ -38,13 +38,18 @@ from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import Meeting, meetings
-from maneuver_automaton.fleet.vehicle import LONG, QUICK, FleetMember, OwnPlan
+from maneuver_automaton.fleet.vehicle import LONG, QUICK, FleetMember, OwnPlan, courses_of
 from maneuver_automaton.problem import Goal
 
 HeldPlans: TypeAlias = dict[int, OwnPlan]
 """Plans by the numbers of their vehicles."""
 
 MOST_EVICTED = 8  # times that plans are given up for one vehicle
+MOST_QUERIES = 30  # searches for one vehicle, of one tree
+LOOKS = 400  # at a conflict, to see how long it lasts
+WORTH = 1e-6  # share of the value that another leaf has to save
+MOST_ASIDE = 3  # times that one vehicle makes room for others
+BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
 
 
 @dataclass(slots=True, eq=False)
@@ -127,11 +132,6 @@ class Turns:
         return self.vehicles[k].past(others, self.budget, most=most, known=known, again=again)
 
 
-MOST_QUERIES = 30  # searches for one vehicle, of one tree
-LOOKS = 400  # at a conflict, to see how long it lasts
-WORTH = 1e-6  # share of the value that another leaf has to save
-
-
 def by_priorities(
     turns: Turns, group: Sequence[int], held: HeldPlans, known: float
 ) -> HeldPlans | None:
@@ -188,9 +188,12 @@ class _Priorities:
         """Plans in which one, and all behind it that meet those before them, give way."""
         plans = dict(plans)
         behind = {k for one, k in pairs if one == first}
-        for k in _sorted_by(pairs, [first, *sorted(behind)]):
+        # Those before others first.
+        turn = [first, *sorted(behind)]
+        for k in sorted(turn, key=lambda k: (sum(other == k for _, other in pairs), k)):
             above = {one: plans[one] for one, other in sorted(pairs) if other == k}
-            if k != first and not _meet(plans, k, above, self.turns.margin):
+            courses = {j: plans[j].course for j in (k, *above)}
+            if k != first and not meetings(courses, keep=self.turns.margin, among=[k]):
                 continue
             found = self._past(k, above)
             if found is None:
@@ -222,18 +225,8 @@ def _closed(pairs: frozenset[tuple[int, int]]) -> frozenset[tuple[int, int]]:
         closed |= more
 
 
-def _sorted_by(pairs: frozenset[tuple[int, int]], numbers: Sequence[int]) -> list[int]:
-    """Numbers, those before others first."""
-    return sorted(numbers, key=lambda k: (sum(other == k for _, other in pairs), k))
-
-
 def _cost(plans: Mapping[int, OwnPlan]) -> float:
     return math.fsum(one.cost for one in plans.values())
-
-
-def _meet(plans: HeldPlans, k: int, others: Mapping[int, OwnPlan], margin: float) -> bool:
-    courses = {k: plans[k].course} | {other: one.course for other, one in others.items()}
-    return bool(meetings(courses, keep=margin, among=[k]))
 
 
 def _first_meeting(plans: HeldPlans, margin: float) -> Meeting | None:
@@ -312,10 +305,6 @@ def _until(one: FleetCourse, other: FleetCourse, begin: float, keep: float) -> f
         near |= clearances(world, world.into(poses), times=times) <= keep
     clear = np.flatnonzero(~near[1:])
     return float(times[clear[0] + 1]) if clear.size else math.inf
-
-
-MOST_ASIDE = 3  # times that one vehicle makes room for others
-BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
 
 
 def one_at_a_time(
@@ -426,10 +415,7 @@ class _Floor:
 
     def _courses(self) -> dict[int, FleetCourse]:
         """What everybody has driven so far."""
-        return {
-            k: self.driven[k].course if k in self.driven else one.standing
-            for k, one in enumerate(self.vehicles)
-        }
+        return courses_of(self.vehicles, self.driven)
 
     def _standing(self, *, but: int) -> list[Obstacle]:
         """All others where they stand now."""

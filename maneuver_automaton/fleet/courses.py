@@ -31,13 +31,7 @@ class HeightBand(NamedTuple):
     high: float
 
     def above(self, low: float, high: float) -> float:
-        """How far [m] it is above or below what stands between two heights; 0 if beside it.
-
-        Examples
-        --------
-        >>> HeightBand(0.0, 9.0, 20.0, 23.0).above(0.0, 4.0)
-        16.0
-        """
+        """How far [m] it is above or below what stands between two heights; 0 if beside it."""
         return max(self.low - high, low - self.high, 0.0)
 
 
@@ -68,21 +62,7 @@ class Levels:
 
     @classmethod
     def of_plan(cls, plan: Plan, body: tuple[float, float]) -> Levels:
-        """Those of a vehicle that drives a plan in space; a body from low to high about its z [m].
-
-        Raises
-        ------
-        ValueError
-            If a maneuver has no course.
-
-        Examples
-        --------
-        >>> from maneuver_automaton.primitives import Trim
-        >>> climb = Trim(name="climb", body_velocity=[1.0, 0.0, 0.0, 2.0], control=[0.0])
-        >>> plan = Plan([0.0, 0.0, 0.0, 5.0], (climb,), durations=[3.0])
-        >>> Levels.of_plan(plan, (0.0, 1.0)).altitude.tolist()
-        [5.0, 11.0]
-        """
+        """Those of a vehicle that drives a plan in space; its body from low to high about z [m]."""
         times, _, _ = plan.coasts
         of = np.searchsorted(plan.switching_times, 0.5 * (times[1:] + times[:-1])) - 1
         off = _swings(plan)
@@ -141,16 +121,6 @@ def levels_of(problem: Problem, plan: Plan | None = None) -> Levels | None:
     """Those of a vehicle that drives a plan, or stands at its start; None if it has no height.
 
     In the plane a body whose height is not stated counts at all heights.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0)})
-    >>> levels_of(Problem(robot, [0, 0, 0], [1, 0, 0])) is None
-    True
-    >>> truck = Problem(robot, [0, 0, 0], [1, 0, 0], body_height=(0.0, 3.5))
-    >>> round(levels_of(truck).bands[0].high, 3)
-    3.5
     """
     low, high = problem.body_height
     in_plane = problem.start.size == 3
@@ -222,6 +192,11 @@ class FleetCourse:
         return tuple(where_it_stays(one) for one in self.obstacles if one.presence[1] == math.inf)
 
     @property
+    def staying(self) -> FleetCourse:
+        """The same of a vehicle that stays where it ends."""
+        return self if self.until == math.inf else replace(self, until=math.inf)
+
+    @property
     def quiet_after(self) -> float:
         """When it has come to rest for good, or is gone [s]."""
         return min(self.until, max(float(one.time[-1]) for one in self.motions))
@@ -245,14 +220,7 @@ def _during(band: HeightBand, shape: Shape, motion: Motion) -> Obstacle:
 
 
 def where_it_stays(body: Obstacle) -> Obstacle:
-    """What stands where a moving body ends.
-
-    Examples
-    --------
-    >>> way = Motion([0.0, 1.0], [[0, 0, 0], [2, 0, 0]])
-    >>> where_it_stays(Obstacle(Disc(0.3), motion=way)).shape.center.tolist()
-    [2.0, 0.0]
-    """
+    """What stands where a moving body ends."""
     assert body.motion is not None
     return Obstacle(body.at(float(body.motion.time[-1])), height=body.height)
 
@@ -279,14 +247,7 @@ def motion_from(motion: Motion, time: float) -> Motion:
 
 
 def larger(shape: Shape, by: float) -> Shape:
-    """A shape that holds all within a length [m] of another, with square corners.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Box, Disc
-    >>> larger(Disc(1.0), 0.5).radius, larger(Box([2.0, 1.0]), 0.5).size.tolist()
-    (1.5, [3.0, 2.0])
-    """
+    """A shape that holds all within a length [m] of another, with square corners."""
     if by <= 0.0:
         return shape
     if isinstance(shape, Disc):

@@ -18,7 +18,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
-from maneuver_automaton.audit import audit_plan, closest_to
+from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.carried import carried
@@ -28,9 +28,8 @@ from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape
 from maneuver_automaton.fleet.courses import Levels
 from maneuver_automaton.fleet.result import Closest, FleetLog
-from maneuver_automaton.fleet.verdict import CONTACT, IN_SPACE, NEAR, plan_of_motion
+from maneuver_automaton.fleet.verdict import CONTACT, NEAR, least_of, plan_of_motion
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Omnidirectional
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
@@ -98,8 +97,14 @@ def verify_driven(log: FleetLog) -> DrivenVerdict:
     for name, problem, leaves in zip(fleet.names, fleet.problems, fleet.leaves, strict=True):
         way = whole_pieces(log, name)
         gone = log.arrived_s.get(name, math.inf) if leaves else math.inf
-        bodies += _bodies(name, problem, way, gone)
-        jumps[name] = _greatest_jump([*way.values()])
+        for shapes, parts in _parts(problem, way):
+            motions = {step: Motion.of_plan(piece) for step, piece in parts.items()}
+            bodies += [
+                _DrivenBody(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
+                for ring, grown in _rings(shapes)
+            ]
+        gaps = [np.delete(b.start - a.end, 2) for a, b in pairwise(way.values())]
+        jumps[name] = max((float(np.linalg.norm(gap)) for gap in gaps), default=0.0)
         clearances[name], when = _clearance(problem, way, edges, gone)
         if clearances[name] <= CONTACT:
             collisions.append(f"{name} touches an obstacle at {when:.6g} s")
@@ -127,33 +132,23 @@ def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
     What it carries then stands as it did at the end of the piece before.
     """
     problem = log.problem.problems[log.problem.names.index(name)]
-    stands, pieces = _at_first(problem), dict[int, Plan]()
+    automaton, pieces = problem.automaton, dict[int, Plan]()
+    if problem.start_trim is not None or automaton.rest is not None:
+        stands = problem.first_trim
+    else:  # what switches at will may just stand
+        still = np.zeros(len(automaton.model.control_names))
+        stands = Trim(name="stands", body_velocity=np.zeros(problem.start.size), control=still)
     for step, piece in log.pieces_of(name).items():
         if piece.trims:
             stands = piece.trims[-1]
             pieces[step] = piece
         else:
-            still = Plan(piece.start, (stands,), durations=[0.0], start_time=piece.start_time)
-            pieces[step] = still
+            begin = piece.start_time
+            pieces[step] = Plan(piece.start, (stands,), durations=[0.0], start_time=begin)
     return pieces
 
 
-def _at_first(problem: Problem) -> Trim:
-    """The trim of a vehicle that has done nothing yet; one that switches at will may just stand."""
-    automaton = problem.automaton
-    if problem.start_trim is not None or automaton.rest is not None:
-        return problem.first_trim
-    still = np.zeros(len(automaton.model.control_names))
-    return Trim(name="stands", body_velocity=np.zeros(problem.start.size), control=still)
-
-
 # -- one vehicle
-
-
-def _greatest_jump(way: Sequence[Plan]) -> float:
-    """How far it was from the end of one piece when the next began, at most [m]."""
-    gaps = [np.delete(after.start - before.end, 2) for before, after in pairwise(way)]
-    return max((float(np.linalg.norm(gap)) for gap in gaps), default=0.0)
 
 
 def _stretches(
@@ -202,15 +197,7 @@ def _clearance(
         return best
     for shapes, pieces in _parts(problem, way):
         for stretch, reach in _stretches(pieces, edges, gone, problem.body_height):
-            in_space = stretch.start.size > 3
-            least = closest_to(
-                stretch,
-                IN_SPACE if in_space else Omnidirectional(),
-                problem.obstacles,
-                footprint=shapes,
-                body_height=reach if in_space else (0.0, 0.0),
-                enough=CONTACT,
-            )
+            least = least_of(stretch, shapes, problem.obstacles, reach=reach, enough=CONTACT)
             best = min(best, (least.distance, least.time))
     return best
 
@@ -278,15 +265,6 @@ class _DrivenBody:
 
         corners = SE2(poses[:, None]).act(self.ring)
         return shapely.points(corners[:, 0]) if len(self.ring) == 1 else shapely.polygons(corners)
-
-
-def _bodies(
-    name: str, problem: Problem, way: Mapping[int, Plan], gone: float
-) -> Iterator[_DrivenBody]:
-    for shapes, pieces in _parts(problem, way):
-        motions = {step: Motion.of_plan(piece) for step, piece in pieces.items()}
-        for ring, grown in _rings(shapes):
-            yield _DrivenBody(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
 
 
 def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:

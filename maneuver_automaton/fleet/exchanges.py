@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from maneuver_automaton.fleet.held import LATER, arrival, goes_on, leads, left_to_pay
+from maneuver_automaton.fleet.held import LATER, goes_on, left_to_pay
 from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.moment import Around, Moment, answers_to, request_of, search
 from maneuver_automaton.fleet.result import Swap
@@ -43,7 +43,7 @@ def go_on(now: Moment) -> None:
     """Who stopped goes on along its void plan, as soon as that is proven: nobody searches."""
     stopped = now.state.stopped
     for k, left in [*stopped.items()]:
-        if k not in now.held or k in now.state.broken or leads(now.held[k]):
+        if k not in now.held or k in now.state.broken or now.held[k].leads:
             del stopped[k]
         elif k not in now.void:
             again = replace(left, plan=replace(left.plan, start_time=now.time))
@@ -93,7 +93,7 @@ def _may_gain(now: Moment, k: int) -> bool:
     Later no more is to be had past the same plans: what is left of them is less. But who has
     none looks again, as as many expansions then lead farther.
     """
-    again = not leads(now.held[k]) and (now.number + k) % AGAIN == 0
+    again = not now.held[k].leads and (now.number + k) % AGAIN == 0
     return again or now.state.efforts[k].in_vain != _around(now)
 
 
@@ -105,7 +105,7 @@ def _look_for_better(now: Moment, batch: Sequence[int]) -> None:
     requests = []
     for k, base, known in zip(batch, bases, values, strict=True):
         # Who has no plan searches for long, and without room at its goal, now and then.
-        hard = not leads(base) and (now.number + k) % AGAIN_LONG == 0
+        hard = not base.leads and (now.number + k) % AGAIN_LONG == 0
         most, others = LONG if hard else QUICK, now.expected_by(k)
         requests.append(request_of(now, k, base, others, known, most=most, room=not hard))
     now.asked += batch
@@ -128,10 +128,10 @@ def _exchanges(now: Moment, k: int, base: OwnPlan, answer: Proposal) -> bool:
     """
     settings, (found, alone) = now.state.settings, answer
     if alone is None:
-        if leads(base) and not now.searches.is_over:
+        if base.leads and not now.searches.is_over:
             now.state.efforts[k].settled = now.state.efforts[k].lineage
         return False
-    if found is not None and found.arrival <= arrival(base) * (1.0 + LATER) + LATER:
+    if found is not None and found.arrival <= base.arrives * (1.0 + LATER) + LATER:
         if settings.delay_steps:
             now.state.due[k] = (now.number + settings.delay_steps, found, base)
         else:

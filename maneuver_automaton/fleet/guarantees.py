@@ -6,7 +6,7 @@ import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from maneuver_automaton.fleet.courses import FleetCourse
-from maneuver_automaton.fleet.held import CONTACT, LATER, arrival, why_not_free
+from maneuver_automaton.fleet.held import CONTACT, LATER, why_not_free
 from maneuver_automaton.fleet.meetings import Meeting, gap_between, meetings
 from maneuver_automaton.fleet.moment import MANY, Moment
 from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation, Swap
@@ -56,7 +56,7 @@ def logged(now: Moment) -> FleetStep:
         plans={names[k]: one.plan for k, one in now.held.items()},
         driven={names[k]: now.beside.get(k) or now.from_here(k).plan for k in now.held},
         values={names[k]: now.left_to_pay(k) for k in now.held},
-        arrivals={names[k]: arrival(one) for k, one in now.held.items()},
+        arrivals={names[k]: one.arrives for k, one in now.held.items()},
         off_plan={names[k]: now.off[k] for k in now.held},
         arrived=named(sorted(state.arrived & set(now.held))),
         swaps=tuple(now.swaps),
@@ -136,7 +136,7 @@ def _costlier(now: Moment) -> Iterator[FleetViolation]:
         if costlier or was > promised + rounding:
             reason = f"the value is {value:.9g}, was {was:.9g} and {promised:.9g} a step before"
             yield FleetViolation(FleetGuarantee.DECREASE, (name,), reason)
-        later = arrival(found) - arrived if arrival(found) < math.inf else 0.0
+        later = found.arrives - arrived if found.arrives < math.inf else 0.0
         if later > LATER * (1.0 + abs(arrived)) and k not in now.in_group:
             reason = f"it arrives {later:.3g} s later than its last plan said"
             yield FleetViolation(FleetGuarantee.ARRIVAL, (name,), reason)

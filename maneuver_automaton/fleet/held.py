@@ -42,19 +42,15 @@ from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on
 
 LEFT = 0.5  # share of a tolerance that is left at least
+CONTACT = 1e-9  # [m] what is closer touches
+LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
 
 
 def with_room(problem: Problem, tube_m: float) -> Problem:
     """The problem with goals whose tolerances are less by what a vehicle may be beside its plan.
 
     A plan that ends at the edge of a tolerance arrives only where nothing disturbs it; one that
-    ends within these arrives from anywhere in its tube. At least half of a tolerance is left.
-
-    Parameters
-    ----------
-    problem : Problem
-    tube_m : float
-        How far any point of the body may be from where its plan has it [m].
+    ends within these arrives from anywhere in its tube [m]. At least half of a tolerance is left.
 
     Examples
     --------
@@ -104,10 +100,6 @@ def aimed_at(plan: Plan, goal: Goal) -> Goal:
     return replace(goal, pose=plan.end)
 
 
-CONTACT = 1e-9  # [m] what is closer touches
-LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
-
-
 def resting(
     vehicle: FleetMember, pose: Array, time: float, found: OwnPlan | None = None
 ) -> OwnPlan:
@@ -127,25 +119,7 @@ def resting(
 
 def _not_leading(vehicle: FleetMember, plan: Plan) -> OwnPlan:
     """A plan that does not arrive: the vehicle stays where it ends, also if it was to leave."""
-    return OwnPlan(plan, math.inf, 0, replace(vehicle.course_of(plan), until=math.inf))
-
-
-def given_up(found: OwnPlan) -> OwnPlan:
-    """A plan that is driven to its end, but does not arrive there."""
-    course = found.course
-    if course.until < math.inf:
-        course = replace(course, until=math.inf)
-    return replace(found, cost=math.inf, course=course)
-
-
-def leads(found: OwnPlan) -> bool:
-    """Whether a plan arrives."""
-    return found.cost < math.inf
-
-
-def arrival(found: OwnPlan) -> float:
-    """When a plan arrives [s]; inf if it does not."""
-    return found.arrival if leads(found) else math.inf
+    return OwnPlan(plan, math.inf, 0, vehicle.course_of(plan).staying)
 
 
 @functools.lru_cache(maxsize=4096)  # a step asks for the same ones several times
@@ -169,16 +143,11 @@ def begin_of(vehicle: FleetMember, plan: Plan, lasting: float) -> Plan:
 @functools.lru_cache(maxsize=4096)
 def left_to_pay(vehicle: FleetMember, found: OwnPlan, time: float) -> float:
     """Cost of what is left of a plan; inf if it does not arrive."""
-    if not leads(found) or time <= found.plan.start_time:
+    if not found.leads or time <= found.plan.start_time:
         return found.cost
     if time >= found.arrival - NOTHING:
         return 0.0
     return vehicle.problem.cost_of(rest_of_plan(vehicle, found, time))
-
-
-def is_over(found: OwnPlan, time: float) -> bool:
-    """Whether nothing of a plan is left but to stay."""
-    return time >= found.arrival - NOTHING
 
 
 def goes_on(vehicle: FleetMember, found: OwnPlan, other: OwnPlan, time: float) -> bool:
@@ -296,8 +265,7 @@ def after_head(vehicle: FleetMember, head: Plan | None, found: OwnPlan) -> OwnPl
     if found.plan.trims:
         follows = followed_by if switches_at_will(vehicle.problem) else joined
         plan = follows(head, found.plan)
-    cost = vehicle.problem.cost_of(plan)
-    return OwnPlan(plan, cost, found.goal_index, vehicle.course_of(plan))
+    return vehicle.own(plan, found.goal_index)
 
 
 def rejoined(
@@ -310,7 +278,7 @@ def rejoined(
     goal's tolerance at all.
     """
     rest = rest_of_plan(vehicle, found, time)
-    if not leads(found):
+    if not found.leads:
         stands = switches_at_will(vehicle.problem) or not moves_on(rest)
         still = replace(rest, start=pose)
         yield resting(vehicle, pose, time, found) if stands else _not_leading(vehicle, still)
@@ -326,8 +294,7 @@ def rejoined(
         plans = (plan for plan in again if allowed(here, plan))
     asis = [moved] if within(moved.end, goal) else []
     for plan in itertools.chain(asis, plans) if well else itertools.chain(plans, asis):
-        cost = vehicle.problem.cost_of(plan)
-        yield OwnPlan(plan, cost, found.goal_index, vehicle.course_of(plan))
+        yield vehicle.own(plan, found.goal_index)
 
 
 def stopping(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> OwnPlan:
@@ -344,7 +311,7 @@ def stopping(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> 
         plans.append(brake if brake is None or head is None else joined(head, brake))
     able = [plan for plan in plans if plan is not None]
     if not able:
-        return given_up(found)
+        return found.given_up()
     soonest = min(able, key=lambda plan: plan.duration)
     return _not_leading(vehicle, replace(soonest, start=pose))
 

@@ -10,7 +10,8 @@ anybody on more than the order of swaps, and no plan is ever lost.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -19,18 +20,19 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
-from maneuver_automaton.fleet.agreement import Agreement, Knowledge, Lossless, Lost
+from maneuver_automaton.fleet.agreement import Lost, knowledge_of
 from maneuver_automaton.fleet.exchanges import exchange, exchange_what_is_due, go_on
 from maneuver_automaton.fleet.guarantees import logged
-from maneuver_automaton.fleet.held import arrival, given_up, tube_of
+from maneuver_automaton.fleet.held import tube_of
 from maneuver_automaton.fleet.moment import Effort, LoopSettings, LoopState, Moment
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetResult, FleetStep
+from maneuver_automaton.fleet.result import FleetLog, FleetResult, FleetStep
 from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
-from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.vehicle import FleetMember, prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon.candidates import within
 
 
 class FleetHorizon:
@@ -78,11 +80,14 @@ class FleetHorizon:
     workers : Workers, optional
         Who looks for the vehicles' plans, such as `DaskWorkers`; this process if omitted. Whose
         worker does not answer any more drives the plan that it holds.
+    log : FleetLog, optional
+        To go on after the last step of another loop: with the plans that were held then, and
+        without the vehicles that have broken down; what was looked for in vain is looked for again.
 
     Raises
     ------
     ValueError
-        If a number is out of its range.
+        If a number is out of its range, or the log is one of other vehicles.
 
     Examples
     --------
@@ -114,6 +119,7 @@ class FleetHorizon:
         delay_steps: int = 0,
         lost: Lost | None = None,
         workers: Workers | None = None,
+        log: FleetLog | None = None,
     ) -> None:
         for name, value in (("step", step), ("time_limit", time_limit)):
             if not value > 0.0:
@@ -145,16 +151,43 @@ class FleetHorizon:
             delay_steps=delay_steps,
             workers=workers,
         )
-        knowledge: Knowledge
-        if lost is None:
-            knowledge = Lossless(lambda k, found: len(self._now.near_to(k, found)))
-        else:
-            knowledge = Agreement(fleet.names, lost)
-        self.state = LoopState(settings, vehicles, knowledge, _plans_of(first, vehicles))
+        knowledge = knowledge_of(fleet.names, lost, lambda k, one: len(self._now.near_to(k, one)))
+        answers = {} if first is None else first.results
+        plans = {
+            one.number: one.own(answer.plan, answer.goal_index)
+            for one in vehicles
+            if (answer := answers.get(one.name)) is not None and answer.plan is not None
+        }
+        self.state = LoopState(settings, vehicles, knowledge, plans)
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
+        if log is not None:
+            self._go_on_from(log)
         # What is prepared for obstacles that vehicles have got since, which are kept alive.
         self._workspaces: dict[tuple[int, ...], tuple[tuple[AnyObstacle, ...], Workspace]] = {}
         prepare_vehicles(vehicles)
+
+    def _go_on_from(self, log: FleetLog) -> None:
+        """Hold what was held in the last step of a log, which everybody knows."""
+        if log.problem.names != self.fleet.names:
+            raise ValueError(
+                f"fleet horizon: log is one of {', '.join(log.problem.names)}, need one of "
+                f"{', '.join(self.fleet.names)}"
+            )
+        if not log.steps:
+            return
+        state, last = self.state, log.steps[-1]
+        for name, plan in last.plans.items():
+            one = state.vehicles[self._numbers[name]]
+            goals = enumerate(one.problem.goals)
+            goal_index = next((n for n, goal in goals if within(plan.end, goal)), 0)
+            found = one.own(plan, goal_index, cost=None if plan.trims else 0.0)
+            leads = last.values[name] < math.inf
+            state.held[one.number] = found if leads else found.given_up()
+            state.efforts[one.number].version = 0
+        state.last = last
+        state.arrived = {self._numbers[name] for name in last.arrived}
+        state.broken = {self._numbers[name] for name in log.broken_down if name in last.plans}
+        state.agreement.start(state.held)
 
     def step(
         self,
@@ -199,7 +232,7 @@ class FleetHorizon:
         for k in [k for k in now.held if k not in now.poses]:
             del now.held[k]
         let_in(now)
-        now.before = {k: (now.left_to_pay(k), arrival(one)) for k, one in now.held.items()}
+        now.before = {k: (now.left_to_pay(k), one.arrives) for k, one in now.held.items()}
         state.agreement.begin(now.number, now.held)
         rejoin(now)
         stop(now, stopped & set(now.held))
@@ -253,7 +286,7 @@ class FleetHorizon:
         known = state.efforts[k]
         state.efforts[k] = Effort(known.version, known.lineage)
         if k in state.held:
-            state.held[k] = given_up(state.held[k])
+            state.held[k] = state.held[k].given_up()
             state.efforts[k].lineage += 1
             state.assigned.add(k)
 
@@ -274,19 +307,3 @@ class FleetHorizon:
                 raise ValueError(f"state of {name!r}: got shape {pose.shape}, need ({dof},)")
             poses[k] = pose
         return dict(sorted(poses.items()))
-
-
-def _plans_of(first: FleetResult | None, vehicles: Sequence[FleetMember]) -> dict[int, OwnPlan]:
-    """The plans of an answer, by number."""
-    if first is None:
-        return {}
-    known = {}
-    for one in vehicles:
-        result = first.results.get(one.name)
-        if result is None or result.plan is None:
-            continue
-        cost = one.problem.cost_of(result.plan)
-        known[one.number] = OwnPlan(
-            result.plan, cost, result.goal_index or 0, one.course_of(result.plan)
-        )
-    return known

@@ -24,6 +24,9 @@ AFTER = 1.0  # [s] that is looked at once nothing moves any more
 SLOT = 1.0  # [s]
 FIRST = 32  # slots and rows to begin with
 NOWHERE = (math.inf, math.inf, -math.inf, -math.inf)
+Frame = tuple[float, float, float]
+FAR = 1.0  # [m] beyond the margin: what keeps more is not measured
+FINE = 0.02  # [m] to which the distance proven is known
 
 
 class Meeting(NamedTuple):
@@ -43,15 +46,14 @@ def meetings(
     *,
     keep: float,
     among: Collection[int] | None = None,
-    frame: tuple[float, float, float] | None = None,
+    frame: Frame | None = None,
 ) -> list[Meeting]:
     """Pairs of vehicles that come closer than a distance [m], the first that does so first.
 
     Whatever is not among the pairs keeps the distance at all times, also after all have arrived, in
-    the plane or in height.
-    Only pairs with one of the vehicles `among`, if these are given. Places are counted from a pose
-    `frame` nearby, that of the first vehicle if omitted: with the same one all that is prepared for
-    a course is prepared once.
+    the plane or in height. Only pairs with one of the vehicles `among`, if these are given. Places
+    are counted from a pose `frame` nearby, that of the first vehicle if omitted: with the same one
+    all that is prepared for a course is prepared once.
     """
     return Encounters(courses, frame).within(keep, among)
 
@@ -59,9 +61,7 @@ def meetings(
 class Encounters:
     """What vehicles drive, prepared once: who meets whom within one distance, and another one."""
 
-    def __init__(
-        self, courses: Mapping[int, FleetCourse], frame: tuple[float, float, float] | None = None
-    ) -> None:
+    def __init__(self, courses: Mapping[int, FleetCourse], frame: Frame | None = None) -> None:
         self.numbers = sorted(courses)
         if len(self.numbers) < 2:
             return
@@ -80,10 +80,7 @@ class Encounters:
         self._driven: dict[int, list[tuple[Body, HeightBand, Array]]] = {}
 
     def within(self, keep: float, among: Collection[int] | None = None) -> list[Meeting]:
-        """Pairs that come closer than a distance [m], the first that does so first.
-
-        Only those with one of the vehicles `among`, if these are given.
-        """
+        """Pairs that come closer than a distance [m]; see `meetings`."""
         found: dict[tuple[int, int], float] = {}
         wanted = set(self.numbers if among is None else among)
         for number in self.numbers if len(self.numbers) > 1 else ():
@@ -129,9 +126,7 @@ class Encounters:
         return known
 
 
-def _coasts(
-    motion: Motion, body: Body, frame: tuple[float, float, float], span: tuple[float, float]
-) -> Array:
+def _coasts(motion: Motion, body: Body, frame: Frame, span: tuple[float, float]) -> Array:
     """Rows of `first_meetings`: it stands from a time on, coasts, then stands until a time [s]."""
     poses, times = motion.pose - np.array(frame), motion.time
     before, after = max(times[0] - span[0], 0.0), max(span[1] - times[-1], 0.0)
@@ -158,13 +153,7 @@ def load_meetings() -> None:
 
 
 def components(numbers: Sequence[int], found: Sequence[Meeting]) -> list[tuple[int, ...]]:
-    """Groups of vehicles that meet, directly or by way of others; the largest first.
-
-    Examples
-    --------
-    >>> components([0, 1, 2, 3], [Meeting(0, 2, 1.0)])
-    [(0, 2), (1,), (3,)]
-    """
+    """Groups of vehicles that meet, directly or by way of others; the largest first."""
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(numbers)
     graph.add_edges_from((row.one, row.other) for row in found)
@@ -186,13 +175,6 @@ def swept(course: FleetCourse) -> Swept:
 
     Between two times on a path of length L, whose ends are a distance d apart, no point is farther
     than ``sqrt(L^2 - d^2) / 2`` from the box around the ends.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Disc
-    >>> way = Motion([0.0, 2.0], [[0, 0, 0], [4, 0, 0]], twist=[[2, 0, 0]])
-    >>> swept(FleetCourse(((Disc(1.0),),), (way,))).boxes.tolist()
-    [[-1.0, -1.0, 3.0, 1.0], [1.0, -1.0, 5.0, 1.0], [3.0, -1.0, 5.0, 1.0]]
     """
     begin = min(float(way.time[0]) for way in course.motions)
     first = math.floor(begin / SLOT)
@@ -250,13 +232,7 @@ def _places(way: Motion, times: Array) -> Array:
 def near_pairs(
     discs: Sequence[tuple[int, float, float, float]], keep: float
 ) -> list[tuple[int, int]]:
-    """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m].
-
-    Examples
-    --------
-    >>> near_pairs([(4, 0.0, 0.0, 1.0), (2, 2.5, 0.0, 1.0), (7, 9.0, 0.0, 1.0)], 1.0)
-    [(2, 4)]
-    """
+    """Pairs of owners of discs (owner, x, y, radius) that come within a distance [m]."""
     if len(discs) < 2:
         return []
     import shapely
@@ -336,12 +312,6 @@ class Nearby:
         return np.concatenate([np.tile(boxes[0], (first, 1)), boxes, rest])
 
 
-Frame = tuple[float, float, float]
-
-FAR = 1.0  # [m] beyond the margin: what keeps more is not measured
-FINE = 0.02  # [m] to which the distance proven is known
-
-
 class Gap(NamedTuple):
     """A distance that any two vehicles are proven to keep from a time on, and what shows it."""
 
@@ -361,29 +331,20 @@ def gap_between(
 ) -> Gap:
     """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
 
-    At most a metre more than the distance to keep; 0 if not even that is proven.
-
-    Parameters
-    ----------
-    courses : mapping of int to FleetCourse
-        What is left of those that are held.
-    keep : float
-        Distance to keep [m].
-    frame : (x, y, 0)
-        What places are counted from.
-    time : float
-        Now [s].
-    held : mapping of int to FleetCourse, optional
-        What is held; what is left of it if omitted.
-    last : Gap, optional
-        Of a step before. It still holds if those that hold another plan since keep it too, and the
-        two that come nearest have not passed yet: the value is the same as without it.
+    At most a metre more than the distance to keep; 0 if not even that is proven. `courses` are what
+    is left of those that are `held`. The `last` one, of a step before, still holds if those that
+    hold another plan since keep it too, and the two that come nearest have not passed yet.
     """
     held = courses if held is None else held
     if len(courses) < 2:
         return Gap(math.inf, None, held)
-    if last is not None and _still_holds(last, courses, frame=frame, time=time, held=held):
-        return last._replace(held=held)
+    if last is not None and last.nearest is not None and last.nearest.time >= time:
+        fresh = {k for k, one in held.items() if last.held.get(k) is not one}
+        changed = fresh | (set(last.held) - set(held))
+        if not {last.nearest.one, last.nearest.other} & changed and not (
+            fresh and meetings(courses, keep=last.distance, among=fresh, frame=frame)
+        ):
+            return last._replace(held=held)
     low, most, more = keep, keep + FAR, 2.0 * FINE
     rows = meetings(courses, keep=most, frame=frame)
     if not rows:
@@ -409,20 +370,3 @@ def gap_between(
         else:
             low = middle
     return Gap(low, nearest, held)
-
-
-def _still_holds(
-    last: Gap,
-    courses: Mapping[int, FleetCourse],
-    *,
-    frame: Frame,
-    time: float,
-    held: Mapping[int, FleetCourse],
-) -> bool:
-    """Whether a distance is what was proven a step before."""
-    fresh = {k for k, one in held.items() if last.held.get(k) is not one}
-    if last.nearest is None or last.nearest.time < time:
-        return False
-    if {last.nearest.one, last.nearest.other} & (fresh | (set(last.held) - set(held))):
-        return False
-    return not (fresh and meetings(courses, keep=last.distance, among=fresh, frame=frame))

@@ -16,7 +16,6 @@ from maneuver_automaton.fleet.agreement import Knowledge
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import (
     distance_to_obstacles,
-    is_over,
     left_to_pay,
     off_plan,
     rejoined,
@@ -37,6 +36,10 @@ FADES, MORE = 0.97, 1.15  # of the time that is kept for the end of a step
 AT_FIRST, MOST_KEPT = 0.5, 0.6  # shares of a step's limit
 
 Around = tuple[int, int, int]  # how many are there, and how often plans were exchanged
+ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
+Other = tuple[int, OwnPlan]  # a plan that another one may drive, and who that is
+MANY = 40  # others that a search looks at; all that are proven
+AWAY = 0.5  # of its way, from which on others are not looked at if there are many
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -114,11 +117,6 @@ class LoopState:
         """
         kept = max(FADES * self.kept_s, MORE * seconds)
         self.kept_s = min(kept, MOST_KEPT * self.settings.time_limit)
-
-
-ROUNDING = 2e-4  # [m] less than two bodies are apart, which the kernels can still prove
-
-Other = tuple[int, OwnPlan]  # a plan that another one may drive, and who that is
 
 
 class Moment:
@@ -306,10 +304,6 @@ class Moment:
         return [j for j, is_near in zip(others, near, strict=True) if is_near]
 
 
-MANY = 40  # others that a search looks at; all that are proven
-AWAY = 0.5  # of its way, from which on others are not looked at if there are many
-
-
 def search(
     now: Moment,
     k: int,
@@ -337,7 +331,7 @@ def request_of(
     """What a vehicle is asked for; without room at its goal, noise may lead it out there."""
     settings = now.state.settings
     goals = now.vehicles[k].problem.goals
-    if is_over(base, now.time) and any(within(base.plan.end, goal) for goal in goals):
+    if base.is_over(now.time) and any(within(base.plan.end, goal) for goal in goals):
         base = now.from_here(k)  # its plan says it is there, but it was measured elsewhere
     terms = Terms(
         time=now.time,

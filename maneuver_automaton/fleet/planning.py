@@ -31,7 +31,7 @@ from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, vehicles_of
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, courses_of, vehicles_of
 from maneuver_automaton.fleet.verdict import verified
 from maneuver_automaton.fleet.workers import Done, How, PoolTask, WorkerPool
 
@@ -204,11 +204,7 @@ class _FleetSearch:
     def _plan_together(self, able: Sequence[int], orders: int, max_rounds: int | None) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
         alone = {k: found for k in able if (found := self.vehicles[k].alone) is not None}
-        courses = {k: one.course for k, one in alone.items()}
-        for one in self.vehicles:
-            if one.number not in alone:
-                courses[one.number] = one.standing
-        met = meetings(courses, keep=self.fleet.margin)
+        met = meetings(courses_of(self.vehicles, alone), keep=self.fleet.margin)
         groups = components(sorted(alone), [m for m in met if m.one in alone and m.other in alone])
         stuck = {k for m in met for k in (m.one, m.other) if k not in alone}
         hit = {m.one if m.other in stuck else m.other for m in met if {m.one, m.other} & stuck}
@@ -426,11 +422,8 @@ class _FleetSearch:
         alone = self.vehicles[k].alone
         if alone is None:
             return "it has no path even alone"
-        courses: dict[int, FleetCourse] = {
-            one.number: self.held[one.number].course if one.number in self.held else one.standing
-            for one in self.vehicles
-        }
-        met = meetings({**courses, k: alone.course}, keep=self.fleet.margin, among=[k])
+        courses = courses_of(self.vehicles, {**self.held, k: alone})
+        met = meetings(courses, keep=self.fleet.margin, among=[k])
         rows = []
         for one in met:
             other = self.vehicles[one.other_than(k)].name

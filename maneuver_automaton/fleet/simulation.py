@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -64,6 +65,7 @@ def simulate_fleet(
     workers: Workers | None = None,
     joins_s: Mapping[str, float] = NEVER,
     breaks_s: Mapping[str, float] = NEVER,
+    log: FleetLog | None = None,
     progress: Callable[[FleetStep], None] | None = None,
 ) -> FleetLog:
     """Close the loop of a fleet until all that can have arrived, or `steps` steps are spent.
@@ -88,6 +90,9 @@ def simulate_fleet(
         When vehicles appear at their starts [s]; each joins as soon as there is room.
     breaks_s : mapping of str to float
         When vehicles break down [s]: they stop as soon as they can, and stay there.
+    log : FleetLog, optional
+        To go on after the last step of a loop that was broken off, with disturbances of the same
+        seed: `steps` more at most. What comes back is the log of both.
     progress : callable, optional
         Called with every step.
 
@@ -99,7 +104,8 @@ def simulate_fleet(
     Raises
     ------
     ValueError
-        If a number is out of its range, or a name is none of the fleet's.
+        If a number is out of its range, a name is none of the fleet's, or the log is one of other
+        vehicles or steps.
 
     Examples
     --------
@@ -120,9 +126,13 @@ def simulate_fleet(
         for name in times:
             if name not in fleet.names:
                 raise ValueError(f"{what}: no vehicle is named {name!r}")
-    if first is None:
-        tube = tube_of(fleet, tube_m)
-        first = _first_plans(fleet, set(joins_s), tube, first_time_limit, seed)
+    if log is not None and log.step != step:
+        raise ValueError(f"step is {step:g} s, need that of the log to go on from, {log.step:g} s")
+    if first is None and not (log and log.steps):
+        there = set(fleet.names) - set(joins_s)
+        if there:  # with room for noise where they end
+            roomy = fleet_with_room(fleet.only(there), tube_of(fleet, tube_m))
+            first = plan_fleet(roomy, time_limit=first_time_limit, seed=seed)
     loop = FleetHorizon(
         fleet,
         step=step,
@@ -136,29 +146,23 @@ def simulate_fleet(
         delay_steps=delay_steps,
         lost=lost,
         workers=workers,
+        log=log,
     )
     drives = [
         _VehicleDrive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)
     ]
     world = _FleetWorld(loop, drives, step, dict(joins_s), dict(breaks_s))
+    if log is not None:
+        world.go_on_from(log)
+    begin = world.steps[-1].number + 1 if world.steps else 0
     with patient():
-        for number in range(steps):
+        for number in range(begin, begin + steps):
             if stopped() or world.is_over:
                 break
             now = world.advance(number)
             if progress is not None:
                 progress(now)
     return world.log()
-
-
-def _first_plans(
-    fleet: FleetProblem, later: set[str], tube: float, time_limit: float, seed: int
-) -> FleetResult | None:
-    """Plans of those that are there from the begin on, with room for noise where they end."""
-    there = set(fleet.names) - later
-    if not there:
-        return None
-    return plan_fleet(fleet_with_room(fleet.only(there), tube), time_limit=time_limit, seed=seed)
 
 
 def _upsets(
@@ -207,6 +211,12 @@ class _VehicleDrive:
             self.cost += problem.cost_of(piece)
         piece = as_driven(piece, self.upset)
         self.pieces.append(piece)
+        self.end(number, noise)
+        return piece
+
+    def end(self, number: int, noise: Array) -> None:
+        """Be where the last piece led, and where that step's disturbance led from there."""
+        piece = self.pieces[-1]
         self.pose = np.array(piece.end)
         if moves_on(piece):
             self.pose = self.pose + noise
@@ -214,7 +224,6 @@ class _VehicleDrive:
             group = group_of(self.pose.size)
             push = np.array(self.upset.pushes[number], dtype=np.float64)
             self.pose = np.array((group(self.pose) @ group(push)).pose)
-        return piece
 
     def leaves_at(self, plan: Plan) -> float:
         """When [s] it leaves at the end of the plan that it holds; inf if it does not."""
@@ -237,6 +246,23 @@ class _FleetWorld:
     gone: set[str] = field(default_factory=set)
     broken: set[str] = field(default_factory=set)
     closest: Closest | None = None
+
+    def go_on_from(self, log: FleetLog) -> None:
+        """All of a log's steps are over, with the random numbers that they used."""
+        if not log.steps:
+            return
+        self.steps, self.arrived_s = list(log.steps), dict(log.arrived_s)
+        self.broken, self.closest = set(log.broken_down), log.closest
+        self.loop.state.agreement.sent += log.counts.get("messages", 0)
+        number = log.steps[-1].number
+        for one in self.drives:
+            name = one.vehicle.name
+            one.pieces, one.cost = [*log.driven[name]], math.fsum(log.costs_of(name).values())
+            *_, draw = itertools.islice(one.random, number + 1)
+            if one.pieces:
+                one.end(number, draw.noise)
+            if one.vehicle.leaves and name in self.arrived_s:
+                self.gone.add(name)
 
     @property
     def time(self) -> float:

@@ -13,17 +13,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import NOTHING, end_state, tail_of, with_samples_at
-from maneuver_automaton.fleet.held import (
-    begin_of,
-    beside,
-    given_up,
-    is_over,
-    leads,
-    off_plan,
-    reach_of,
-    rest_of_plan,
-    why_not_free,
-)
+from maneuver_automaton.fleet.held import begin_of, beside, off_plan, reach_of, why_not_free
 from maneuver_automaton.fleet.meetings import meetings, near_pairs
 from maneuver_automaton.fleet.moment import ROUNDING, Moment, search
 from maneuver_automaton.fleet.result import FleetGuarantee
@@ -33,6 +23,19 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
+
+NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
+LOOK_AT = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
+REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
+IN_TIME = 0.4  # share of a step's limit, after which it does not where it can do without
+TENTHS = 10  # of the tube, by which it is said who is farthest beside its plan
+MOST = 16  # trims that are tried, those most like what the plan drives
+SWITCHES = 8  # of a step, at which one trim follows another
+WIDE, NARROW = 24, 8  # pairs of trims that are refined, and again
+SIDEWAYS = 0.5  # how much a heading counts
+LOOKS = 8  # within a step, at which it is looked at how far beside the plan it leads
+EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
+LEAST = 1e-3  # [m] kept even then
 
 
 def let_in(now: Moment) -> None:
@@ -72,7 +75,7 @@ def let_in(now: Moment) -> None:
 def note_arrivals(now: Moment) -> None:
     """Whose plan is over: at the goal, or it has none that arrives."""
     for k, found in now.held.items():
-        if k in now.state.arrived or not leads(found) or not is_over(found, now.time):
+        if k in now.state.arrived or not found.leads or not found.is_over(now.time):
             continue
         vehicle = now.vehicles[k]
         there = within(now.poses[k], vehicle.problem.goals[found.goal_index])
@@ -83,15 +86,8 @@ def note_arrivals(now: Moment) -> None:
         # It stays where it is, or where its plan ends, and looks for another one.
         stay = now.resting(k, found)
         if not (now.is_proven(k, stay, now.expected_by(k)) and now.agreed(k, stay)):
-            stay = given_up(found)
+            stay = found.given_up()
         now.hold(k, stay)
-
-
-NEARLY = 0.005  # share of its cost: a plan rejoined that is no costlier is the same one
-LOOK_AT = (0.5, 1.0, 2.0)  # of a step, when it is looked at how far a plan is beside another one
-REJOINS = 0.5  # share of the tube: farther beside its plan, a vehicle asks for one from there
-IN_TIME = 0.4  # share of a step's limit, after which it does not where it can do without
-TENTHS = 10  # of the tube, by which it is said who is farthest beside its plan
 
 
 def rejoin(now: Moment) -> None:
@@ -127,7 +123,7 @@ def _note_pressed(now: Moment) -> None:
             now.pressed[one, other] = max(min(least, now.keep) - ROUNDING, 0.0)
     for k, found in now.held.items():
         proven = now.state.proofs.apart.get(k) is found.course  # it stands on a plan that is free
-        if not (leads(found) or proven or k in now.state.broken):
+        if not (found.leads or proven or k in now.state.broken):
             now.note_near(k)
 
 
@@ -144,7 +140,7 @@ def _note_crossing(now: Moment) -> None:
         if now.first_meeting(one, now.held[one], [(other, now.held[other])]) == math.inf:
             continue
         able = [k for k in (other, one) if k not in now.state.broken]
-        moves = [k for k in able if not is_over(now.held[k], now.time)]
+        moves = [k for k in able if not now.held[k].is_over(now.time)]
         for k, j in ((one, other), (other, one)):
             if k in (moves or able) and now.state.agreement.knows(k, j, now.held[j]):
                 now.make_void(k)
@@ -185,7 +181,7 @@ def _tracks(now: Moment, k: int, found: OwnPlan, share: float = 1.0) -> bool:
     tube = share * now.state.settings.tube_m
     if vehicle.problem.obstacles:
         tube = min(tube, vehicle.problem.margin)
-    if now.off[k] > tube or not leads(found):
+    if now.off[k] > tube or not found.leads:
         return False
     back = back_onto(vehicle, found, now.time, now.poses[k], step, tube)
     if back is not None:
@@ -221,34 +217,13 @@ def _drives_beside(now: Moment, k: int, found: OwnPlan, choices: Sequence[OwnPla
     return False
 
 
-MOST = 16  # trims that are tried, those most like what the plan drives
-SWITCHES = 8  # of a step, at which one trim follows another
-WIDE, NARROW = 24, 8  # pairs of trims that are refined, and again
-SIDEWAYS = 0.5  # how much a heading counts
-LOOKS = 8  # within a step, at which it is looked at how far beside the plan it leads
-
-
 def back_onto(
     vehicle: FleetMember, found: OwnPlan, time: float, pose: Array, step: float, tube: float
 ) -> Plan | None:
     """Two trims for a step that lead nearest to where a plan then is, and where it then heads.
 
     They are followed by what is left of the plan. None for what does not switch at will in a plane,
-    and where none of them stays within the tube.
-
-    Parameters
-    ----------
-    vehicle : FleetMember
-    found : OwnPlan
-        The plan that is held.
-    time : float
-        [s]
-    pose : (3,) array
-        Where the vehicle is.
-    step : float
-        [s]
-    tube : float
-        How far beside its plan the vehicle may be [m].
+    and where none of them stays within the tube [m].
     """
     problem = vehicle.problem
     if not switches_at_will(problem) or pose.size != 3 or problem.horizon.min_coast > 0.0:
@@ -338,10 +313,6 @@ def _off(poses: SE2, wanted: SE2) -> Array:
     return np.asarray((gap * gap).sum(axis=-1))
 
 
-EASED = (1.0, 0.5, 0.0)  # shares of the margin, where a void plan has none that keeps all of it
-LEAST = 1e-3  # [m] kept even then
-
-
 def stop(now: Moment, broken_down: set[int]) -> None:
     """Who breaks down stops as soon as it can; plans that would hit it are void.
 
@@ -376,9 +347,8 @@ def plan_anew(now: Moment) -> None:
         found = None if k in anew or k in now.state.silent else _another(now, k, waiting)
         anew.add(k)
         if found is None:
-            if leads(held := now.held[k]):
-                left = rest_of_plan(now.vehicles[k], held, now.time)
-                now.state.stopped[k] = replace(held, plan=left)
+            if now.held[k].leads:
+                now.state.stopped[k] = replace(now.held[k], plan=now.rest_of(k))
             found = _stopped(now, k, stop, stopped)
             stopped.add(k)
         now.hold(k, found)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,13 +13,11 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import NOTHING
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import (
-    Disc,
-    Obstacle,
-)
+from maneuver_automaton.collision.shapes import Disc, Obstacle
 from maneuver_automaton.fleet.courses import FleetCourse, levels_of, standing_still, where_it_stays
 from maneuver_automaton.fleet.meetings import PROOF, load_meetings
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -38,7 +36,7 @@ from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.shifting import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
-from maneuver_automaton.search.lattice import first_plan
+from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import outside
@@ -54,6 +52,16 @@ ALIKE, TURNED = 0.5, 0.8  # [lengths of the body], [rad]: of refuges so near onl
 SEED = 14  # of the places
 FAR = 8.0  # [lengths of the body] from the way alone
 EXPANSIONS = 4000  # of the way to a refuge, and of that from there
+WAYS = 6  # alone, that are tried with rests
+QUICK = 1500  # expansions in space and time at first ...
+LONG = 20_000  # ... and where nothing else helps
+AT_ONCE = Patience(attempts=0, passes=0)
+WITH_TIME = Patience(attempts=400, passes=2)
+NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
+MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
+LONGEST = 400_000  # expansions for a way alone
+LEAST_S = 0.01  # [s] of a whole query
+POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
 
 
 def by_a_refuge(
@@ -138,18 +146,6 @@ def refuges(problem: Problem, query: LatticeQuery, way: Plan, *, off: bool = Fal
     return found
 
 
-WAYS = 6  # alone, that are tried with rests
-QUICK = 1500  # expansions in space and time at first ...
-LONG = 20_000  # ... and where nothing else helps
-AT_ONCE = Patience(attempts=0, passes=0)
-WITH_TIME = Patience(attempts=400, passes=2)
-NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
-MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
-LONGEST = 400_000  # expansions for a way alone
-LEAST_S = 0.01  # [s] of a whole query
-POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class OwnPlan:
     """A plan of a vehicle, its cost, and where that leaves its bodies."""
@@ -161,8 +157,26 @@ class OwnPlan:
 
     @property
     def arrival(self) -> float:
-        """When it arrives [s]."""
+        """When it is over [s]."""
         return self.plan.start_time + self.plan.duration
+
+    @property
+    def leads(self) -> bool:
+        """Whether it arrives."""
+        return self.cost < math.inf
+
+    @property
+    def arrives(self) -> float:
+        """When it arrives [s]; inf if it does not."""
+        return self.arrival if self.leads else math.inf
+
+    def is_over(self, time: float) -> bool:
+        """Whether nothing of it is left but to stay."""
+        return time >= self.arrival - NOTHING
+
+    def given_up(self) -> OwnPlan:
+        """It is driven to its end, but does not arrive there: the vehicle stays."""
+        return replace(self, cost=math.inf, course=self.course.staying)
 
 
 @dataclass(eq=False)
@@ -184,17 +198,14 @@ class FleetMember:
     expansions: int = 0
 
     def __post_init__(self) -> None:
-        problem = self.problem
-        shapes, poses = [problem.footprint or POINT], [problem.start[:3]]
+        problem, poses = self.problem, [self.problem.start[:3]]
         if problem.parts:
             here = Plan(problem.start, (problem.first_trim,), durations=[0.0])
-        for name, of_part in problem.parts.items():
-            shapes.append(of_part)
-            poses.append(carried(here, problem.automaton.model, name).start[:3])
+            model = problem.automaton.model
+            poses += [carried(here, model, name).start[:3] for name in problem.parts]
+        shapes = (problem.footprint or POINT, *problem.parts.values())
         motions = tuple(Motion([problem.start_time], [pose]) for pose in poses)
-        self.standing = FleetCourse(
-            tuple(shapes), motions, grown=self.grown, levels=levels_of(problem)
-        )
+        self.standing = FleetCourse(shapes, motions, grown=self.grown, levels=levels_of(problem))
 
     @functools.cached_property
     def at_will(self) -> bool:
@@ -205,14 +216,12 @@ class FleetMember:
 
     def course_of(self, plan: Plan) -> FleetCourse:
         """Its bodies in time if it drives a plan."""
-        plans = [(self.problem.footprint or POINT, plan)]
-        for name, shapes in self.problem.parts.items():
-            plans.append((shapes, carried(plan, self.problem.automaton.model, name)))
-        until = plan.start_time + plan.duration if self.leaves else math.inf
+        parts, model = self.problem.parts, self.problem.automaton.model
+        plans = [plan, *(carried(plan, model, name) for name in parts)]
         return FleetCourse(
-            tuple(shapes for shapes, _ in plans),
-            tuple(Motion.of_plan(one) for _, one in plans),
-            until,
+            (self.problem.footprint or POINT, *parts.values()),
+            tuple(Motion.of_plan(one) for one in plans),
+            plan.start_time + plan.duration if self.leaves else math.inf,
             self.grown,
             levels_of(self.problem, plan),
         )
@@ -250,8 +259,7 @@ class FleetMember:
     def _plan_words(self, budget: Budget, *, bounded: bool) -> None:
         """The same for one whose plans are words of the lattice."""
         query = self._query(self.aimed)
-        first = first_plan(query, budget=replace(budget, expansions=LONGEST))
-        self._count(first.expansions)
+        first = self._first(query, budget, LONGEST)
         if first.word is None:
             self.why_none = first.enclosed or "no path was found"
             return
@@ -273,26 +281,28 @@ class FleetMember:
         self, query: LatticeQuery, word: Word, budget: Budget, patience: Patience
     ) -> None:
         better = improve(query, word, budget=budget, patience=patience)
-        self._count(better.expansions)
+        self.expansions += better.expansions
         words = [better.word, word, *better.others, *self.ways]
         words = sorted(words, key=lambda one: one.cost)
         distinct = {tuple(one.trims.tolist()): one for one in reversed(words)}
         self.ways = list(distinct.values())[::-1][:WAYS]
         self.alone = self._word_found(query, self.ways[0], self.aims)
 
+    def own(self, plan: Plan, goal_index: int | None = 0, *, cost: float | None = None) -> OwnPlan:
+        """A plan as its own; it has its price if no cost is given."""
+        cost = self.problem.cost_of(plan) if cost is None else cost
+        return OwnPlan(plan, cost, goal_index or 0, self.course_of(plan))
+
     def _word_found(
         self, query: LatticeQuery, word: Word, aims: Sequence[tuple[int, Goal]]
     ) -> OwnPlan:
-        plan = plan_of_word(query, word)
         goal_index = aims[query.goal_index[word.goal]][0]
-        return OwnPlan(plan, word.cost + query.padding, goal_index, self.course_of(plan))
+        return self.own(plan_of_word(query, word), goal_index, cost=word.cost + query.padding)
 
     def _found(self, result: PlanResult) -> OwnPlan | None:
         if result.plan is None or result.cost is None:
             return None
-        return OwnPlan(
-            result.plan, result.cost, result.goal_index or 0, self.course_of(result.plan)
-        )
+        return self.own(result.plan, result.goal_index, cost=result.cost)
 
     def past(
         self,
@@ -337,10 +347,9 @@ class FleetMember:
                 own, query = replace(own, goals=goals), self._query(replace(problem, goals=goals))
             best = self._round_the_arrived(query, calm, budget)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
-            first = first_plan(query, budget=replace(budget, expansions=most))
-            self._count(first.expansions)
-            if first.word is not None and first.word.cost < (best.cost if best else math.inf):
-                best = first.word
+            word = self._first(query, budget, most).word
+            if word is not None and word.cost < (best.cost if best else math.inf):
+                best = word
         if best is None and most == LONG and self.alone is not None:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
@@ -377,11 +386,10 @@ class FleetMember:
         if not self.at_will:
             return self._found(self._planned(calm, budget, improve=False))
         query = self._query(calm)
-        first = first_plan(query, budget=replace(budget, expansions=QUICK))
-        self._count(first.expansions)
-        if first.word is None:
+        word = self._first(query, budget, QUICK).word
+        if word is None:
             return None
-        word = improve(query, first.word, budget=budget, patience=AT_ONCE).word
+        word = improve(query, word, budget=budget, patience=AT_ONCE).word
         return self._word_found(query, word, aims)
 
     def refuges(
@@ -407,8 +415,7 @@ class FleetMember:
             )
         if before is not None:
             plan = followed_by(before.plan, plan)
-        cost = self.problem.cost_of(plan)
-        return OwnPlan(plan, cost, leg.goal_index, self.course_of(plan))
+        return self.own(plan, leg.goal_index)
 
     def keep_aside(self, found: OwnPlan) -> None:
         """Keep a way on which it makes room for others, to drive it at other times."""
@@ -471,9 +478,8 @@ class FleetMember:
         """A way round those that stay at their goals, wherever they are now, with rests."""
         if blocked_ends(calm) is not None:
             return None
-        first = first_plan(self._query(calm), budget=replace(budget, expansions=QUICK))
-        self._count(first.expansions)
-        return None if first.word is None else with_waits(query, first.word)
+        word = self._first(self._query(calm), budget, QUICK).word
+        return None if word is None else with_waits(query, word)
 
     def _planned(self, problem: Problem, budget: Budget, *, improve: bool) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""
@@ -487,14 +493,27 @@ class FleetMember:
         wanted = replace(problem, search=search)
         limit = max(budget.left, LEAST_S)
         result = plan_in(workspace, wanted, time_limit=limit, alternatives=0)
-        self._count(result.counts.get("expansions", 0))
+        self.expansions += result.counts.get("expansions", 0)
         return result
 
     def _query(self, problem: Problem) -> LatticeQuery:
         return lattice_query(problem, goals_left(problem), prepared=self.workspace.prepared)
 
-    def _count(self, expansions: int) -> None:
-        self.expansions += expansions
+    def _first(self, query: LatticeQuery, budget: Budget, most: int) -> FirstPlan:
+        """The first word that a search finds with so many expansions, which are counted."""
+        first = first_plan(query, budget=replace(budget, expansions=most))
+        self.expansions += first.expansions
+        return first
+
+
+def courses_of(
+    vehicles: Sequence[FleetMember], plans: Mapping[int, OwnPlan]
+) -> dict[int, FleetCourse]:
+    """The courses of all, by number: who has no plan stands at its start."""
+    return {
+        one.number: plans[one.number].course if one.number in plans else one.standing
+        for one in vehicles
+    }
 
 
 def prepare_vehicles(vehicles: Sequence[FleetMember]) -> None:

@@ -64,7 +64,7 @@ def verified(
         row, driven = next(((row, some) for row, some in pairs if some), (None, []))
         if row is None:
             break
-        # ToPass a vehicle that has no plan nobody may drive; and what two libraries do not agree on
+        # Past a vehicle that has no plan nobody may drive; and what two libraries do not agree on
         # is not returned. Who stands all the time stands there without its plan too.
         name = max(driven, key=lambda one: (passed[names.index(one)].quiet_after, one))
         other = row.pair[0] if name == row.pair[1] else row.pair[1]
@@ -77,6 +77,7 @@ def verified(
             problem=results[name].problem, status=PlanStatus.NO_PLAN, reason=why[name]
         )
         del passed[names.index(name)]
+    far = math.inf if len(fleet) < 2 else fleet.margin + NEAR
     n = sum(result.plan is not None for result in results.values())
     status = FleetStatus.FOUND if n == len(vehicles) else FleetStatus.PARTIAL
     return FleetResult(
@@ -84,7 +85,8 @@ def verified(
         status=status if n else FleetStatus.NO_PLAN,
         results=results,
         closest=closest,
-        clearance_m=least_apart(closest, fleet),
+        # pairs that are not measured keep a metre more
+        clearance_m=min(far, *(row.distance_m for row in closest)) if closest else far,
         reasons=why,
     )
 
@@ -92,13 +94,6 @@ def verified(
 def enough_for(keep: float) -> float:
     """The distance [m] that two bodies must exceed which are to keep one; touching never is."""
     return max(keep - CONTACT, CONTACT)
-
-
-def least_apart(closest: Sequence[Closest], fleet: FleetProblem) -> float:
-    """What any two vehicles keep at least [m]: pairs that are not measured keep `NEAR` more."""
-    if len(fleet) < 2:
-        return math.inf
-    return min([fleet.margin + NEAR, *(row.distance_m for row in closest)])
 
 
 def _checked(
@@ -170,15 +165,11 @@ def _nearest(one: FleetCourse, other: FleetCourse, *, enough: float) -> Least:
     """The same, the first driven as it is past the other's bodies."""
     begin = min(float(way.time[0]) for way in (*one.motions, *other.motions))
     quiet = min(max(one.quiet_after, other.quiet_after), one.until)
-    levels = one.levels if _heights_matter(one, other) else None
+    above = (mine.above(its.low, its.high) > 0.0 for mine in one.bands for its in other.bands)
+    levels = one.levels if any(above) else None
     found = [
-        closest_to(
-            plan_of_motion(motion, quiet, since=begin, levels=levels),
-            Omnidirectional() if levels is None else IN_SPACE,
-            other.bodies,
-            footprint=shapes,
-            body_height=(0.0, 0.0) if levels is None else levels.reach,
-            enough=enough,
+        nearest_obstacle(
+            shapes, motion, other.bodies, until=quiet, since=begin, levels=levels, enough=enough
         )
         for shapes, motion in zip(one.shapes, one.motions, strict=True)
     ]
@@ -191,6 +182,7 @@ def nearest_obstacle(
     obstacles: tuple[AnyObstacle, ...],
     *,
     until: float,
+    since: float = math.inf,
     levels: Levels | None = None,
     enough: float = 0.0,
 ) -> Least:
@@ -198,19 +190,29 @@ def nearest_obstacle(
 
     A lower bound, made sharp enough to tell on which side of `enough` [m] it is.
     """
+    plan = plan_of_motion(motion, until, since=since, levels=levels)
+    reach = (0.0, 0.0) if levels is None else levels.reach
+    return least_of(plan, shapes, obstacles, reach=reach, enough=enough)
+
+
+def least_of(
+    plan: Plan,
+    shapes: tuple[Shape, ...],
+    obstacles: tuple[AnyObstacle, ...],
+    *,
+    reach: tuple[float, float],
+    enough: float,
+) -> Least:
+    """The same of a plan of something that moves at will; `reach` is its height about the plan."""
+    in_space = plan.start.size > 3
     return closest_to(
-        plan_of_motion(motion, until, levels=levels),
-        Omnidirectional() if levels is None else IN_SPACE,
+        plan,
+        IN_SPACE if in_space else Omnidirectional(),
         obstacles,
         footprint=shapes,
-        body_height=(0.0, 0.0) if levels is None else levels.reach,
+        body_height=reach if in_space else (0.0, 0.0),
         enough=enough,
     )
-
-
-def _heights_matter(one: FleetCourse, other: FleetCourse) -> bool:
-    """Whether one may be above the other at some time."""
-    return any(mine.above(its.low, its.high) > 0.0 for mine in one.bands for its in other.bands)
 
 
 def plan_of_motion(

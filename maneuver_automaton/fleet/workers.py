@@ -78,10 +78,8 @@ def decoded(vehicle: FleetMember, message: bytes) -> OwnPlan:
             maneuvers=word[count:],
             start_time=begin,
         )
-    course = vehicle.course_of(plan)
-    if stays and course.until < math.inf:
-        course = replace(course, until=math.inf)
-    return OwnPlan(plan, cost, goal_index, course)
+    found = vehicle.own(plan, goal_index, cost=cost)
+    return replace(found, course=found.course.staying) if stays else found
 
 
 def _primitives(vehicle: FleetMember) -> tuple[Any, ...]:

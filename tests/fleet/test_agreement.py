@@ -11,7 +11,7 @@ from maneuver_automaton.collision.shapes import (
     Disc,
 )
 from maneuver_automaton.fleet import Message
-from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.agreement import _Agreement
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.vehicle import OwnPlan
 from tests.fleet.robots import at_rest, crossing, least_distance
@@ -42,7 +42,7 @@ def three(*dropped: int):
     """Three vehicles that hold plans, and what they say to each other."""
     drops = Drops(*dropped)
     held = {k: found(float(k)) for k in range(3)}
-    agreement = Agreement("abc", drops, tries=1)
+    agreement = _Agreement("abc", drops, tries=1)
     agreement.start(held)
     return agreement, held, drops
 

@@ -13,14 +13,7 @@ from maneuver_automaton.automaton.cutting import begin_state, committed, end_sta
 from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import FleetHorizon, FleetProblem, plan_fleet
-from maneuver_automaton.fleet.held import (
-    given_up,
-    onward,
-    rejoined,
-    rest_of_plan,
-    resting,
-    stopping,
-)
+from maneuver_automaton.fleet.held import onward, rejoined, rest_of_plan, resting, stopping
 from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.fleet.workers import PlanRequest, Terms, answered
 from tests.inertia import car_automaton, unicycle_automaton
@@ -85,7 +78,7 @@ def test_whatever_is_driven_next_goes_on_from_the_state_that_it_has(driving):
         state = state_at(vehicle, found, time)
         pose = plan.pose_at(min(time, plan.start_time + plan.duration))
         beside = pose + np.array([0.01, -0.01, 0.001])
-        for one in (found, given_up(found)):
+        for one in (found, found.given_up()):
             choices = [*rejoined(vehicle, one, time, beside, TUBE)]
             for other in [*choices, stopping(vehicle, one, time, beside)]:
                 if other.plan.trims:

@@ -14,7 +14,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
-from maneuver_automaton.fleet.agreement import Agreement
+from maneuver_automaton.fleet.agreement import _Agreement
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.guarantees import broken
 from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
@@ -232,7 +232,7 @@ def pair(gap=1.0):
     ends = [([0, 0, 0], [2, 0, 0]), ([0, 0.6 + gap, 0], [2, 0.6 + gap, 0])]
     fleet = FleetProblem([problem_of(*one) for one in ends], names=("a", "b"), margin=0.1)
     state = FleetHorizon(fleet, step=0.5).state
-    state.agreement = Agreement(fleet.names)
+    state.agreement = _Agreement(fleet.names)
     for k, one in enumerate(state.vehicles):
         state.held[k] = found_on(one, start=one.problem.start)
     state.agreement.start(state.held)
