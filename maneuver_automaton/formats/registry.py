@@ -6,6 +6,7 @@ format of its own: its entry point in the group `maneuver_automaton.formats` nam
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import importlib
 from collections.abc import Callable, Mapping
@@ -16,7 +17,7 @@ from typing import Any, Protocol, TypeAlias
 
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import Statement, Unknown
 from maneuver_automaton.formats.yaml_source import Document
 
 GROUP = "maneuver_automaton.formats"  # of entry points
@@ -57,123 +58,61 @@ class Format(Protocol):
         """Write a map; called only where `writes` says so."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class BuiltIn:
     """A format of this package, whose module is loaded when it is asked; see `Format`."""
 
     name: str
-    endings: tuple[str, ...]
+    endings: str
     module: str
     reads: str  # the function that does
     test: str = ""  # of a path, or of a YAML document; empty: the ending is enough
     saves: str = ""
-    stands_alone: bool = True  # in a folder, and belongs to no other file
-    counts: str = ""  # how many problems a path holds, where they may be several
+    alone: bool = True  # a problem by itself, where it is found in a folder
+    count: str = ""  # problems of a path; "several": always so many that --case tells which
 
     def recognises(self, path: Path, document: Document | None) -> bool:
         """Whether a file is in it, by its ending and its content."""
-        if path.suffix.lower() not in self.endings:
+        if path.suffix.lower() not in self.endings.split():
             return False
-        return not self.test or bool(self._call(self.test, path if document is None else document))
+        return not self.test or bool(self.call(self.test, path if document is None else document))
 
     def read(self, path: Path, document: Document | None) -> tuple[Statement, ...]:
         """What a file states, problem by problem."""
         given = (path,) if document is None else (path, document)
-        statements: tuple[Statement, ...] = self._call(self.reads, *given)
+        statements: tuple[Statement, ...] = self.call(self.reads, *given)
         return statements
 
     def writes(self, path: Path) -> bool:
         """Whether a map of this name is written in it."""
-        return bool(self.saves) and path.suffix.lower() in self.endings
+        return bool(self.saves) and path.suffix.lower() in self.endings.split()
 
     def write(self, cells: OccupancyMap, path: Path) -> None:
         """Write a map."""
-        self._call(self.saves, cells, path)
+        self.call(self.saves, cells, path)
 
-    def _call(self, function: str, *given: Any) -> Any:
+    def call(self, function: str, *given: Any) -> Any:
+        """What a function of its module returns."""
         module = importlib.import_module(f"{__package__}.{self.module}")
         return getattr(module, function)(*given)
 
 
+YAML, CSV = " ".join(YAML_ENDINGS), ".csv"
 BUILT_IN = (  # of one ending: the last is read where none recognises the file, and says why
+    BuiltIn("Bench-MR", CSV, "benchmr", "read_benchmr_queries", "is_queries", alone=False),
+    BuiltIn("table of poses", CSV, "poses_csv", "read_poses", "is_poses"),
+    BuiltIn("TPCAP", CSV, "tpcap", "read_tpcap", "is_tpcap"),
+    BuiltIn("MovingAI", ".map", "movingai", "read_movingai_map", saves="save_movingai_map"),
+    BuiltIn("MovingAI", ".scen", "movingai", "read_movingai_scenario", count="several"),
+    BuiltIn("SBPL", ".cfg .env .nav2d .nav3d", "sbpl_cfg", "read_sbpl", "is_sbpl"),
     BuiltIn(
-        name="Bench-MR",
-        endings=(".csv",),
-        module="benchmr_svg",
-        reads="read_benchmr_queries",
-        test="is_queries",
-        stands_alone=False,
+        "CommonRoad", ".xml", "commonroad", "read_commonroad", "is_commonroad", count="several"
     ),
-    BuiltIn(
-        name="poses", endings=(".csv",), module="poses_csv", reads="read_poses", test="is_poses"
-    ),
-    BuiltIn(name="TPCAP", endings=(".csv",), module="tpcap", reads="read_tpcap", test="is_tpcap"),
-    BuiltIn(
-        name="MovingAI",
-        endings=(".map",),
-        module="movingai",
-        reads="read_movingai_map",
-        saves="save_movingai_map",
-    ),
-    BuiltIn(
-        name="MovingAI",
-        endings=(".scen",),
-        module="movingai",
-        reads="read_movingai_scenario",
-        counts="several",
-    ),
-    BuiltIn(
-        name="SBPL",
-        endings=(".cfg", ".env", ".nav2d", ".nav3d"),
-        module="sbpl_cfg",
-        reads="read_sbpl",
-        test="is_sbpl",
-    ),
-    BuiltIn(
-        name="CommonRoad",
-        endings=(".xml",),
-        module="commonroad",
-        reads="read_commonroad",
-        test="is_commonroad",
-        counts="several",
-    ),
-    BuiltIn(
-        name="Bench-MR",
-        endings=(".svg",),
-        module="benchmr_svg",
-        reads="read_benchmr",
-        test="n_queries",
-        counts="n_queries",
-    ),
-    BuiltIn(
-        name="Bench-MR",
-        endings=(".png", ".bmp"),
-        module="benchmr_image",
-        reads="read_benchmr_image",
-        stands_alone=False,
-    ),
-    BuiltIn(
-        name="dynobench",
-        endings=YAML_ENDINGS,
-        module="dynobench",
-        reads="read_dynobench",
-        test="is_dynobench",
-    ),
-    BuiltIn(
-        name="CL-CBS",
-        endings=YAML_ENDINGS,
-        module="cl_cbs",
-        reads="read_cl_cbs",
-        test="is_cl_cbs",
-    ),
-    BuiltIn(
-        name="Nav2",
-        endings=YAML_ENDINGS,
-        module="nav2_map",
-        reads="read_nav2_map",
-        test="is_nav2_map",
-        saves="save_nav2_map",
-    ),
+    BuiltIn("Bench-MR", ".svg", "benchmr", "read_benchmr", "n_queries", count="n_queries"),
+    BuiltIn("Bench-MR", ".png .bmp", "benchmr", "read_benchmr_image", alone=False),
+    BuiltIn("dynobench", YAML, "dynobench", "read_dynobench", "is_dynobench"),
+    BuiltIn("CL-CBS", YAML, "cl_cbs", "read_cl_cbs", "is_cl_cbs"),
+    BuiltIn("Nav2", YAML, "nav2_map", "read_nav2_map", "is_nav2_map", saves="save_nav2_map"),
 )
 
 
@@ -219,7 +158,7 @@ def format_of(path: Path, document: Document | None = None) -> Format | None:
         raise InvalidScenario(f"{path}: holds {PRIMITIVES}")
     if said := NOT_READ.get(ending):
         raise InvalidScenario(f"{path}: {said}")
-    of_it = [one for one in BUILT_IN if ending in one.endings]
+    of_it = [one for one in BUILT_IN if ending in one.endings.split()]
     if document is None and of_it:
         return next((one for one in of_it[:-1] if one.recognises(path, None)), of_it[-1])
     return next((one for one in of_it if one.recognises(path, document)), None)
@@ -279,20 +218,20 @@ def states_a_problem(path: Path, document: Document | None) -> bool:
     try:
         if any(one.recognises(path, None) for one in from_outside()):
             return True
-        return any(one.stands_alone and one.recognises(path, None) for one in BUILT_IN)
+        return any(one.alone and one.recognises(path, None) for one in BUILT_IN)
     except (OSError, InvalidScenario):
         return True
 
 
 def holds_several(path: Path) -> bool:
     """Whether a file that is no YAML may hold several problems, for one of which --case asks."""
-    of_it = [one for one in BUILT_IN if path.suffix.lower() in one.endings and one.counts]
-    if not of_it or of_it[-1].counts == "several":
-        return bool(of_it)
-    try:
-        return int(of_it[-1]._call(of_it[-1].counts, path)) > 1
-    except InvalidScenario:
-        return False
+    for one in BUILT_IN:
+        if one.count == "several" and path.suffix.lower() in one.endings.split():
+            return True
+        if one.count and path.suffix.lower() in one.endings.split():
+            with contextlib.suppress(InvalidScenario):  # told when it is planned
+                return int(one.call(one.count, path)) > 1
+    return False
 
 
 def _holds_primitives(path: Path) -> bool:
@@ -303,3 +242,37 @@ def _holds_primitives(path: Path) -> bool:
         return is_commonroad_primitives(path)
     except (OSError, ValueError):
         return False
+
+
+def load_map(path: Path | str, *, unknown: Unknown = "blocked") -> OccupancyMap:
+    """The occupancy map of a file: of Nav2 and ROS (.yaml beside an image), or MovingAI (.map).
+
+    A picture alone states no size of its pixels: `OccupancyMap.of_picture` takes both.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    unknown : str
+        How to read the cells of a Nav2 map of which it knows nothing: "blocked" or "free".
+
+    Raises
+    ------
+    InvalidScenario
+        If the file or its image cannot be used: file, line, field, value, what would be right.
+    """
+    path = Path(path)
+    if unknown not in ("blocked", "free"):
+        raise InvalidScenario(f"{path}: unknown: got {unknown!r}, need 'blocked' or 'free'")
+    if path.suffix.lower() in YAML_ENDINGS:
+        from maneuver_automaton.formats.nav2_map import load_nav2_map
+
+        return load_nav2_map(path, unknown=unknown)
+    if path.suffix.lower() == ".map":
+        from maneuver_automaton.formats.movingai import load_movingai_map
+
+        return load_movingai_map(path)
+    raise InvalidScenario(
+        f"{path}: is no map, need a file of Nav2 ({', '.join(YAML_ENDINGS)}) or MovingAI "
+        "(.map); OccupancyMap.of_picture reads an image"
+    )
