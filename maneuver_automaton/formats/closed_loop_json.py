@@ -77,7 +77,7 @@ class PlaceEntry(TypedDict):
 
     time_s: Number
     pose: Numbers
-    value: Number
+    value: Annotated[Known, says("cost of what is left; null if the plan does not arrive")]
     accumulated_cost: Annotated[Number, says("of all steps before")]
     vehicle_pose: Annotated[Numbers, says("where it was, if pose is where it will be")]
 
@@ -128,15 +128,13 @@ class PiecesEntry(TypedDict):
     max_dynamics_defect: Known
 
 
-StepEntry = Annotated[
-    Annotated[AppliedEntry, Tag("<AppliedEntry>")] | Annotated[EndedEntry, Tag("<EndedEntry>")],
-    Discriminator(lambda row: tag_of(row, "<AppliedEntry>", "<EndedEntry>")),
-]
+def has_ended(row: Any) -> str:
+    """Which of two kinds a row of `steps` is of: the last one says where the vehicle ended."""
+    return "<ended>" if isinstance(row, dict) and row.get("word", "") is None else "<applied>"
 
 
-def tag_of(row: Any, applied: str, ended: str) -> str:
-    """Which of two kinds a row of `steps` is of."""
-    return ended if isinstance(row, dict) and row.get("word", "") is None else applied
+Ended = Annotated[EndedEntry, Tag("<ended>")]
+StepEntry = Annotated[Annotated[AppliedEntry, Tag("<applied>")] | Ended, Discriminator(has_ended)]
 
 
 class LoopDocument(Document):
