@@ -26,7 +26,7 @@ from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     SCHEMA,
-    Document,
+    DocumentHead,
     Flag,
     Known,
     ModelEntry,
@@ -137,7 +137,7 @@ Ended = Annotated[EndedEntry, Tag("<ended>")]
 StepEntry = Annotated[Annotated[AppliedEntry, Tag("<applied>")] | Ended, Discriminator(has_ended)]
 
 
-class LoopDocument(Document):
+class LoopDocument(DocumentHead):
     """What a closed loop of one vehicle did."""
 
     vehicle: NotRequired[ModelEntry | None]
@@ -505,7 +505,7 @@ class OutcomeEntry(TypedDict):
     solve_s: Numbers
 
 
-class StatisticsDocument(Document):
+class StatisticsDocument(DocumentHead):
     """Many closed loops in a few numbers each."""
 
     loops_run: Whole

@@ -42,7 +42,7 @@ from maneuver_automaton.formats.documents import (
     SCHEMA,
     ClearanceEntry,
     ClosestEntry,
-    Document,
+    DocumentHead,
     Flag,
     Known,
     ModelEntry,
@@ -142,7 +142,7 @@ class VehicleLoopEntry(TypedDict):
     steps: Annotated[list[VehicleStep], Field(min_length=1)]
 
 
-class FleetLoopDocument(Document):
+class FleetLoopDocument(DocumentHead):
     """What a closed loop of several vehicles did."""
 
     kind: Literal["fleet"]
