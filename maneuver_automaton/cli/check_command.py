@@ -287,8 +287,12 @@ def _of_fleet(scenario: FleetScenario) -> Iterator[Finding]:
         if not leaves and len(one.goals) == 1 and not one.goals[0].free_heading
     ]
     if at_goals:
-        names, there = zip(*at_goals, strict=True)
-        yield _apart("goals", FleetProblem(there, names=names, margin=fleet.margin))
+        there = FleetProblem(
+            [one for _, one in at_goals],
+            names=[name for name, _ in at_goals],
+            margin=fleet.margin,
+        )
+        yield _apart("goals", there)
     limit = scenario.time_limit_s
     with announced(), waiting(f"planning, at most {limit:g} s", quiet=False):
         result = plan_fleet(
