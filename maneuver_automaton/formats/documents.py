@@ -50,6 +50,7 @@ Number = Annotated[float, Strict(), AllowInfNan(False)]
 Known = Number | None  # null where there is none, or no limit
 Whole = Annotated[int, Strict()]
 Flag = Annotated[bool, Strict()]
+Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0.0)]
 Pairs = list[tuple[Number, Number]]
 
 
@@ -82,7 +83,7 @@ SourceEntry = TypedDict(  # what a result was made from, as seen from its file
 )
 
 
-class Document(TypedDict):
+class DocumentHead(TypedDict):
     """What every result file has."""
 
     schema: Annotated[Whole, says("1")]
@@ -261,24 +262,30 @@ def checked(kind: str, value: Any, path: Path | str) -> dict[str, Any]:
         )
     if value["schema"] != SCHEMA:
         raise InvalidScenario(f"{path}: schema: got {value['schema']!r}, need {SCHEMA}")
+    check_value(adapter_of(kind), value, path)
+    return value
+
+
+def check_value(adapter: TypeAdapter[Any], value: Any, path: Path | str) -> None:
+    """Refuse a value of a JSON file that is not as stated; raises InvalidScenario: the first."""
     try:
-        adapter_of(kind).validate_python(value)
+        adapter.validate_python(value)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where, words = first["loc"], first["msg"]
         if first["type"] == "missing":
-            words = f"is missing, need {_needed(schema_of(kind), where)}"
+            words = f"is missing, need {_needed(adapter.json_schema(), where)}"
         else:
             need = NEED.get(first["type"]) or words.partition(" should be ")[2]
             words = f"got {shown(first['input'])}, need {need}"
         raise misstated(path, where, words) from error
-    return value
 
 
 def misstated(path: Path | str, where: tuple[str | int, ...], said: str) -> InvalidScenario:
     """The error of a field of a file: raise it."""
     steps = (step for step in where if isinstance(step, int) or step[:1] != "<")  # tags of unions
-    return InvalidScenario(f"{path}: {spelled(tuple(steps))}: {said}")
+    label = spelled(tuple(steps))
+    return InvalidScenario(f"{path}: {label + ': ' if label else ''}{said}")
 
 
 @contextlib.contextmanager
@@ -303,6 +310,7 @@ NEED = {  # by the kinds of complaint of pydantic, and by the types of JSON Sche
     "tuple_type": "a list",
     "dict_type": "an object",
     "too_short": "at least one entry",
+    "greater_than": "a positive number",
     "number": "a finite number",
     "integer": "a whole number",
     "string": "a text",
