@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet import FleetLog
     from maneuver_automaton.receding_horizon import ClosedLoop, Disturbance
     from maneuver_automaton.scenario import Scenario
-    from maneuver_automaton.scenario.schema import Disturbance as DisturbancePart
+    from maneuver_automaton.scenario.schema import LateNoisePart as DisturbancePart
 
 STEPS = 100  # at most, where neither file nor option says
 PICTURES = ("closed_loop.png", "closed_loop.gif", "closed_loop.html")
@@ -259,7 +259,7 @@ def _in_file(path: Path, error: ValueError) -> InvalidScenario:
 
 
 def _disturbance(part: DisturbancePart | None, seed: int | None) -> Disturbance | None:
-    from maneuver_automaton.scenario.disturbances import disturbance_of
+    from maneuver_automaton.scenario.scenario import disturbance_of
 
     return None if part is None else disturbance_of(part, seed=seed)
 

@@ -8,19 +8,19 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from annotated_types import Ge
 from pydantic import Field, Strict
 
-from maneuver_automaton.scenario.checks import (
+from maneuver_automaton.scenario.parts import (
     Count,
+    FilePart,
     Name,
     Need,
     NotNegative,
     Number,
-    Part,
     Positive,
     Several,
     Text,
+    Whole,
 )
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
@@ -28,21 +28,18 @@ from maneuver_automaton.scenario.schema import (
     CostPart,
     Goals,
     HorizonPart,
-    Noise,
-    Obstacle,
+    NoisePart,
+    Obstacles,
     SearchPart,
-    Seed,
-    Start,
-    ZonePart,
+    StartPart,
+    Zones,
 )
-from maneuver_automaton.scenario.vehicle_parts import VehiclePart
+from maneuver_automaton.scenario.vehicles import VehiclePart
 
 AT_TOP = "left out: that of the top"
-Obstacles = Annotated[tuple[Obstacle, ...], Several("a list of obstacles", at_least=0)]
-Zones = Annotated[tuple[ZonePart, ...], Several("a list of zones", at_least=0)]
 
 
-class FleetPart(Part):
+class FleetPart(FilePart):
     """How several vehicles are planned."""
 
     objective: Annotated[Literal["sum", "last"], Need("sum or last")] = Field(
@@ -55,17 +52,17 @@ class FleetPart(Part):
     time_limit_s: Positive = Field(10.0, description="upper bound for planning them all")
 
 
-class FleetNoise(Noise):
+class FleetNoisePart(NoisePart, title="FleetNoise"):
     """What vehicles of a fleet do beside their plans; random numbers come from the seed."""
 
     instead: ClassVar = {
         "delay_steps": "no such key: answers of a fleet are late by delay_steps of receding_horizon"
     }
 
-    seed: Seed = Field(0, description="seed of the random numbers")
+    seed: Whole = Field(0, description="seed of the random numbers")
 
 
-class FleetLoopPart(Part):
+class FleetLoopPart(FilePart):
     """Closed loop of several vehicles, for mpc."""
 
     instead: ClassVar = {
@@ -84,15 +81,13 @@ class FleetLoopPart(Part):
         None, description="vehicles that look for another plan in a step; left out: all"
     )
     group_size: Count = Field(1, description="so many exchange their plans at once, at most")
-    delay_steps: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
-        0, description="how many steps late an answer comes"
-    )
-    disturbance: FleetNoise | None = Field(
+    delay_steps: Whole = Field(0, description="how many steps late an answer comes")
+    disturbance: FleetNoisePart | None = Field(
         None, description="of every vehicle that states none: {position_m, heading_rad, seed, ...}"
     )
 
 
-class VehicleLoopPart(Part):
+class VehicleLoopPart(FilePart):
     """What happens to one of several vehicles in closed loop, for mpc."""
 
     joins_s: Number | None = Field(
@@ -101,10 +96,10 @@ class VehicleLoopPart(Part):
     breaks_s: Number | None = Field(
         None, description="when it breaks down: it stops as soon as it can, and stays there"
     )
-    disturbance: FleetNoise | None = Field(None, description=AT_TOP)
+    disturbance: FleetNoisePart | None = Field(None, description=AT_TOP)
 
 
-class VehicleEntry(Part):
+class VehicleEntry(FilePart):
     """One of several vehicles: what it has of its own, and what differs from the top."""
 
     name: Name | None = Field(None, description="a name of its own; left out: its number, from 1")
@@ -115,7 +110,7 @@ class VehicleEntry(Part):
     start_time_s: Number | None = Field(None, description="time at the start; until then it waits")
     vehicle: VehiclePart | None = Field(None, description=AT_TOP)
     automaton: AutomatonPart | None = Field(None, description=AT_TOP)
-    start: Start = Field(description="a mapping {pose, ...}")
+    start: StartPart = Field(description="a mapping {pose, ...}")
     goal: Goals = Field(description="a mapping {pose, ...}, or a list of these")
     cost: CostPart | None = Field(None, description=AT_TOP)
     horizon: HorizonPart | None = Field(None, description=AT_TOP)
@@ -129,7 +124,7 @@ class VehicleEntry(Part):
     )
 
 
-class FleetFile(Part):
+class FleetFile(FilePart):
     """Several vehicles that keep apart."""
 
     schema_version: Literal[1] = Field(alias="schema", description="1")

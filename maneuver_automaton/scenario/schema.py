@@ -23,23 +23,26 @@ from pydantic import (
     field_validator,
 )
 
-from maneuver_automaton.scenario.checks import (
+from maneuver_automaton.scenario.parts import (
     Count,
+    FilePart,
     Interval,
     Name,
     Need,
     NotNegative,
     Number,
-    Part,
     Point,
     Polygon,
+    Polygons,
     Positive,
     Several,
+    Size,
     Text,
+    Whole,
     need,
     one_or_many,
 )
-from maneuver_automaton.scenario.vehicle_parts import VehiclePart
+from maneuver_automaton.scenario.vehicles import VehiclePart
 
 Pose = Annotated[
     tuple[Number, ...],
@@ -48,44 +51,32 @@ Pose = Annotated[
 Seconds = Annotated[Positive | Literal["free"], Need("a positive number of seconds, or free")]
 
 
-def _names(info: ValidationInfo, kind: str) -> tuple[str, ...]:
-    names: tuple[str, ...] = (info.context or {}).get(kind, ())
-    return names
-
-
-def _listed(value: Any, names: tuple[str, ...]) -> Any:
+def _listed(value: Any, info: ValidationInfo) -> Any:
+    """A list of numbers, as many as the model of the file has of them."""
+    names = (info.context or {}).get(f"{info.field_name}_names", ())
     if not isinstance(value, list) or (names and len(value) != len(names)):
         count = f"{len(names)} numbers ({', '.join(names)})" if names else "numbers"
         raise need(f"a list of {count}")
     return value
 
 
-def _controls(value: Any, info: ValidationInfo) -> Any:
-    return _listed(value, _names(info, "control_names"))
+Vector = Annotated[tuple[Number, ...], BeforeValidator(_listed)]
+Numbers = Annotated[tuple[Number, ...], Several("a list of numbers")]
 
 
-def _states(value: Any, info: ValidationInfo) -> Any:
-    return _listed(value, _names(info, "reduced_names"))
-
-
-Control = Annotated[tuple[Number, ...], BeforeValidator(_controls)]
-State = Annotated[tuple[Number, ...], BeforeValidator(_states)]
-Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0)]
-
-
-class NamedTrim(Part):
+class NamedTrim(FilePart):
     """One trim: a name, and what holds it; what is left out follows from the rest being steady."""
 
     name: Name = Field(description="a name that no other trim has")
-    control: Control | None = Field(
+    control: Vector | None = Field(
         None, description="constant control; unicycle: [v, omega]; car: [v, steering]"
     )
-    state: State | None = Field(
+    state: Vector | None = Field(
         None, description="reduced state of a vehicle that has one; second_order_car: [v, steering]"
     )
 
 
-class Axis(Part):
+class Axis(FilePart):
     """Equally spaced values of one control, both ends included."""
 
     one_of: ClassVar = ("step", "count")
@@ -96,16 +87,17 @@ class Axis(Part):
     count: Count | None = Field(None, description="number of values")
 
 
-class Grid(Part):
+Axes = Annotated[tuple[Axis, ...], Several("a list with one axis per control", at_least=1)]
+
+
+class GridPart(FilePart, title="Grid"):
     """One trim for every combination of values: of controls, or of speeds and what else is steady.
 
     The axes of a kinematic vehicle are those of its control. Any other vehicle has axes by name:
     of its body velocity, its reduced state or its control; the rest is solved for.
     """
 
-    control: (
-        Annotated[tuple[Axis, ...], Several("a list with one axis per control", at_least=1)] | None
-    ) = Field(None, description="one axis {min, max, step or count} per control")
+    control: Axes | None = Field(None, description="one axis {min, max, step or count} per control")
     speed_m_s: Axis | None = Field(None, description="axis of the speed ahead")
     lateral_speed_m_s: Axis | None = Field(None, description="axis of the speed to the left")
     turn_rate_rad_s: Axis | None = Field(None, description="axis of the turn rate")
@@ -119,7 +111,7 @@ class Grid(Part):
     )
 
 
-class ManeuversPart(Part):
+class ManeuversPart(FilePart):
     """How trims of a grid are joined, where that needs no solver."""
 
     pairs: Annotated[Literal["all", "neighbours"], Need("all or neighbours")] = Field(
@@ -130,22 +122,23 @@ class ManeuversPart(Part):
     turns_rad: Numbers = Field((), description="turns on the spot, from rest to rest")
 
 
-class AutomatonPart(Part):
+NamedTrims = Annotated[tuple[NamedTrim, ...], Several("a list of at least one trim", at_least=1)]
+
+
+class AutomatonPart(FilePart):
     """The library of trims: listed, a grid, a file, or a named one."""
 
     one_of: ClassVar = ("trims", "grid", "file", "preset")
     goes_with: ClassVar = {"maneuvers": ("trims", "grid")}
 
-    trims: (
-        Annotated[tuple[NamedTrim, ...], Several("a list of at least one trim", at_least=1)] | None
-    ) = Field(None, description="trims, each {name, control or state}")
-    grid: Grid | None = Field(None, description="all combinations of values")
+    trims: NamedTrims | None = Field(None, description="trims, each {name, control or state}")
+    grid: GridPart | None = Field(None, description="all combinations of values")
     file: Name | None = Field(None, description="library file, relative to this file")
     preset: Name | None = Field(None, description="name of a built-in library")
     maneuvers: ManeuversPart | None = Field(None, description="how trims are joined")
 
 
-class Start(Part):
+class StartPart(FilePart, title="Start"):
     """Where the plan begins."""
 
     pose: Pose = Field(description="[x, y, heading]")
@@ -153,7 +146,7 @@ class Start(Part):
     time_s: Number = Field(0.0, description="time at the start")
 
 
-class GoalPart(Part):
+class GoalPart(FilePart):
     """Where the plan ends."""
 
     pose: Pose = Field(description="[x, y, heading]")
@@ -182,25 +175,19 @@ def _norm_order(value: Any) -> Any:
     return "inf" if value == math.inf else value
 
 
-class CostPart(Part):
+Row = Annotated[tuple[Number, ...], Several("a row of the matrix, a list of numbers", at_least=1)]
+Matrix = Annotated[tuple[Row, ...], Several("a square matrix, a list of rows", at_least=1)]
+
+
+class CostPart(FilePart):
     """Weights of the stage cost, 0 unless stated."""
 
     effort: NotNegative = Field(0.0, description="c1, of the squared control per second")
     norm: NotNegative = Field(0.0, description="c2, of the norm of the control per second")
     time: NotNegative = Field(0.0, description="c3, per second")
-    effort_matrix: (
-        Annotated[
-            tuple[
-                Annotated[
-                    tuple[Number, ...],
-                    Several("a row of the matrix, a list of numbers", at_least=1),
-                ],
-                ...,
-            ],
-            Several("a square matrix, a list of rows", at_least=1),
-        ]
-        | None
-    ) = Field(None, description="R of the effort; left out: the identity")
+    effort_matrix: Matrix | None = Field(
+        None, description="R of the effort; left out: the identity"
+    )
     norm_order: Annotated[
         Literal[1, 2, "inf"], BeforeValidator(_norm_order), Need("1, 2 or inf")
     ] = Field(2, description="1, 2 or inf")
@@ -209,7 +196,7 @@ class CostPart(Part):
     direction_change: NotNegative = Field(0.0, description="per change between forward and reverse")
 
 
-class HorizonPart(Part):
+class HorizonPart(FilePart):
     """How long a plan lasts, and of how many trims it may consist."""
 
     time_s: Seconds = Field("free", description="exactly this long, or free")
@@ -223,7 +210,7 @@ class HorizonPart(Part):
     )
 
 
-class BoundsPart(Part):
+class BoundsPart(FilePart):
     """Where the pose may be."""
 
     x: Interval | None = Field(None, description="[low, high]")
@@ -231,21 +218,18 @@ class BoundsPart(Part):
     z: Interval | None = Field(None, description="[low, high]")
 
 
-class Disc(Part):
+class DiscPart(FilePart, title="Disc"):
     """A disc in the world."""
 
     center: Point = Field(description="[x, y]")
     radius: Positive = Field(description="radius")
 
 
-class Box(Part):
+class BoxPart(FilePart, title="Box"):
     """A rectangle in the world."""
 
     center: Point = Field(description="[x, y]")
-    size: Annotated[
-        tuple[Positive, Positive],
-        Several("[length, width], two positive numbers", at_least=2, at_most=2),
-    ] = Field(description="[length, width]")
+    size: Size = Field(description="[length, width]")
     heading_rad: Number = Field(0.0, description="direction of its length")
 
 
@@ -261,7 +245,18 @@ def _in_time(motion: tuple[TimedPose, ...]) -> tuple[TimedPose, ...]:
     return motion
 
 
-class Obstacle(Part):
+TimedPoses = Annotated[
+    tuple[TimedPose, ...],
+    Several("a list of at least one [time, x, y, heading]", at_least=1),
+    AfterValidator(_in_time),
+]
+Twists = Annotated[
+    tuple[Pose, ...],
+    Several("a list of [v_x, v_y, turn rate], one for every pose but the last"),
+]
+
+
+class ObstaclePart(FilePart, title="Obstacle"):
     """What the vehicle must not touch."""
 
     one_of: ClassVar = ("polygon_m", "disc_m", "box_m", "map")
@@ -275,35 +270,22 @@ class Obstacle(Part):
     }
 
     polygon_m: Polygon | None = Field(None, description="corners [x, y]")
-    holes_m: Annotated[tuple[Polygon, ...], Several("a list of polygons", at_least=0)] = Field(
-        (), description="polygons that are free inside polygon_m"
-    )
-    disc_m: Disc | None = Field(None, description="{center, radius}")
-    box_m: Box | None = Field(None, description="{center, size, heading_rad}")
+    holes_m: Polygons = Field((), description="polygons that are free inside polygon_m")
+    disc_m: DiscPart | None = Field(None, description="{center, radius}")
+    box_m: BoxPart | None = Field(None, description="{center, size, heading_rad}")
     map: Name | None = Field(None, description="occupancy map (YAML), relative to this file")
     unknown: Annotated[Literal["blocked", "free"], Need("blocked or free")] = Field(
         "blocked", description="what unknown cells of the map are"
     )
     height_m: Interval | None = Field(None, description="[low, high] of a body in space")
-    motion: (
-        Annotated[
-            tuple[TimedPose, ...],
-            Several("a list of at least one [time, x, y, heading]", at_least=1),
-            AfterValidator(_in_time),
-        ]
-        | None
-    ) = Field(None, description="poses in time, linear between")
-    twists: (
-        Annotated[
-            tuple[Pose, ...],
-            Several("a list of [v_x, v_y, turn rate], one for every pose but the last", at_least=0),
-        ]
-        | None
-    ) = Field(None, description="velocities in its own frame after each pose: it moves on arcs")
+    motion: TimedPoses | None = Field(None, description="poses in time, linear between")
+    twists: Twists | None = Field(
+        None, description="velocities in its own frame after each pose: it moves on arcs"
+    )
     present_s: Interval | None = Field(None, description="[from, to]: it is there then alone")
 
 
-class SearchPart(Part):
+class SearchPart(FilePart):
     """How to search, and for how long."""
 
     method: Annotated[
@@ -330,19 +312,14 @@ class SearchPart(Part):
     )
 
 
-class PushPart(Part):
+class PushPart(FilePart):
     """A displacement in the vehicle's own frame, as by a hand."""
 
-    after_step: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
-        description="number of the step, the first is 0"
-    )
+    after_step: Whole = Field(description="number of the step, the first is 0")
     by: Pose = Field(description="[x, y, heading] seen from the vehicle")
 
 
-Seed = Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")]
-
-
-class Noise(Part):
+class NoisePart(FilePart):
     """What a vehicle does beside its plan."""
 
     position_m: NotNegative = Field(0.0, description="standard deviation per axis and step")
@@ -352,7 +329,7 @@ class Noise(Part):
     twist_scale: Pose | None = Field(
         None, description="true over nominal body velocity, per component"
     )
-    pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes", at_least=0)] = Field(
+    pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes")] = Field(
         (), description="a list of {after_step, by}"
     )
 
@@ -364,16 +341,16 @@ class Noise(Part):
         return pushes
 
 
-class Disturbance(Noise):
+class LateNoisePart(NoisePart, title="Disturbance"):
     """What the vehicle does beside its plan; random numbers come from the seed."""
 
     delay_steps: Annotated[Literal[0, 1], Need("0 or 1")] = Field(
         0, description="how late the controller sees the pose"
     )
-    seed: Seed = Field(0, description="seed of the random numbers")
+    seed: Whole = Field(0, description="seed of the random numbers")
 
 
-class RecedingHorizonPart(Part):
+class RecedingHorizonPart(FilePart):
     """Closed loop, for mpc."""
 
     step_s: Positive = Field(description="time between two plans")
@@ -386,12 +363,12 @@ class RecedingHorizonPart(Part):
         None, description="parts of a plan with controls between those of the library; left out: 0"
     )
     stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
-    disturbance: Disturbance | None = Field(
+    disturbance: LateNoisePart | None = Field(
         None, description="{position_m, heading_rad, seed, ...}"
     )
 
 
-class MaskLimit(Part):
+class MaskLimitPart(FilePart, title="MaskLimit"):
     """The greatest speed where a mask has a value v from 1 to 100: base + multiplier * v."""
 
     base: Number = Field(description="of the speed")
@@ -401,7 +378,10 @@ class MaskLimit(Part):
     )
 
 
-class ZonePart(Part):
+TrimNames = Annotated[tuple[Name, ...], Several("a list of at least one trim", at_least=1)]
+
+
+class ZonePart(FilePart):
     """A part of the plane in which not every motion is admitted."""
 
     one_of: ClassVar = ("polygon_m", "map")
@@ -415,31 +395,35 @@ class ZonePart(Part):
     }
 
     polygon_m: Polygon | None = Field(None, description="corners [x, y]")
-    holes_m: Annotated[tuple[Polygon, ...], Several("a list of polygons", at_least=0)] = Field(
-        (), description="polygons inside polygon_m that are not in the zone"
-    )
+    holes_m: Polygons = Field((), description="polygons inside polygon_m that are not in the zone")
     map: Name | None = Field(
         None, description="mask of a speed filter (YAML), relative to this file"
     )
-    speed_limit: MaskLimit | None = Field(None, description="{base, multiplier, unit} of the mask")
+    speed_limit: MaskLimitPart | None = Field(
+        None, description="{base, multiplier, unit} of the mask"
+    )
     max_speed_m_s: NotNegative | None = Field(None, description="greatest speed in it")
     reverse: bool = Field(True, description="false: forwards only")
     max_lateral_acceleration_m_s2: NotNegative | None = Field(
         None, description="greatest speed times turn rate in it"
     )
-    trims: (
-        Annotated[tuple[Name, ...], Several("a list of at least one trim", at_least=1)] | None
-    ) = Field(None, description="only these trims, and maneuvers between them")
+    trims: TrimNames | None = Field(
+        None, description="only these trims, and maneuvers between them"
+    )
 
 
-class ScenarioFile(Part):
+Obstacles = Annotated[tuple[ObstaclePart, ...], Several("a list of obstacles")]
+Zones = Annotated[tuple[ZonePart, ...], Several("a list of zones")]
+
+
+class ScenarioFile(FilePart):
     """A motion planning problem: vehicle, automaton, start, goal, cost."""
 
     schema_version: Literal[1] = Field(alias="schema", description="1")
     name: Text | None = Field(None, description="what the situation is called")
     vehicle: VehiclePart = Field(description="a mapping {model, ...}")
     automaton: AutomatonPart = Field(description="a mapping with trims, grid, file or preset")
-    start: Start = Field(description="a mapping {pose, ...}")
+    start: StartPart = Field(description="a mapping {pose, ...}")
     goal: Goals = Field(description="a mapping {pose, ...}, or a list of these")
     cost: CostPart = Field(
         default_factory=lambda: CostPart(time=1.0), description="left out: {time: 1}"
@@ -449,11 +433,12 @@ class ScenarioFile(Part):
     )
     bounds_m: BoundsPart = Field(default_factory=BoundsPart, description="left out: none")
     margin_m: NotNegative = Field(0.0, description="distance kept from everything")
-    obstacles: Annotated[tuple[Obstacle, ...], Several("a list of obstacles", at_least=0)] = Field(
-        (), description="what the vehicle must not touch"
-    )
-    zones: Annotated[tuple[ZonePart, ...], Several("a list of zones", at_least=0)] = Field(
-        (), description="where not every motion is admitted"
-    )
+    obstacles: Obstacles = Field((), description="what the vehicle must not touch")
+    zones: Zones = Field((), description="where not every motion is admitted")
     search: SearchPart = Field(default_factory=SearchPart, description="how to search")
     receding_horizon: RecedingHorizonPart | None = Field(None, description="only for mpc")
+
+    @property
+    def goals(self) -> tuple[GoalPart, ...]:
+        """One or several."""
+        return self.goal if isinstance(self.goal, tuple) else (self.goal,)
