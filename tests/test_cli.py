@@ -175,6 +175,7 @@ def test_shipped_scenarios_plan(folder, name):
     assert document["terminal_error"]["heading_rad"] <= 1e-9
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_flight_among_heights_is_drawn_in_space_too(folder):
     assert run(["plan", str(SCENARIOS / "helicopter_city.yaml"), "--time-limit", "12"]) == 0

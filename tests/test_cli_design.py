@@ -79,6 +79,7 @@ def test_the_page_shows_the_example():
     assert f"```text\n{EXAMPLE.read_text(encoding='utf-8')}```" in page
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_example_of_the_help(capsys):
     assert run(["automaton", "design", str(EXAMPLE), "-o", "city_car.json"]) == 0

@@ -99,6 +99,7 @@ def test_what_is_wrong_is_one_line(folder, capsys, arguments, message):
     assert said.count("\n") == 1
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @needs_data
 def test_every_file_of_primitives_is_shown(tmp_path, capsys):

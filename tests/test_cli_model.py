@@ -157,6 +157,7 @@ def test_a_kinematic_model_plans_and_closes_the_loop(folder, name):
     assert document(name="closed_loop")["steps"][0]["word"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_other_commands_take_it_too(folder, capsys):
     model = ["--model", "test_boats:SKATE"]

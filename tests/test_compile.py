@@ -275,6 +275,7 @@ print(json.dumps(said))
 """
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_kernel_that_calls_a_kernel_is_refused_compiled_now_or_before(example):
     with (example / "example_kernels.py").open("a") as file:

@@ -82,6 +82,7 @@ made.compile((numba.types.float64,))
 """
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.skipif(_compile_all.processors()[0] == "generic", reason="kinds of x86-64")
 def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_need(
@@ -106,6 +107,7 @@ def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_n
     assert hits() == 1
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_kernels_are_compiled_by_several_processes(monkeypatch):
     names = ("collision._kernels_field.count_buckets", "collision._kernels_field.fill_buckets")

@@ -809,6 +809,7 @@ plan(Problem(GLIDER, [1.625, 0, 0, 0], [0, 0, 0, 0], cost=COST, horizon=Horizon(
 """
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_full_buffer_is_no_crash():
     done = subprocess.run([sys.executable, "-c", FULL], capture_output=True, check=False)

@@ -168,6 +168,7 @@ COMMANDS = [
 ]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_commands_run(clone):
     for line in COMMANDS:

@@ -71,6 +71,7 @@ def test_images_are_what_solving_finds():
         assert a.displacement == pytest.approx(b.displacement, abs=1e-3)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_half_of_a_users_library_is_solved_where_left_and_right_are_alike():
     wheels = UserModel(
@@ -91,6 +92,7 @@ def test_half_of_a_users_library_is_solved_where_left_and_right_are_alike():
         assert a.displacement == pytest.approx(b.displacement, abs=1e-4)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_killed_build_goes_on_and_comes_to_the_same_file(tmp_path):
     whole, killed = tmp_path / "whole.json", tmp_path / "killed.json"

@@ -115,6 +115,7 @@ def test_no_bound_in_free_space_exceeds_the_shortest_path(goal):
     assert 0.5 * shortest < bound.value <= shortest * (1.0 + 1e-9)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("price", quick_are([0.0], [0.0, 1.0]))
 def test_a_bound_among_obstacles_knows_no_plan_and_lies_below_it(price):
@@ -180,6 +181,7 @@ def test_bad_limits_are_refused(more, message):
     assert str(caught.value) == message
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
     problem = among((), goal=(0.0, 2.0, 0.0))
@@ -194,6 +196,7 @@ def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
         ma.lower_bound(problem, max_direction_changes=-1)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_trailer_moves_at_most_as_the_car_that_pulls_it():
     car = ma.CarWithTrailer(

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.free_ways import drawn, planned, wrong
 from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Problem, Unicycle, plan
 from maneuver_automaton.bounds import goals_blocked, separation
 from maneuver_automaton.groups import SE2xR
@@ -13,7 +14,6 @@ from maneuver_automaton.models import UserModel
 from maneuver_automaton.planning.lower_bound import known_bound
 from maneuver_automaton.problem import Bounds, Goal, SearchSettings
 from maneuver_automaton.scenario import load_scenario
-from tests.benchmarks.free_ways import drawn, planned, wrong
 
 FIELD = Path(__file__).parents[3] / "shared" / "data" / "field"
 ROBOT = Automaton.of_controls(
@@ -34,6 +34,7 @@ def test_no_drawn_scene_is_called_impossible(seed):
     assert wrong(drawn(seed)) == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("first", batches(range(0, 5000, 250), quick=1))
 def test_none_of_5000_drawn_scenes_is_called_impossible(first):
@@ -41,6 +42,7 @@ def test_none_of_5000_drawn_scenes_is_called_impossible(first):
     assert said == {}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("first", batches(range(0, 300, 20), quick=1))
 def test_no_drawn_scene_that_is_planned_is_called_impossible(first):

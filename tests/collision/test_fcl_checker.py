@@ -431,6 +431,7 @@ def test_threads_do_not_disturb_each_other():
     assert answers == [expected] * 4
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_course_is_free_exactly_where_its_poses_are():
     """Courses past a corner at many distances: shapely on dense poses, to within a millimetre."""

@@ -45,6 +45,7 @@ def test_the_worst_goal_has_the_factor_that_is_stated():
     assert np.hypot(*found.worst[:2]) <= found.radius
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_larger_car_in_a_larger_disc_is_the_same():
     small, large = proof(4), proof(4, scale=4.0)

@@ -73,6 +73,7 @@ def test_who_meets_nobody_keeps_its_way_alone():
         assert cost_of(held) == pytest.approx(10.0)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_both_give_way_in_the_alcove():
     """One after another the second waits until the first has gone by: 26.9 s."""

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.fleet_loops import driven
 from maneuver_automaton import (
     Disturbance,
     FleetHorizon,
@@ -20,7 +21,6 @@ from maneuver_automaton import (
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
-from tests.benchmarks.fleet_loops import driven
 from tests.fleet.robots import (
     at_rest,
     crossing,
@@ -254,6 +254,7 @@ def test_who_was_to_leave_but_has_no_plan_stays():
     assert [*log.violations] == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_an_emergency_that_is_not_acknowledged():
     """All messages of three steps are lost as one breaks down: nobody swaps, all is flagged."""
@@ -292,6 +293,7 @@ def test_another_goal_on_the_way():
         loop.assign("a", problem_of([0, 0, 0], [1, 0, 0], margin=0.0))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_who_lost_its_plan_finds_a_long_way_round():
     """Beside one that broke down, no way is found with few expansions."""

@@ -98,6 +98,7 @@ def test_any_number_of_processes_finds_the_same_plans(fleet):
     assert all(one.counts == runs[0].counts for one in runs)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_what_a_vehicle_is_made_of_travels_too():
     """A model of one's own, with functions that have no name."""

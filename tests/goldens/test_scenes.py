@@ -52,6 +52,7 @@ def test_the_sum_of_the_quick_ones_does_not_rise():
 
 
 @compiled_only
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_sum_of_all_but_those_with_a_reason_does_not_rise():
     assert risen([name for name in SCENES if name not in dearer()]) <= EQUAL

@@ -137,6 +137,7 @@ def test_plans_keep_what_is_promised(name):
     assert costs[-1] == pytest.approx(result.cost, rel=1e-7)  # before its end is closed
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_rest_that_pads_is_a_trim():
     fixed = replace(EASY, cost=Cost(effort=1.0), horizon=Horizon(time=20.0, max_trims=3))

@@ -135,6 +135,7 @@ def test_maneuvers_keep_to_zones_too():
     assert check_plan(problem, found, problem.goals[0]).passed
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_vehicle_with_inertia_slows_down():
     model_limit = Zone(shape=ACROSS, max_speed=0.5)

@@ -124,6 +124,7 @@ def test_unreachable_is_said_with_a_proof_only():
     assert plan(far, time_limit=LIMIT).status is PlanStatus.UNREACHABLE
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_large_library_keeps_a_least_coasting_time():
     free = Problem(GRID, [0, 0, 0], [3, 1, 0.5], horizon=Horizon(max_trims=3))

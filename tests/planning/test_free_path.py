@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import shapely
 
+from benchmarks.unreachable import FAMILIES
 from maneuver_automaton import Automaton, Box, Car, plan
 from maneuver_automaton.bounds import Connection, widest_path
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import SearchSettings
-from tests.benchmarks.unreachable import FAMILIES
 from tests.bounds.scenes import BODY, bend, dead_end, walled
 
 WORK = SearchSettings(max_expansions=90_000, improve=False)

@@ -54,6 +54,7 @@ def clearance(one, obstacle):
     return float(np.where(beside, aside - RADIUS, np.inf).min())
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_low_wall_is_flown_over_and_a_tower_round():
     free = found(BASE)
@@ -70,12 +71,14 @@ def test_a_low_wall_is_flown_over_and_a_tower_round():
     assert clearance(other.plan, TOWER) > 0.0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_margin_is_kept():
     result = found(replace(BASE, obstacles=(TOWER,), margin=0.3))
     assert clearance(result.plan, TOWER) >= 0.3 - 1e-6
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_bounds_of_height_close_a_way():
     high = found(replace(BASE, obstacles=(LOW,)))
@@ -86,6 +89,7 @@ def test_bounds_of_height_close_a_way():
     assert result.cost >= high.cost - 1e-9
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_an_occupancy_map_and_a_moving_obstacle():
     cells = np.random.default_rng(1).random((9, 12)) < 0.12

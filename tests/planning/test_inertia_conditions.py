@@ -109,6 +109,7 @@ def test_words_may_be_late_at_first_where_cheaper_ones_are_quicker():
     assert late_at_first(by_effort).most_time == pytest.approx(5.0)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_fixed_time_is_kept_among_obstacles(usual):
     total = 1.4 * usual.plan.duration
@@ -118,6 +119,7 @@ def test_a_fixed_time_is_kept_among_obstacles(usual):
     assert_free(result.plan)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_no_trim_lasts_less_than_it_must_among_obstacles():
     automaton = unicycle_automaton()

@@ -144,6 +144,7 @@ def test_a_zone_holds_in_its_half_of_the_plane(limited):
     assert "polished" in found.plan.word
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only
 def test_a_moved_problem_has_the_moved_plan():

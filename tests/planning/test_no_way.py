@@ -53,6 +53,7 @@ def test_nothing_is_proven_of_other_verdicts_or_without_time():
         assert with_proof(late, Budget.from_now(seconds)) is late
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_no_plan_is_as_quick_as_the_horizon_admits():
     problem = among(WALL, cost=Cost(time=1.0))

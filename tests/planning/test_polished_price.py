@@ -94,6 +94,7 @@ def test_effort_alone_has_no_quickest_motion():
     assert not why_not_polished(posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=9.0)))
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only
 def test_metres_alone_are_polished_where_the_vehicle_keeps_moving():

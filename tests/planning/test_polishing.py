@@ -35,6 +35,7 @@ def unpolished(problem):
         return plan(problem, time_limit=60.0)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_plan_that_only_polishing_finds_does_not_wait_for_the_lattice():
     """In a bug trap: stops take too long for the horizon, and so do the words of the lattice."""
@@ -65,6 +66,7 @@ def test_a_plan_that_only_polishing_finds_does_not_wait_for_the_lattice():
     assert result.plan.duration <= 18.0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_trailer_without_maneuvers_is_led_by_paths_of_its_car():
     """Behind a wall that a library of rest alone leads past by no word."""
@@ -110,6 +112,7 @@ def test_a_fixed_time_is_kept_under_way_and_its_effort_falls():
     assert result.cost < 0.5 * unpolished(problem).cost
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_body_of_several_parts_is_polished_between_posts():
     """A shelf stands out to its sides, and its nose is round."""

@@ -37,6 +37,7 @@ def test_a_search_ends_once_its_gap_is_proven():
     assert values[-1] == result.lower_bound
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_counted_work_proves_the_same_and_leaves_the_plan_as_it_is():
     counted = replace(SLOT, search=ma.SearchSettings(max_expansions=1_000))

@@ -188,6 +188,7 @@ def test_words_come_first_where_nothing_is_in_the_way(name, cost):
     assert result.cost <= words.solutions[0].cost * (1.0 + 1e-9)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("name", quick_are(["hovercraft"], FREE))
 def test_counted_work_gives_the_same_plan_and_the_moved_one(name):

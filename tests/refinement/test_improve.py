@@ -139,6 +139,7 @@ def incumbents_until(deadline, name="car"):
     return incumbents
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_less_time_gives_the_beginning_of_what_more_time_gives():
     improved("car")

@@ -47,6 +47,7 @@ def test_it_ends_where_the_path_ends_and_obeys_the_model(name, data):
     assert audit.max_dynamics_defect < 1e-9
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 @given(data=st.data())

@@ -99,6 +99,7 @@ drives = st.tuples(
 CLEARING = clearing()
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @settings(max_examples=draws(150))
 @given(drive=drives)

@@ -236,6 +236,7 @@ def test_a_line_beside_a_lane_of_ours_leaves_that_open():
 
 
 @needs_data
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["plan", "mpc"])
 def test_the_given_files(command, tmp_path):

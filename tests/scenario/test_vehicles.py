@@ -64,6 +64,7 @@ def test_a_lattice_of_another_resolution_is_refused(tmp_path):
         load_scenario(tmp_path / "a.yaml")
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_an_omnidirectional_platform_goes_aside_where_it_cannot_turn():
     scenario = load_scenario(SCENARIOS / "omnidirectional.yaml")

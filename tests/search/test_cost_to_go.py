@@ -190,6 +190,7 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_two_processes_at_once_keep_one_whole_table(tmp_path):
     order = (

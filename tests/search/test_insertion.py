@@ -490,6 +490,7 @@ json.dump(answers, sys.stdout)
 """
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only
 def test_interpreted_kernels_give_the_compiled_results():

@@ -213,6 +213,7 @@ for name in ("robot", "prices", "map"):
 """
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.skipif(not COMPILED, reason="compares compiled kernels with these")
 def test_compiled_and_not_the_first_plan_is_the_same_to_the_last_bit():

@@ -64,6 +64,7 @@ def test_nothing_cheaper_is_found_by_brute_force(goal):
     assert best.cost <= by_brute_force(one, 4, 6) + 1e-6
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_all_words_of_three_trims_are_listed():
     one = problem([2.0, 1.5, 0.7], automaton=unicycle_automaton(SMALL))
@@ -162,6 +163,7 @@ def test_a_fixed_time_is_met_without_solving_every_word_for_it():
     assert plan_of(one, found.solutions[0]).duration == pytest.approx(6.8, abs=1e-8)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_words_that_climb_are_kept_though_no_node_is_at_the_altitude():
     one = sent("helicopter", 1)

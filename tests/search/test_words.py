@@ -139,6 +139,7 @@ def test_slsqp_confirms_the_complete_list():
 SUBSET = [*list(words_of(4, 3))[::4], (2, 1, 0, 2), (0, 3, 0, 3), (1, 3, 0, 2), (3, 0, 1, 3)]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_brute_force_finds_nothing_else():
     problem = parking()

@@ -203,6 +203,7 @@ def test_a_closed_loop_is_played_as_its_file_says(tmp_path):
         np.testing.assert_allclose(shown, [step["pose"] for step in steps], atol=MILLIMETRE)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.skipif(not ROADS.is_dir(), reason="needs recordings of roads")
 def test_a_drive_is_played_as_its_file_says(tmp_path):

@@ -1,0 +1,60 @@
+"""Recordings: what any result holds, in one form, of which all that is shown or written is made.
+
+`recording_of(result)` is the door; a `Recording` has movers, a world, facts, events and curves.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from maneuver_automaton.recording.values import Curve as Curve
+from maneuver_automaton.recording.values import Event as Event
+from maneuver_automaton.recording.values import Fact as Fact
+from maneuver_automaton.recording.values import Mover as Mover
+from maneuver_automaton.recording.values import Recording as Recording
+from maneuver_automaton.recording.values import Search as Search
+from maneuver_automaton.recording.values import World as World
+
+ROOMS = {  # of results: who records them, loaded only where there is such a result
+    "automaton": "plans",
+    "planning": "plans",
+    "receding_horizon": "loops",
+    "fleet": "fleets",
+    "roads": "road_drives",
+}
+
+
+def recording_of(result: Any) -> Recording:
+    """Who moved where and when, among what, of any result.
+
+    Parameters
+    ----------
+    result : Plan, PlanResult, ClosedLoop, Statistics, FleetResult, FleetLog, RoadPlanResult, \
+RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
+
+    Raises
+    ------
+    TypeError
+        If it is none of these.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Problem, Unicycle, plan
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
+    >>> recording = recording_of(plan(Problem(robot, [0, 0, 0], [2, 0, 0])))
+    >>> recording.kind, recording.movers[0].end.tolist(), recording.facts[0].text
+    ('plan', [2.0, 0.0, 0.0], '2')
+    """
+    if isinstance(result, Recording):
+        return result
+    package, _, home = type(result).__module__.partition(".")
+    room = ROOMS.get(home.partition(".")[0]) if package == "maneuver_automaton" else None
+    if room is not None:
+        made = importlib.import_module(f"{__name__}.{room}").recorded(result)
+        if isinstance(made, Recording):
+            return made
+    raise TypeError(
+        f"recording: got {type(result).__name__}, need a Plan, PlanResult, ClosedLoop, "
+        "Statistics, FleetResult, FleetLog, or a plan or drive on roads"
+    )

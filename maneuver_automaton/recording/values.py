@@ -1,0 +1,312 @@
+"""Who moved where and when, among what: all that pictures, pages, exports and tables need."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._brief import brief
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.plan_arrays import PlanArrays, arrays_at, joined, step_times
+from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape
+from maneuver_automaton.collision.zones import Zone
+from maneuver_automaton.models import Model
+from maneuver_automaton.problem import Bounds, Goal, Problem
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Fact:
+    """One line of a heading, a table of the terminal, or a folder's row.
+
+    Examples
+    --------
+    >>> Fact(label="duration", value=3.14159, unit="s").text, Fact(label="goal", value="met").text
+    ('3.1416 s', 'met')
+    """
+
+    label: str
+    value: float | str
+    unit: str = ""
+    digits: int = 5
+
+    @property
+    def text(self) -> str:
+        """The value with its unit, as it is shown."""
+        if isinstance(self.value, str):
+            return self.value
+        return f"{self.value:.{self.digits}g} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Event:
+    """What happened at a time: a plan made anew, an exchange, a guarantee broken."""
+
+    time: float  # [s]
+    kind: str  # replanned | exchanged | broken | disturbed
+    text: str = ""
+    mover: str = ""  # whom it concerns; empty: all
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Curve:
+    """A number over time, which holds until the next; nan where it is not known."""
+
+    label: str
+    unit: str = ""
+    time: Array  # (n,) [s]
+    value: Array  # (n,)
+    mover: str = ""  # whose it is; empty: of all together
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        freeze(self, "time")
+        freeze(self, "value")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Mover:
+    """A vehicle: what it is, where it was to go, and what it drives, piece after piece.
+
+    Between two pieces of a closed loop a disturbance may have moved it. Without any piece it
+    stands at its start.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
+    >>> one = Mover(pieces=(Plan([0.0, 0.0, 0.0], (ahead,), durations=[3.0]),))
+    >>> one.pose_at([1.0, 9.0]).tolist(), one.duration
+    ([[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]], 3.0)
+    """
+
+    name: str = ""
+    pieces: tuple[Plan, ...]  # at least one; of one that stands: it lasts no time
+    end: Array | None = None  # (dof,) where it ends, noise included; the last piece's end if None
+    model: Model | None = None  # None: it is not known, as in a file alone
+    bodies: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict)  # "": its own; its parts'
+    problem: Problem | None = None  # that it was to solve; None: on roads, or not known
+    regions: tuple[Shape, ...] = ()  # goals on roads
+    has_plan: bool = True
+    reached: bool = True  # whether it ends at a goal
+    reason: str = ""  # why it has no plan, or did not arrive
+    cost: float | None = None
+    there: tuple[float, float] = (-math.inf, math.inf)  # [s] when it appears, and is gone
+    held: tuple[tuple[float, Plan], ...] = ()  # the plan held from a time on [s]
+    names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())  # of state and control, by a file
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        if not self.pieces:
+            raise ValueError("mover: got no piece, need at least one; who stands has one of 0 s")
+        if self.end is None:
+            object.__setattr__(self, "end", self.pieces[-1].end)
+        freeze(self, "end", last=(3, 4))
+
+    @property
+    def goals(self) -> tuple[Goal, ...]:
+        """Where it was to go; empty if that is not known, or a region."""
+        return () if self.problem is None else self.problem.goals
+
+    @property
+    def start(self) -> Array:
+        """Pose (dof,) at the beginning."""
+        return self.pieces[0].start
+
+    @property
+    def start_time(self) -> float:
+        """Time at the beginning [s]."""
+        return self.pieces[0].start_time
+
+    @property
+    def end_time(self) -> float:
+        """Time at the end of the last piece [s]."""
+        return float(self.pieces[-1].start_time + self.pieces[-1].duration)
+
+    @property
+    def duration(self) -> float:
+        """From the beginning to the end [s]."""
+        return self.end_time - self.start_time
+
+    @property
+    def goal_index(self) -> int | None:
+        """Which of its goals it ends at; None if at none."""
+        if not (self.goals and self.reached and self.has_plan):
+            return None
+        return int(np.argmin([sum(goal.off(self.pieces[-1].end)) for goal in self.goals]))
+
+    def pose_at(self, time: ArrayLike, /) -> Array:
+        """Poses (..., dof) at times (...,) [s], held before the begin and after the end."""
+        times = np.asarray(time, dtype=np.float64)
+        flat = times.ravel()
+        begins = np.array([one.start_time for one in self.pieces])
+        which = np.maximum(np.searchsorted(begins, flat, side="right") - 1, 0)
+        found = np.empty((flat.size, self.start.size))
+        for k in np.unique(which).tolist():
+            rows = which == k
+            found[rows] = self.pieces[k].pose_at(flat[rows])
+        return found.reshape(*times.shape, -1)
+
+    def carried(self, part: str) -> Mover:
+        """A part of it, say its trailer, as one that moves by itself."""
+        assert self.model is not None
+        pieces = tuple(carried(one, self.model, part) for one in self.pieces)
+        return replace(
+            self, name=part, pieces=pieces, end=None, model=None, bodies={"": self.bodies[part]}
+        )
+
+    @property
+    def parts(self) -> tuple[Mover, ...]:
+        """The vehicle, then all that it carries, each as one that moves by itself."""
+        return (self, *(self.carried(name) for name in self.bodies if name))
+
+    def is_there(self, time: float) -> bool:
+        """Whether it has appeared by a time [s], and not left."""
+        return self.there[0] <= time <= self.there[1]
+
+    def rows(self, *, step: float | None = None) -> PlanArrays:
+        """One row an instant, as `Plan.as_arrays` has them; the last row is the end.
+
+        Parameters
+        ----------
+        step : float, optional
+            Time between rows [s]; rows are at most 0.05 m and 0.05 rad apart if left out.
+
+        Raises
+        ------
+        ValueError
+            If `step` is not positive, or a maneuver has no course.
+        """
+        times = None if step is None else step_times(self.start_time, self.duration, step)
+        parts = [
+            one.as_arrays(model=self.model) if times is None else self._at(one, times)
+            for one in self.pieces
+        ]
+        whole = joined([one for one in parts if one.word and one.time.size] or parts[:1])
+        pose = whole.pose.copy()
+        pose[-1] = self.end
+        whole = replace(whole, pose=pose)
+        if self.model is not None:
+            return whole
+        states, controls = self.names  # those of a file, where no model has named them
+        fits = len(states) == len(whole.reduced_names), len(controls) == len(whole.control_names)
+        return replace(
+            whole,
+            reduced_names=states if fits[0] else whole.reduced_names,
+            control_names=controls if fits[1] else whole.control_names,
+        )
+
+    def _at(self, piece: Plan, times: Array) -> PlanArrays:
+        """Rows of a piece at those of the times that lie within it, its end included."""
+        end = float(piece.start_time + piece.duration)
+        inside = times[(times >= piece.start_time) & (times < end)]
+        return arrays_at(piece, np.append(inside, end), model=self.model)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class World:
+    """What stands and moves around those who drive, and what they have to keep to."""
+
+    obstacles: tuple[AnyObstacle, ...] = ()
+    zones: tuple[Zone, ...] = ()
+    bounds: Bounds = field(default_factory=Bounds)
+    lanes: tuple[Array, ...] = ()  # outlines (n, 2) of pieces of road [m]
+    margin: float = 0.0  # [m] that any two movers keep
+    source: str = ""  # who recorded it
+    fleeting: bool = False  # what moves is there only while its motion lasts, as on roads
+
+    __repr__ = brief
+
+    def is_there(self, obstacle: AnyObstacle, time: float) -> bool:
+        """Whether an obstacle is there at a time [s]."""
+        if not (self.fleeting and isinstance(obstacle, Obstacle) and obstacle.motion is not None):
+            return True
+        first, last = obstacle.motion.time[[0, -1]].tolist()
+        return bool(first - 1e-9 <= time <= last + 1e-9)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Search:
+    """How a search went on, and what it looked at if that was asked for."""
+
+    improvements: tuple[tuple[float, float], ...] = ()  # [s], cost
+    bounds: tuple[tuple[float, float], ...] = ()  # [s], proven
+    cost: float | None = None
+    bound: float | None = None
+    kind: str = ""  # of the bound
+    nodes: Array | None = None  # (n, 3 or 4) places that were expanded, and cost
+    reached: Array | None = None  # (n, 2) places a search came to that found no plan
+    narrowest: Array | None = None  # (2,) place it could not pass
+
+    __repr__ = brief
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Recording:
+    """Movers, the world around them, and what is to be said of them; one value for every kind.
+
+    Kinds of result differ by data: events, plans held, lanes, many movers.
+    """
+
+    kind: str  # plan | closed_loop | fleet | fleet_loop | road_plan | road_drive | road_fleet | ...
+    title: str
+    status: str = "found"
+    reason: str = ""  # empty if all is as asked
+    ending: str = ""  # how it ended, in words
+    facts: tuple[Fact, ...] = ()
+    movers: tuple[Mover, ...]
+    world: World = field(default_factory=World)
+    alternatives: tuple[Mover, ...] = ()  # the first mover's other plans, costlier
+    events: tuple[Event, ...] = ()
+    curves: tuple[Curve, ...] = ()
+    search: Search | None = None
+
+    __repr__ = brief
+
+    @property
+    def begin(self) -> float:
+        """When the first may leave its start [s]."""
+        return min(one.start_time for one in self.movers)
+
+    @property
+    def end(self) -> float:
+        """When the last arrives [s]."""
+        return max(one.end_time for one in self.movers)
+
+
+def bodies_of(problem: Problem) -> dict[str, tuple[Shape, ...]]:
+    """The shapes of a problem's vehicle, and those of what it carries."""
+    return {"": tuple(problem.footprint)} | {
+        name: tuple(shapes) for name, shapes in problem.parts.items()
+    }
+
+
+def world_of(*problems: Problem, margin: float = 0.0) -> World:
+    """What is around vehicles on one floor, each thing once; bounds that hold all of theirs."""
+    around: dict[tuple[int, ...], AnyObstacle] = {}
+    for one in (one for problem in problems for one in problem.obstacles):
+        # problems made alike hold the same shapes and maps
+        same = (id(one.shape), id(one.motion)) if isinstance(one, Obstacle) else (id(one),)
+        around.setdefault(same, one)
+    return World(
+        obstacles=tuple(around.values()),
+        zones=tuple({id(zone): zone for one in problems for zone in one.zones}.values()),
+        bounds=problems[0].bounds if len(problems) == 1 else _loosest(problems),
+        margin=margin,
+    )
+
+
+def _loosest(problems: tuple[Problem, ...]) -> Bounds:
+    sides = {}
+    for axis in ("x", "y"):
+        known = [side for one in problems if (side := getattr(one.bounds, axis)) is not None]
+        if len(known) == len(problems):
+            sides[axis] = (min(low for low, _ in known), max(high for _, high in known))
+    return Bounds(**sides)
