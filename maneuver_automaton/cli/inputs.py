@@ -24,6 +24,11 @@ class Parts:
     model: str | None = None  # MODULE:OBJECT
 
 
+def is_road(path: Path) -> bool:
+    """Whether a file is one of CommonRoad, by its ending."""
+    return path.suffix.lower() == ".xml"
+
+
 def problem_of(
     path: Path, parts: Parts | None = None, *, remark: bool = True
 ) -> Scenario | FleetScenario:
