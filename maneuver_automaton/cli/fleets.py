@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton.cli.jobs import INTERRUPTED, Job, Outcome
+from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.cli.single import STEPS
 from maneuver_automaton.fleet import (
@@ -24,7 +24,7 @@ from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.scenario import FleetScenario
 
 
-def planned(job: Job, scenario: FleetScenario) -> Outcome:
+def planned(job: Job, scenario: FleetScenario) -> JobResult:
     """Plan them all."""
     from maneuver_automaton.formats.fleet_json import reason_of, save_fleet
 
@@ -60,7 +60,7 @@ def planned(job: Job, scenario: FleetScenario) -> Outcome:
 
         print_fleet(name, result, folder=folder)
 
-    return Outcome(
+    return JobResult(
         name=name,
         result=result,
         save=lambda path: save_fleet(
@@ -96,7 +96,7 @@ def given_up(scenario: FleetScenario) -> FleetResult:
     )
 
 
-def driven(job: Job, scenario: FleetScenario) -> Outcome:
+def driven(job: Job, scenario: FleetScenario) -> JobResult:
     """Close the loop of them all."""
     log = _loop(job, scenario)
     verdict, name = verify_driven(log), scenario.name
@@ -122,7 +122,7 @@ def driven(job: Job, scenario: FleetScenario) -> Outcome:
 
         print_fleet_loop(name, log, verdict, folder=folder)
 
-    return Outcome(
+    return JobResult(
         name=name,
         result=log,
         save=save,

@@ -13,7 +13,14 @@ from typing import Any
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
-from maneuver_automaton.cli.inputs import Parts, is_road, make_folder, not_written, problem_of
+from maneuver_automaton.cli.inputs import (
+    Parts,
+    is_road,
+    make_folder,
+    not_written,
+    problem_of,
+    states_several,
+)
 from maneuver_automaton.cli.options import Options, refuse_unknown
 from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, draw
 from maneuver_automaton.cli.progress import announced
@@ -30,7 +37,7 @@ WORK = {"plan": "planned", "mpc": "driven"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Outcome:
+class JobResult:
     """What came of a job: how it is written and told, and its row in the table of a folder."""
 
     name: str  # of the scenario
@@ -69,7 +76,7 @@ class Job:
     parts: Parts
     options: Options
 
-    def done(self, out: Path) -> Outcome:
+    def done(self, out: Path) -> JobResult:
         """Do it, and write its document into the folder `out`; no picture."""
         kind, scenario = self._read()
         refuse_unknown(self.path, self.command, kind, self.options, self.parts)
@@ -79,7 +86,7 @@ class Job:
         home = "single" if kind == "one" else "fleets" if kind == "fleet" else "roads"
         work = getattr(importlib.import_module(f"{__package__}.{home}"), WORK[self.command])
         with announced(quiet=self.options.quiet):
-            outcome: Outcome = work(self, scenario)
+            outcome: JobResult = work(self, scenario)
         with _writing(out):
             outcome.save(out / f"{outcome.document or DOCUMENTS[self.command]}.json")
             for name in PICTURES[self.command] if outcome.result is not None else ():
@@ -89,8 +96,6 @@ class Job:
     def _read(self) -> tuple[str, Any]:
         """The kind of the job, and what the file states."""
         if is_road(self.path):
-            from maneuver_automaton.cli.roads import states_several
-
             return ("roads" if states_several(self.path, self.parts) else "road"), None
         from maneuver_automaton.scenario import FleetScenario
 
@@ -102,7 +107,7 @@ class Job:
             )
         return ("fleet" if isinstance(scenario, FleetScenario) else "one"), scenario
 
-    def drawn(self, outcome: Outcome, out: Path) -> None:
+    def drawn(self, outcome: JobResult, out: Path) -> None:
         """Write the pictures that were asked for, in this process."""
         options = self.options
         wanted = options.plot or options.animate or options.html
@@ -155,7 +160,7 @@ def _run_file(job: Job, out: Path) -> int:
     return FOUND if outcome.done else NO_PLAN
 
 
-def _begun(one: Draughtsman, job: Job, outcome: Outcome, out: Path) -> bool:
+def _begun(one: Draughtsman, job: Job, outcome: JobResult, out: Path) -> bool:
     """Whether another process draws it."""
     return one.begin(draw, outcome.result, outcome.name, out / "plan", job.options)
 
@@ -196,8 +201,8 @@ def _has_loop(path: Path, parts: Parts) -> bool:
 
 def _row(
     problem: tuple[Path, Parts], *, command: str, out: Path, options: Options, folder: Path
-) -> Row:
-    """Do the job of one file of a folder; what goes wrong is told in the row.
+) -> tuple[Path, Row]:
+    """Do the job of one file of a folder; what goes wrong is told in its row.
 
     Paths are relative to `folder`: a process that works for others may have begun elsewhere.
     """
@@ -205,15 +210,16 @@ def _row(
     out = out / path.stem
     if stopped():
         reason = f"{path}: interrupted before it was {WORK[command]}"
-        return Row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
+        return path, Row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
     try:
         with contextlib.chdir(folder):
             job = Job(command=command, path=path, parts=parts, options=options)
             outcome = job.done(out)
             job.drawn(outcome, out)
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
-        return Row(name=path.name, code=BAD_INPUT, status="bad input", reason=explained(error))
-    return outcome.row(path)
+        reason = explained(error)
+        return path, Row(name=path.name, code=BAD_INPUT, status="bad input", reason=reason)
+    return path, outcome.row(path)
 
 
 def _compile_first(*, quiet: bool) -> None:

@@ -10,8 +10,8 @@ from typing import Any
 
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.guard import complain
-from maneuver_automaton.cli.inputs import Parts
-from maneuver_automaton.cli.jobs import INTERRUPTED, Job, Outcome
+from maneuver_automaton.cli.inputs import states_several
+from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.loop_tables import times_of
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
@@ -47,17 +47,7 @@ COLUMNS = ["vehicle", "status", "cost", "arrival [s]", "clearance [m]", "edge [m
 Facts = Mapping[str, str]
 
 
-def states_several(path: Path, parts: Parts) -> bool:
-    """Whether a file of CommonRoad states several problems, and --case picks none of them."""
-    from maneuver_automaton.formats.commonroad import n_problems
-
-    try:
-        return parts.case is None and n_problems(path) > 1
-    except OSError:
-        return False  # told by who reads it
-
-
-def planned(job: Job, _: None) -> Outcome:
+def planned(job: Job, _: None) -> JobResult:
     """Plan one drive, or all of them."""
     if states_several(job.path, job.parts):
         return _plans(job)
@@ -83,7 +73,7 @@ def planned(job: Job, _: None) -> Outcome:
     )
 
 
-def driven(job: Job, _: None) -> Outcome:
+def driven(job: Job, _: None) -> JobResult:
     """Close the loop of one drive, or of all of them.
 
     Where the search of one step finds no plan to a goal from the start, a wider one is made before
@@ -127,7 +117,7 @@ def _scenario(job: Job) -> RoadScenario:
     return found
 
 
-def _plans(job: Job) -> Outcome:
+def _plans(job: Job) -> JobResult:
     """Plan them all."""
     scenes, vehicle, name = _scenes(job)
     limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
@@ -168,7 +158,7 @@ def _plans(job: Job) -> Outcome:
     )
 
 
-def _drives(job: Job) -> Outcome:
+def _drives(job: Job) -> JobResult:
     """Close the loop of them all."""
     scenes, vehicle, name = _scenes(job)
     steps, quiet = job.options.budgets.steps, job.options.quiet
@@ -241,7 +231,7 @@ def _outcome(
     rows: Sequence[Sequence[str]] | None = None,
     source: Job | None = None,
     first_plan: float | None = None,
-) -> Outcome:
+) -> JobResult:
     """What came of any job on roads; of several vehicles with a row each, and their `source`."""
     if isinstance(result, RoadFleetResult | RoadFleetDrive):
         notes: Sequence[str] = joint_notes(result)
@@ -272,7 +262,7 @@ def _outcome(
     if isinstance(result, RoadFleetResult):
         duration = max((one.duration for one in result.plans.values()), default=None)
     known = done or isinstance(result, RoadDrive | RoadFleetDrive)
-    return Outcome(
+    return JobResult(
         name=name,
         result=result,
         save=save,

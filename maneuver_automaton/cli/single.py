@@ -9,7 +9,7 @@ from typing import Any
 from maneuver_automaton import planning
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.budget import Watch
-from maneuver_automaton.cli.jobs import INTERRUPTED, Job, Outcome
+from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.progress import counted, has_terminal, progress_bar, waiting
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.planning import PlanResult, PlanStatus
@@ -20,7 +20,7 @@ from maneuver_automaton.scenario.scenario import disturbance_of
 STEPS = 100  # of a loop, where neither file nor option says
 
 
-def planned(job: Job, scenario: Scenario) -> Outcome:
+def planned(job: Job, scenario: Scenario) -> JobResult:
     """Plan the problem of a file."""
     budgets, quiet = job.options.budgets, job.options.quiet
     limit, shown = budgets.time_limit or scenario.time_limit_s, SoFar.of_gap(budgets.gap)
@@ -50,7 +50,7 @@ def planned(job: Job, scenario: Scenario) -> Outcome:
 
         print_result(name, result, folder=folder, share=budgets.gap is not None)
 
-    return Outcome(
+    return JobResult(
         name=name,
         result=result,
         save=lambda path: save_plan(result, path, name=name, interrupted=stopped()),
@@ -97,7 +97,7 @@ class SoFar:
         return ", ".join(parts)
 
 
-def driven(job: Job, scenario: Scenario) -> Outcome:
+def driven(job: Job, scenario: Scenario) -> JobResult:
     """Close the loop of a file, once or with seed after seed."""
     part, options = scenario.receding_horizon, job.options
     assert part is not None
@@ -132,7 +132,7 @@ def driven(job: Job, scenario: Scenario) -> Outcome:
     return _driven(loop, scenario.name)
 
 
-def _driven(loop: ClosedLoop, name: str) -> Outcome:
+def _driven(loop: ClosedLoop, name: str) -> JobResult:
     from maneuver_automaton.formats.closed_loop_json import save_closed_loop
 
     broken = [f"step {n} broke a guarantee: {one}" for n, one in loop.violations]
@@ -148,7 +148,7 @@ def _driven(loop: ClosedLoop, name: str) -> Outcome:
 
         print_loop(name, loop, folder=folder)
 
-    return Outcome(
+    return JobResult(
         name=name,
         result=loop,
         save=lambda path: save_closed_loop(loop, path, name=name, interrupted=stopped()),
@@ -162,7 +162,7 @@ def _driven(loop: ClosedLoop, name: str) -> Outcome:
     )
 
 
-def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> Outcome:
+def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
     """Drive the loop with seed after seed."""
     from maneuver_automaton.formats.statistics_json import save_statistics
 
@@ -185,7 +185,7 @@ def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> Outcome:
 
         print_statistics(scenario.name, statistics, folder=folder)
 
-    return Outcome(
+    return JobResult(
         name=scenario.name,
         result=None,
         save=lambda path: save_statistics(statistics, path, interrupted=stopped()),

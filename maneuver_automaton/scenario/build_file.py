@@ -47,6 +47,7 @@ from maneuver_automaton.scenario.parts import (
     checked,
     made,
     need,
+    optional,
 )
 from maneuver_automaton.scenario.scenario import cost_of
 from maneuver_automaton.scenario.schema import CostPart
@@ -123,14 +124,12 @@ class DesignPart(FilePart):
     )
     within: Factor = Field(1.05, description="how much costlier words may be than all candidates'")
     most: Count = Field(24, description="trims that the library may have")
-    max_trims: Count | None = Field(None, description="of a word, at least 3; left out: any number")
-    radius_m: Positive | None = Field(None, description="of the disc of goals; with max_trims")
+    max_trims: Count | None = optional("of a word, at least 3; left out: any number")
+    radius_m: Positive | None = optional("of the disc of goals; with max_trims")
     tasks: (
         Annotated[tuple[_Task, ...], Several("a list of tasks [start, goal]", at_least=1)] | None
-    ) = Field(None, description="starts and goals that are to be among them")
-    least_m: Positive | None = Field(
-        None, description="goals whose shortest path is shorter do not count"
-    )
+    ) = optional("starts and goals that are to be among them")
+    least_m: Positive | None = optional("goals whose shortest path is shorter do not count")
     tolerance: Positive = Field(0.01, description="between what is proven and what is met")
 
 
@@ -141,16 +140,16 @@ class LibraryFile(FilePart):
 
     schema_version: Literal[1] = Field(alias="schema", description="1")
     library: Text = Field(description="what the library is called")
-    vehicle: VehiclePart | None = Field(None, description="as in a scenario: {model, ...}")
-    model: Mapped | None = Field(None, description="as in a library file: {kind, ...}, SI units")
+    vehicle: VehiclePart | None = optional("as in a scenario: {model, ...}")
+    model: Mapped | None = optional("as in a library file: {kind, ...}, SI units")
     trims: Grid = Field(description="a grid of trims, a mapping of names to lists of values")
-    max_lateral_acceleration_m_s2: Positive | None = Field(
-        None, description="what the tyres hold; left out: no limit"
+    max_lateral_acceleration_m_s2: Positive | None = optional(
+        "what the tyres hold; left out: no limit"
     )
     maneuvers: JoiningPart = Field(
         default_factory=lambda: JoiningPart(), description="how trims are joined"
     )
-    design: DesignPart | None = Field(None, description="how trims are chosen by automaton design")
+    design: DesignPart | None = optional("how trims are chosen by automaton design")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

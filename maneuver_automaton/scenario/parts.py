@@ -170,6 +170,11 @@ class FilePart(BaseModel):
         return value
 
 
+def optional(text: str) -> Any:
+    """A key that may be left out, and what it holds."""
+    return Field(None, description=text)
+
+
 def missing(key: str, what: str) -> PydanticCustomError:
     """The error of a mapping without a key that it needs: raise it."""
     return told(f"the key {key!r} is missing, need {key}: {what}")

@@ -144,20 +144,7 @@ def scenario_of_document(
         found: T = kept[key]
         return found
 
-    def vehicle() -> tuple[Model, dict[str, Any]]:
-        with at(document, ("vehicle",)):
-            model = model_of(file.vehicle, own=own)
-        carried = {
-            name: footprint_of(document, body, key=name)
-            for name, body in carried_of(file.vehicle).items()
-        }
-        return model, {
-            "footprint": footprint_of(document, file.vehicle.footprint, key="footprint"),
-            "parts": carried,
-            "body_height": file.vehicle.footprint_height_m or (0.0, 0.0),
-        }
-
-    model, bodies = once(("vehicle",), vehicle)
+    model, bodies = once(("vehicle",), lambda: _vehicle(document, file, own))
     obstacles, maps = once(("obstacles",), lambda: obstacles_of(document, file.obstacles, folder))
     read = time.perf_counter()
     automaton = once(
@@ -199,6 +186,23 @@ def scenario_of_document(
         path=path,
         timing_s={"load": read - begin, "automaton": built - read},
     )
+
+
+def _vehicle(
+    document: Document, file: ScenarioFile, own: Model | None
+) -> tuple[Model, dict[str, Any]]:
+    """The model of a file, and the bodies that it moves, as `Problem` takes them."""
+    with at(document, ("vehicle",)):
+        model = model_of(file.vehicle, own=own)
+    carried = {
+        name: footprint_of(document, body, key=name)
+        for name, body in carried_of(file.vehicle).items()
+    }
+    return model, {
+        "footprint": footprint_of(document, file.vehicle.footprint, key="footprint"),
+        "parts": carried,
+        "body_height": file.vehicle.footprint_height_m or (0.0, 0.0),
+    }
 
 
 def _names_of(value: Any, own: Model | None) -> dict[str, Any]:

@@ -41,6 +41,7 @@ from maneuver_automaton.scenario.parts import (
     Whole,
     need,
     one_or_many,
+    optional,
 )
 from maneuver_automaton.scenario.vehicles import VehiclePart
 
@@ -68,11 +69,9 @@ class NamedTrim(FilePart):
     """One trim: a name, and what holds it; what is left out follows from the rest being steady."""
 
     name: Name = Field(description="a name that no other trim has")
-    control: Vector | None = Field(
-        None, description="constant control; unicycle: [v, omega]; car: [v, steering]"
-    )
-    state: Vector | None = Field(
-        None, description="reduced state of a vehicle that has one; second_order_car: [v, steering]"
+    control: Vector | None = optional("constant control; unicycle: [v, omega]; car: [v, steering]")
+    state: Vector | None = optional(
+        "reduced state of a vehicle that has one; second_order_car: [v, steering]"
     )
 
 
@@ -83,8 +82,8 @@ class Axis(FilePart):
 
     min: Number = Field(description="smallest value")
     max: Number = Field(description="largest value")
-    step: Positive | None = Field(None, description="distance of neighbours")
-    count: Count | None = Field(None, description="number of values")
+    step: Positive | None = optional("distance of neighbours")
+    count: Count | None = optional("number of values")
 
 
 Axes = Annotated[tuple[Axis, ...], Several("a list with one axis per control", at_least=1)]
@@ -97,14 +96,14 @@ class GridPart(FilePart, title="Grid"):
     of its body velocity, its reduced state or its control; the rest is solved for.
     """
 
-    control: Axes | None = Field(None, description="one axis {min, max, step or count} per control")
-    speed_m_s: Axis | None = Field(None, description="axis of the speed ahead")
-    lateral_speed_m_s: Axis | None = Field(None, description="axis of the speed to the left")
-    turn_rate_rad_s: Axis | None = Field(None, description="axis of the turn rate")
-    climb_m_s: Axis | None = Field(None, description="axis of the speed upwards")
-    steering_rad: Axis | None = Field(None, description="axis of the steering angle")
-    max_lateral_acceleration_m_s2: Positive | None = Field(
-        None, description="greatest speed times turn rate of a trim; left out: no limit"
+    control: Axes | None = optional("one axis {min, max, step or count} per control")
+    speed_m_s: Axis | None = optional("axis of the speed ahead")
+    lateral_speed_m_s: Axis | None = optional("axis of the speed to the left")
+    turn_rate_rad_s: Axis | None = optional("axis of the turn rate")
+    climb_m_s: Axis | None = optional("axis of the speed upwards")
+    steering_rad: Axis | None = optional("axis of the steering angle")
+    max_lateral_acceleration_m_s2: Positive | None = optional(
+        "greatest speed times turn rate of a trim; left out: no limit"
     )
     leave_out: bool = Field(
         False, description="true: points without a trim are left out, not refused"
@@ -131,18 +130,18 @@ class AutomatonPart(FilePart):
     one_of: ClassVar = ("trims", "grid", "file", "preset")
     goes_with: ClassVar = {"maneuvers": ("trims", "grid")}
 
-    trims: NamedTrims | None = Field(None, description="trims, each {name, control or state}")
-    grid: GridPart | None = Field(None, description="all combinations of values")
-    file: Name | None = Field(None, description="library file, relative to this file")
-    preset: Name | None = Field(None, description="name of a built-in library")
-    maneuvers: ManeuversPart | None = Field(None, description="how trims are joined")
+    trims: NamedTrims | None = optional("trims, each {name, control or state}")
+    grid: GridPart | None = optional("all combinations of values")
+    file: Name | None = optional("library file, relative to this file")
+    preset: Name | None = optional("name of a built-in library")
+    maneuvers: ManeuversPart | None = optional("how trims are joined")
 
 
 class StartPart(FilePart, title="Start"):
     """Where the plan begins."""
 
     pose: Pose = Field(description="[x, y, heading]")
-    trim: Name | None = Field(None, description="the first trim")
+    trim: Name | None = optional("the first trim")
     time_s: Number = Field(0.0, description="time at the start")
 
 
@@ -150,9 +149,9 @@ class GoalPart(FilePart):
     """Where the plan ends."""
 
     pose: Pose = Field(description="[x, y, heading]")
-    trim: Name | None = Field(None, description="the last trim")
-    heading: Annotated[Literal["free"], Need("free, or no such key")] | None = Field(
-        None, description="free: the third number of the pose does not matter"
+    trim: Name | None = optional("the last trim")
+    heading: Annotated[Literal["free"], Need("free, or no such key")] | None = optional(
+        "free: the third number of the pose does not matter"
     )
     tolerance_m: NotNegative = Field(0.0, description="distance that is near enough; 0: exact")
     tolerance_rad: NotNegative = Field(0.0, description="heading that is near enough; 0: exact")
@@ -185,9 +184,7 @@ class CostPart(FilePart):
     effort: NotNegative = Field(0.0, description="c1, of the squared control per second")
     norm: NotNegative = Field(0.0, description="c2, of the norm of the control per second")
     time: NotNegative = Field(0.0, description="c3, per second")
-    effort_matrix: Matrix | None = Field(
-        None, description="R of the effort; left out: the identity"
-    )
+    effort_matrix: Matrix | None = optional("R of the effort; left out: the identity")
     norm_order: Annotated[
         Literal[1, 2, "inf"], BeforeValidator(_norm_order), Need("1, 2 or inf")
     ] = Field(2, description="1, 2 or inf")
@@ -200,11 +197,11 @@ class HorizonPart(FilePart):
     """How long a plan lasts, and of how many trims it may consist."""
 
     time_s: Seconds = Field("free", description="exactly this long, or free")
-    max_trims: Count | None = Field(None, description="largest number of trims, rest included")
-    min_coast_s: NotNegative | None = Field(
-        None, description="shortest time in a trim; omitted: 0.02, unless the plan gets costlier"
+    max_trims: Count | None = optional("largest number of trims, rest included")
+    min_coast_s: NotNegative | None = optional(
+        "shortest time in a trim; omitted: 0.02, unless the plan gets costlier"
     )
-    max_time_s: Positive | None = Field(None, description="longest time, when time_s is free")
+    max_time_s: Positive | None = optional("longest time, when time_s is free")
     stay: bool = Field(
         False, description="it stays at the goal, when time_s is free: nothing may pass there later"
     )
@@ -213,9 +210,9 @@ class HorizonPart(FilePart):
 class BoundsPart(FilePart):
     """Where the pose may be."""
 
-    x: Interval | None = Field(None, description="[low, high]")
-    y: Interval | None = Field(None, description="[low, high]")
-    z: Interval | None = Field(None, description="[low, high]")
+    x: Interval | None = optional("[low, high]")
+    y: Interval | None = optional("[low, high]")
+    z: Interval | None = optional("[low, high]")
 
 
 class DiscPart(FilePart, title="Disc"):
@@ -269,20 +266,20 @@ class ObstaclePart(FilePart, title="Obstacle"):
         "present_s": ("polygon_m", "disc_m", "box_m"),
     }
 
-    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
+    polygon_m: Polygon | None = optional("corners [x, y]")
     holes_m: Polygons = Field((), description="polygons that are free inside polygon_m")
-    disc_m: DiscPart | None = Field(None, description="{center, radius}")
-    box_m: BoxPart | None = Field(None, description="{center, size, heading_rad}")
-    map: Name | None = Field(None, description="occupancy map (YAML), relative to this file")
+    disc_m: DiscPart | None = optional("{center, radius}")
+    box_m: BoxPart | None = optional("{center, size, heading_rad}")
+    map: Name | None = optional("occupancy map (YAML), relative to this file")
     unknown: Annotated[Literal["blocked", "free"], Need("blocked or free")] = Field(
         "blocked", description="what unknown cells of the map are"
     )
-    height_m: Interval | None = Field(None, description="[low, high] of a body in space")
-    motion: TimedPoses | None = Field(None, description="poses in time, linear between")
-    twists: Twists | None = Field(
-        None, description="velocities in its own frame after each pose: it moves on arcs"
+    height_m: Interval | None = optional("[low, high] of a body in space")
+    motion: TimedPoses | None = optional("poses in time, linear between")
+    twists: Twists | None = optional(
+        "velocities in its own frame after each pose: it moves on arcs"
     )
-    present_s: Interval | None = Field(None, description="[from, to]: it is there then alone")
+    present_s: Interval | None = optional("[from, to]: it is there then alone")
 
 
 class SearchPart(FilePart):
@@ -293,13 +290,13 @@ class SearchPart(FilePart):
         Need("auto, words, insertion or lattice"),
     ] = Field("auto", description="auto, words, insertion or lattice")
     time_limit_s: Positive = Field(5.0, description="upper bound for search and refinement")
-    max_expansions: Count | None = Field(None, description="upper bound for the nodes expanded")
-    cell_m: Positive | None = Field(None, description="lattice: size of a cell")
-    headings: Count | None = Field(None, description="lattice: number of headings")
+    max_expansions: Count | None = optional("upper bound for the nodes expanded")
+    cell_m: Positive | None = optional("lattice: size of a cell")
+    headings: Count | None = optional("lattice: number of headings")
     weight: (
         Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a finite number of at least 1")]
         | None
-    ) = Field(None, description="lattice: weight of the cost to go")
+    ) = optional("lattice: weight of the cost to go")
     backwards: bool = Field(
         False, description="lattice_body: search from the goals; false: from the start"
     )
@@ -326,9 +323,7 @@ class NoisePart(FilePart):
     heading_rad: NotNegative = Field(0.0, description="standard deviation per step")
     measured_position_m: NotNegative = Field(0.0, description="standard deviation, seen alone")
     measured_heading_rad: NotNegative = Field(0.0, description="standard deviation, seen alone")
-    twist_scale: Pose | None = Field(
-        None, description="true over nominal body velocity, per component"
-    )
+    twist_scale: Pose | None = optional("true over nominal body velocity, per component")
     pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes")] = Field(
         (), description="a list of {after_step, by}"
     )
@@ -354,18 +349,16 @@ class RecedingHorizonPart(FilePart):
     """Closed loop, for mpc."""
 
     step_s: Positive = Field(description="time between two plans")
-    steps: Count | None = Field(None, description="largest number of steps; left out: 100")
+    steps: Count | None = optional("largest number of steps; left out: 100")
     margin: NotNegative = Field(
         0.0, description="a new word must be cheaper by more than this; 0: the optimum"
     )
     retimed: bool = Field(False, description="drive plans at the pace of uniform effort")
-    pieces: Count | None = Field(
-        None, description="parts of a plan with controls between those of the library; left out: 0"
+    pieces: Count | None = optional(
+        "parts of a plan with controls between those of the library; left out: 0"
     )
     stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
-    disturbance: LateNoisePart | None = Field(
-        None, description="{position_m, heading_rad, seed, ...}"
-    )
+    disturbance: LateNoisePart | None = optional("{position_m, heading_rad, seed, ...}")
 
 
 class MaskLimitPart(FilePart, title="MaskLimit"):
@@ -394,22 +387,16 @@ class ZonePart(FilePart):
         "trims": ("polygon_m",),
     }
 
-    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
+    polygon_m: Polygon | None = optional("corners [x, y]")
     holes_m: Polygons = Field((), description="polygons inside polygon_m that are not in the zone")
-    map: Name | None = Field(
-        None, description="mask of a speed filter (YAML), relative to this file"
-    )
-    speed_limit: MaskLimitPart | None = Field(
-        None, description="{base, multiplier, unit} of the mask"
-    )
-    max_speed_m_s: NotNegative | None = Field(None, description="greatest speed in it")
+    map: Name | None = optional("mask of a speed filter (YAML), relative to this file")
+    speed_limit: MaskLimitPart | None = optional("{base, multiplier, unit} of the mask")
+    max_speed_m_s: NotNegative | None = optional("greatest speed in it")
     reverse: bool = Field(True, description="false: forwards only")
-    max_lateral_acceleration_m_s2: NotNegative | None = Field(
-        None, description="greatest speed times turn rate in it"
+    max_lateral_acceleration_m_s2: NotNegative | None = optional(
+        "greatest speed times turn rate in it"
     )
-    trims: TrimNames | None = Field(
-        None, description="only these trims, and maneuvers between them"
-    )
+    trims: TrimNames | None = optional("only these trims, and maneuvers between them")
 
 
 Obstacles = Annotated[tuple[ObstaclePart, ...], Several("a list of obstacles")]
@@ -420,7 +407,7 @@ class ScenarioFile(FilePart):
     """A motion planning problem: vehicle, automaton, start, goal, cost."""
 
     schema_version: Literal[1] = Field(alias="schema", description="1")
-    name: Text | None = Field(None, description="what the situation is called")
+    name: Text | None = optional("what the situation is called")
     vehicle: VehiclePart = Field(description="a mapping {model, ...}")
     automaton: AutomatonPart = Field(description="a mapping with trims, grid, file or preset")
     start: StartPart = Field(description="a mapping {pose, ...}")
@@ -436,7 +423,7 @@ class ScenarioFile(FilePart):
     obstacles: Obstacles = Field((), description="what the vehicle must not touch")
     zones: Zones = Field((), description="where not every motion is admitted")
     search: SearchPart = Field(default_factory=SearchPart, description="how to search")
-    receding_horizon: RecedingHorizonPart | None = Field(None, description="only for mpc")
+    receding_horizon: RecedingHorizonPart | None = optional("only for mpc")
 
     @property
     def goals(self) -> tuple[GoalPart, ...]:

@@ -141,11 +141,6 @@ def _zones_of_mask(
 def stated_zone(zone: Zone) -> dict[str, Any]:
     """A zone in the words of a scenario file.
 
-    Raises
-    ------
-    ValueError
-        If its shape has no corners.
-
     Examples
     --------
     >>> stated_zone(Zone(shape=Polygon([[0, 0], [1, 0], [1, 1]]), max_speed=0.5))
@@ -166,11 +161,6 @@ def _holes(shape: Box | Polygon) -> dict[str, Any]:
 
 def stated_footprint(footprint: Sequence[Shape]) -> tuple[dict[str, Any], ...]:
     """A body in the words of a scenario file, and of `plotting`.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot state it: a disc beside the pose, or a hole.
 
     Examples
     --------
@@ -195,13 +185,7 @@ def stated_footprint(footprint: Sequence[Shape]) -> tuple[dict[str, Any], ...]:
 
 
 def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path) -> dict[str, Any]:
-    """An obstacle in the words of a scenario file in `folder`; a map by its file.
-
-    Raises
-    ------
-    ValueError
-        If a map has no file.
-    """
+    """An obstacle in the words of a scenario file in `folder`; a map by its file."""
     if isinstance(obstacle, OccupancyMap):
         for file in maps:
             if file.map is obstacle:

@@ -46,6 +46,7 @@ from maneuver_automaton.scenario.parts import (
     missing,
     need,
     one_or_many,
+    optional,
     stated,
     told,
 )
@@ -60,14 +61,13 @@ class BodyShape(FilePart, title="Shape"):
     one_of: ClassVar = ("rectangle_m", "polygon_m", "disc_m")
     goes_with: ClassVar = {"reference_m": ("rectangle_m",)}
 
-    rectangle_m: Size | None = Field(None, description="[length, width], ahead and aside")
-    reference_m: Point | None = Field(
-        None,
-        description="where the pose sits in the rectangle, from its centre: [ahead, left]; "
+    rectangle_m: Size | None = optional("[length, width], ahead and aside")
+    reference_m: Point | None = optional(
+        "where the pose sits in the rectangle, from its centre: [ahead, left]; "
         "a rear axle has ahead < 0",
     )
-    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
-    disc_m: Positive | None = Field(None, description="radius of a disc around the pose")
+    polygon_m: Polygon | None = optional("corners [x, y]")
+    disc_m: Positive | None = optional("radius of a disc around the pose")
 
 
 Footprint = Annotated[
@@ -186,11 +186,11 @@ def _part(model: str, what: str) -> type[FilePart]:
         if one.default is dataclasses.MISSING:
             fields[key] = (number, Field(description=said))
         else:
-            fields[key] = (number | None, Field(None, description=said))
+            fields[key] = (number | None, optional(said))
     for key, shape in (("footprint", Footprint), ("footprint_height_m", Interval)):
-        fields[key] = (shape | None, Field(None, description=text(key)))
+        fields[key] = (shape | None, optional(text(key)))
     if model == "car_with_trailer":
-        fields["trailer"] = (Footprint | None, Field(None, description=TRAILER))
+        fields["trailer"] = (Footprint | None, optional(TRAILER))
     name = "".join(word.title() for word in model.split("_"))
     part = create_model(f"{name}Part", __base__=FilePart, __doc__=what, **fields)
     is_car = any(one.name == "max_lateral_acceleration" for one in parameters)
@@ -221,12 +221,12 @@ class OwnPart(FilePart):
         description="the name of a model that is given with --model",
         json_schema_extra=lambda schema: schema.update({"not": {"enum": list(MODELS)}}),
     )
-    footprint: Footprint | None = Field(None, description="shape of the body")
-    footprint_height_m: Interval | None = Field(
-        None, description="[low, high] of the body about its altitude, or above the ground"
+    footprint: Footprint | None = optional("shape of the body")
+    footprint_height_m: Interval | None = optional(
+        "[low, high] of the body about its altitude, or above the ground"
     )
-    parts: dict[str, Footprint] | None = Field(
-        None, description="shapes of what it carries, by the model's names of these"
+    parts: dict[str, Footprint] | None = optional(
+        "shapes of what it carries, by the model's names of these"
     )
 
 

@@ -57,7 +57,7 @@ def to_yaml(scenario: Scenario | FleetScenario, *, folder: Path | None = None) -
 
     Examples
     --------
-    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton import Automaton, Cost, Problem, Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
     >>> problem = Problem(robot, [0, 0, 0], [1, 1, 0], cost=Cost(effort=1.0))
     >>> print(to_yaml(Scenario(name="A first plan", problem=problem)))
