@@ -57,6 +57,7 @@ LARGE = {  # pictures of the README and of pages, by their scenarios
 FILMED = "parallel_parking"
 TABLES = {  # between a line <!-- word --> and <!-- end -->
     "reference/keys.md": ("keys", reference.keys),
+    "reference/documents.md": ("documents", reference.documents),
     "reference/options.md": ("options", reference.options),
     "reference/python.md": ("names", reference.names),
     "gallery.md": ("scenarios", gallery.table),

@@ -50,10 +50,10 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet import verify_driven as verify_driven
     from maneuver_automaton.fleet import verify_fleet as verify_fleet
     from maneuver_automaton.formats.fleet_json import save_fleet as save_fleet
-    from maneuver_automaton.formats.maps import load_map as load_map
     from maneuver_automaton.formats.plan_json import load_plan as load_plan
     from maneuver_automaton.formats.plan_json import load_plans as load_plans
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
+    from maneuver_automaton.formats.registry import load_map as load_map
     from maneuver_automaton.groups import SE2 as SE2
     from maneuver_automaton.groups import SE2xR as SE2xR
     from maneuver_automaton.groups import translations as translations
@@ -158,7 +158,7 @@ _HOMES = {
     "drive_road": "roads",
     "drive_roads": "roads",
     "load_library": "automaton.library",
-    "load_map": "formats.maps",
+    "load_map": "formats.registry",
     "load_plan": "formats.plan_json",
     "load_plans": "formats.plan_json",
     "load_scenario": "scenario",

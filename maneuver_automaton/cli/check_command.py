@@ -1,12 +1,11 @@
-"""`check`: what holds of a scenario, as a table; no plan is shown."""
+"""`check`: what holds of a scenario, of one vehicle or several, as a table; no plan is shown."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,12 +20,14 @@ from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, problem_of
 from maneuver_automaton.cli.progress import announced, waiting
 from maneuver_automaton.cli.tables import console, table
-from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.surroundings import parts_of
+from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
+from maneuver_automaton.formats.fleet_json import reason_of
 from maneuver_automaton.models import Model, as_stated, rollout, vector_field
-from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.planning import PlanStatus
 from maneuver_automaton.planning.blocked import where_touched
 from maneuver_automaton.problem import Bounds, Problem
+from maneuver_automaton.scenario import FleetScenario, Scenario
 
 TRIM_SECONDS = 2.0  # how long every trim is driven by the ODE solver
 TRIM_TOLERANCE = 1e-7  # [m, rad] between trim and ODE solver
@@ -45,14 +46,13 @@ class Finding:
 
 def check_file(path: Path, *, parts: Parts, leave: bool = False) -> int:
     """Print the report of a problem, of a fleet, or of plans, and return the exit code."""
-    from maneuver_automaton.cli import check_fleet, check_plans
-    from maneuver_automaton.scenario import Scenario
+    from maneuver_automaton.cli import check_plans
 
     if (proven := check_plans.findings(path, parts, leave=leave)) is not None:
         return reported(*proven)
     scenario = problem_of(path, parts)
     if not isinstance(scenario, Scenario):
-        return reported(scenario.name, check_fleet.findings(scenario))
+        return reported(scenario.name, _of_fleet(scenario))
     problem = scenario.problem
     return reported(
         scenario.name,
@@ -85,7 +85,14 @@ def of_vehicle(problem: Problem) -> Iterator[Finding]:
     """What holds of a vehicle, its library and its cost."""
     yield from _symmetry(problem)
     yield from _automaton(problem.automaton)
-    yield _lemma(problem)
+    twists = problem.automaton.body_velocities[:, :3]
+    report = analysis.check_library(twists, max_trims=problem.horizon.max_trims)
+    missing = f"sufficient, not necessary, to reach every pose: {'; '.join(report.missing)}"
+    yield Finding(
+        what="library: turn, move, turn",
+        holds=True if report.holds else None,
+        words=report.message if report.holds else missing,
+    )
 
 
 def _symmetry(problem: Problem) -> Iterator[Finding]:
@@ -210,90 +217,124 @@ def _states_after(model: Model, states: Array, controls: Array) -> Array:
     return np.asarray(ends[-1].reshape(states.shape))
 
 
-def _lemma(problem: Problem) -> Finding:
-    report = analysis.check_library(
-        problem.automaton.body_velocities[:, :3], max_trims=problem.horizon.max_trims
-    )
-    return Finding(
-        what="library: turn, move, turn",
-        holds=True if report.holds else None,
-        words=report.message
-        if report.holds
-        else f"sufficient, not necessary, to reach every pose: {'; '.join(report.missing)}",
-    )
-
-
 def of_ends(problem: Problem) -> Iterator[Finding]:
     """Whether start and goals are where a vehicle can be."""
     ends = [("start", problem.start), *(("goal", goal.pose) for goal in problem.goals)]
     bounds = problem.bounds
-    bounded = any(pair is not None for pair in (bounds.x, bounds.y, bounds.z))
+    limits = [("x", 0, bounds.x), ("y", 1, bounds.y), ("z", 3, bounds.z)]
+    known = [(name, k, pair) for name, k, pair in limits if pair is not None]
     for what, pose in ends:
-        outside = _outside(bounds, pose)
+        excess = {name: max(low - pose[k], pose[k] - high) for name, k, (low, high) in known}
+        outside = {name: float(value) for name, value in excess.items() if value > 0.0}
         words = "outside in " + ", ".join(outside) if outside else "inside"
         yield Finding(
             what=f"{what}: inside the bounds",
             holds=not outside,
             worst=max(outside.values()) if outside else None,
-            words=words if bounded else "there are none",
+            words=words if known else "there are none",
         )
-    if problem.footprint:
-        yield Finding(what="body: seen from the pose", holds=None, words=_reach(problem.footprint))
-    if problem.obstacles:
-        yield from _ends_free(problem)
-
-
-def _feasibility(problem: Problem, time_limit: float) -> Finding:
-    with announced(), waiting(f"planning, at most {time_limit:g} s", quiet=False):
-        result = planning.plan(problem, time_limit=time_limit)
-    found = result.status is PlanStatus.FOUND
-    return Finding(
-        what="goal: can be reached",
-        holds=None if result.status in UNDECIDED else found,
-        words=_reached(result),
-    )
-
-
-def _reach(footprint: tuple[Shape, ...]) -> str:
-    """How far a body reaches, which shows a reference that is on the wrong side."""
-    parts = parts_of(footprint)
-    low = np.min([np.array(part.core.bounds[:2]) - part.radius for part in parts], axis=0)
-    high = np.max([np.array(part.core.bounds[2:]) + part.radius for part in parts], axis=0)
-    return (
-        f"{-low[0]:.6g} m behind to {high[0]:.6g} m ahead, "
-        f"{-low[1]:.6g} m right to {high[1]:.6g} m left"
-    )
-
-
-def _reached(result: PlanResult) -> str:
-    """What is known of the goal: that it is reached, that it is not, or nothing."""
-    if result.status is PlanStatus.FOUND:
-        return "a plan exists"
-    if result.status is PlanStatus.OUT_OF_BUDGET:
-        return f"not known: {result.reason}, which does not prove that there is none"
-    return f"{result.status.value}: {result.reason}"
-
-
-def _ends_free(problem: Problem) -> Iterator[Finding]:
-    """Whether start and goals touch an obstacle, and which."""
-    said = [("start", where_touched(problem, problem.start, problem.start_time))]
-    said += [
-        ("goal", where_touched(problem, goal.pose, math.inf))
-        for goal in problem.goals
-        if not goal.free_heading
-    ]
-    for what, words in said:
+    if problem.footprint:  # how far it reaches shows a reference that is on the wrong side
+        parts = parts_of(problem.footprint)
+        low = np.min([np.array(part.core.bounds[:2]) - part.radius for part in parts], axis=0)
+        high = np.max([np.array(part.core.bounds[2:]) + part.radius for part in parts], axis=0)
+        yield Finding(
+            what="body: seen from the pose",
+            holds=None,
+            words=f"{-low[0]:.6g} m behind to {high[0]:.6g} m ahead, "
+            f"{-low[1]:.6g} m right to {high[1]:.6g} m left",
+        )
+    touched = [("start", problem.start, problem.start_time)]
+    touched += [("goal", one.pose, math.inf) for one in problem.goals if not one.free_heading]
+    for what, pose, time in touched if problem.obstacles else ():
+        words = where_touched(problem, pose, time)
         yield Finding(
             what=f"{what}: keeps clear of obstacles", holds=not words, words=words or "it does"
         )
 
 
-def _outside(bounds: Bounds, pose: Array) -> dict[str, float]:
-    """How far a pose is outside [m], for each coordinate in which it is."""
-    pairs: dict[str, Any] = {"x": (0, bounds.x), "y": (1, bounds.y), "z": (3, bounds.z)}
-    excess = {
-        name: max(pair[0] - pose[k], pose[k] - pair[1])
-        for name, (k, pair) in pairs.items()
-        if pair is not None
-    }
-    return {name: float(value) for name, value in excess.items() if value > 0.0}
+def _feasibility(problem: Problem, time_limit: float) -> Finding:
+    """What is known of the goal: that it is reached, that it is not, or nothing."""
+    with announced(), waiting(f"planning, at most {time_limit:g} s", quiet=False):
+        result = planning.plan(problem, time_limit=time_limit)
+    words = f"{result.status.value}: {result.reason}"
+    if result.status is PlanStatus.FOUND:
+        words = "a plan exists"
+    elif result.status is PlanStatus.OUT_OF_BUDGET:
+        words = f"not known: {result.reason}, which does not prove that there is none"
+    found = None if result.status in UNDECIDED else result.status is PlanStatus.FOUND
+    return Finding(what="goal: can be reached", holds=found, words=words)
+
+
+# -- several vehicles
+
+
+def _of_fleet(scenario: FleetScenario) -> Iterator[Finding]:
+    """What holds of a fleet: a line for what is alike of all, or for each that is not."""
+    fleet = scenario.fleet
+    kinds: dict[tuple[int, int], dict[str, Problem]] = {}  # those of one library and cost
+    for name, problem in zip(fleet.names, fleet.problems, strict=True):
+        kinds.setdefault((id(problem.automaton), id(problem.cost)), {})[name] = problem
+    for alike in kinds.values():
+        more = f" and {len(alike) - 3} more" if len(alike) > 3 else ""
+        names = ", ".join([*alike][:3]) + more
+        for one in of_vehicle(next(iter(alike.values()))):
+            yield one if len(kinds) == 1 else replace(one, what=f"{names}: {one.what}")
+    yield from _ends(fleet)
+    yield _apart("starts", fleet)
+    at_goals = [  # those that stay at one goal of one heading, standing there
+        (name, replace(one, start=one.goals[0].pose, start_trim=one.goals[0].trim))
+        for name, one, leaves in zip(fleet.names, fleet.problems, fleet.leaves, strict=True)
+        if not leaves and len(one.goals) == 1 and not one.goals[0].free_heading
+    ]
+    if at_goals:
+        names, there = zip(*at_goals, strict=True)
+        yield _apart("goals", FleetProblem(there, names=names, margin=fleet.margin))
+    limit = scenario.time_limit_s
+    with announced(), waiting(f"planning, at most {limit:g} s", quiet=False):
+        result = plan_fleet(
+            fleet,
+            time_limit=limit,
+            objective=scenario.settings.objective,
+            orders=scenario.settings.orders,
+            max_rounds=0,
+        )
+    found = result.status is FleetStatus.FOUND
+    n = len(fleet)
+    yield Finding(
+        what="goals: can be reached",
+        holds=True if found else None,
+        words=f"plans of all {n} vehicles exist" if found else f"not known: {reason_of(result)}",
+    )
+
+
+def _ends(fleet: FleetProblem) -> Iterator[Finding]:
+    """What holds of start and goal: a line for all, or for each vehicle of which it does not."""
+    found: dict[str, list[tuple[str, Finding]]] = {}
+    for name, problem in zip(fleet.names, fleet.problems, strict=True):
+        for one in of_ends(problem):
+            found.setdefault(one.what, []).append((name, one))
+    for what, its in found.items():
+        wrong = [(name, one) for name, one in its if one.holds is False]
+        for name, one in wrong:
+            yield replace(one, what=f"{name}: {what}")
+        if not wrong:
+            words = {one.words: None for _, one in its}
+            yield replace(its[0][1], what=what, words="; ".join(words))
+
+
+def _apart(what: str, fleet: FleetProblem) -> Finding:
+    """Whether all vehicles can stand at their starts at once."""
+    verdict = verify_fleet(fleet, {})
+    if not verdict.too_near:
+        least = min((one.distance_m for one in verdict.closest), default=None)
+        return Finding(what=f"{what}: are apart", holds=True, worst=least, words="every pair is")
+    said = "; ".join(
+        f"{' and '.join(one.pair)} are {one.distance_m:.3g} m apart" for one in verdict.too_near[:5]
+    )
+    more = f", need more than {fleet.margin:g} m" if fleet.margin else ", which touch"
+    return Finding(
+        what=f"{what}: are apart",
+        holds=False,
+        worst=verdict.too_near[0].distance_m,
+        words=said + more,
+    )

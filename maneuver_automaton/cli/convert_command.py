@@ -29,33 +29,30 @@ from maneuver_automaton.formats.libraries import (
     write_again,
     writer_of,
 )
-from maneuver_automaton.formats.movingai import save_movingai_map
 from maneuver_automaton.formats.nav2_map import save_nav2_map
-from maneuver_automaton.formats.recognition import YAML_ENDINGS
+from maneuver_automaton.formats.registry import YAML_ENDINGS, map_writer_of
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
-
-MAP_ENDINGS = (".map",)
 
 
 def convert(source: Path, target: Path, *, parts: Parts) -> int:
     """Write a problem as a scenario, a map or a library of primitives in another format."""
     if (write := writer_of(target)) is not None:
         return _convert_library(source, target, write)
-    ending = target.suffix.lower()
-    if ending not in YAML_ENDINGS + MAP_ENDINGS:
+    ending, of_maps = target.suffix.lower(), map_writer_of(target)
+    if of_maps is None:
         raise InvalidScenario(
             f"{target}: is in no format that this version writes, need a scenario or a Nav2 map "
-            f"({', '.join(YAML_ENDINGS)}), a MovingAI map ({', '.join(MAP_ENDINGS)}), or "
+            f"({', '.join(YAML_ENDINGS)}), a MovingAI map (.map), or "
             "primitives (.json, .nav2.json, .mprim, .xml)"
         )
     try:
-        if ending in MAP_ENDINGS:
+        if ending not in YAML_ENDINGS:
             cells = _only_map(source, parts)
             make_folder(target.parent)
-            save_movingai_map(cells, target)
+            of_maps.write(cells, target)
         elif parts == Parts() and (plain := _plain_map(source)) is not None:
             make_folder(target.parent)
             save_nav2_map(plain, target)
@@ -142,9 +139,13 @@ def _write_scenario(scenario: Scenario | FleetScenario, source: Path, target: Pa
     write_text_atomically(target, text)
 
 
-def print_schema() -> int:
-    """Print the JSON Schema of scenario files."""
+def print_schema(document: str | None = None) -> int:
+    """Print the JSON Schema of scenario files, or of a kind of document."""
+    from maneuver_automaton.formats.documents import KINDS, schema_of
     from maneuver_automaton.scenario import json_schema
 
-    sys.stdout.write(json.dumps(json_schema(), indent=2) + "\n")
+    if document is not None and document not in KINDS:
+        raise InvalidScenario(f"--document: got {document!r}, need {', '.join(KINDS)}")
+    schema = json_schema() if document is None else schema_of(document)
+    sys.stdout.write(json.dumps(schema, indent=2) + "\n")
     return FOUND

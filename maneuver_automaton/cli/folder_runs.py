@@ -17,17 +17,13 @@ from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, not_written
 from maneuver_automaton.cli.progress import progress_bar
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats import (
-    benchmr_svg,
-    cl_cbs,
-    commonroad,
-    dynobench,
-    movingai,
-    nav2_map,
-    sbpl_cfg,
-    tpcap,
+from maneuver_automaton.formats.movingai import map_beside
+from maneuver_automaton.formats.registry import (
+    YAML_ENDINGS,
+    format_of,
+    holds_several,
+    states_a_problem,
 )
-from maneuver_automaton.formats.recognition import SBPL_ENDINGS, YAML_ENDINGS
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
 
@@ -208,7 +204,7 @@ def problems_in(folder: Path, parts: Parts) -> list[tuple[Path, Parts]]:
     found = [
         (path, _parts_for(path, documents.get(path), parts))
         for path in _files(folder)
-        if path.resolve() not in used and _states_a_problem(path, documents.get(path))
+        if path.resolve() not in used and states_a_problem(path, documents.get(path))
     ]
     if not found:
         raise InvalidScenario(
@@ -245,32 +241,12 @@ def _document(path: Path) -> Document | None:
         return None
 
 
-def _states_a_problem(path: Path, document: Document | None) -> bool:
-    ending = _ending(path)
-    if ending in YAML_ENDINGS:
-        return document is None or not (
-            dynobench.belongs_to_dynobench(document) or cl_cbs.belongs_to_cl_cbs(document)
-        )
-    try:
-        if ending == ".csv":
-            return tpcap.is_tpcap(path)
-        if ending == ".svg":
-            return benchmr_svg.n_queries(path) > 0
-        if ending in SBPL_ENDINGS:
-            return sbpl_cfg.is_sbpl(path)
-        if ending == ".xml":
-            return commonroad.is_commonroad(path)
-    except (OSError, InvalidScenario):
-        return True  # errors are told when it is planned
-    return ending in (".map", ".scen")
-
-
 def _used(folder: Path, documents: dict[Path, Document | None]) -> Iterator[Path]:
     """Maps that other files of the folder name."""
     for path in _files(folder):
         if _ending(path) == ".scen":
             with contextlib.suppress(InvalidScenario):  # told when the file is planned
-                yield movingai.map_beside(path).resolve()
+                yield map_beside(path).resolve()
         document = documents.get(path)
         value = document.value if document is not None else None
         for obstacle in _obstacles(value):
@@ -288,17 +264,8 @@ def _obstacles(value: Any) -> Iterator[Any]:
 
 
 def _parts_for(path: Path, document: Document | None, parts: Parts) -> Parts:
-    ending, several = _ending(path), False
-    if ending in YAML_ENDINGS and not (
-        document is not None
-        and (
-            dynobench.is_dynobench(document)
-            or nav2_map.is_nav2_map(document)
-            or cl_cbs.is_cl_cbs(document)
-        )
-    ):
-        return Parts(model=parts.model)
-    if ending == ".svg":
-        with contextlib.suppress(InvalidScenario):
-            several = benchmr_svg.n_queries(path) > 1
-    return parts if several or ending in (".scen", ".xml") else replace(parts, case=None)
+    if _ending(path) in YAML_ENDINGS:
+        if document is None or format_of(path, document) is None:
+            return Parts(model=parts.model)
+        return replace(parts, case=None)
+    return parts if holds_several(path) else replace(parts, case=None)

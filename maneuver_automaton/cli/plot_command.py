@@ -14,19 +14,19 @@ from maneuver_automaton.cli.pictures import ready_to_draw, save_film, save_pictu
 from maneuver_automaton.cli.planned import fleet_planned, road_fleet
 from maneuver_automaton.cli.tables import print_written
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.driven_json import (
+from maneuver_automaton.formats.closed_loop_json import (
     driven_document,
     load_closed_loop,
     read_closed_loop_document,
 )
 from maneuver_automaton.formats.fleet_json import load_fleet
-from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop, read_fleet_loop_document
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, read_fleet_loop_document
 from maneuver_automaton.formats.plan_json import (
+    load_result,
     plan_of_document,
     read_fleet_document,
     read_plan_document,
 )
-from maneuver_automaton.formats.result_json import load_result
 
 ENDINGS = {
     "picture": (".png", ".pdf", ".svg"),

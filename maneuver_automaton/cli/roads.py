@@ -15,8 +15,7 @@ from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.loop_tables import times_of
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.fleet_json import source_entry
-from maneuver_automaton.formats.plan_json import write_document
+from maneuver_automaton.formats.documents import source_entry, write_document
 from maneuver_automaton.formats.road_json import (
     joint_notes,
     road_drive_to_dict,
@@ -222,7 +221,7 @@ def _scenes(job: Job) -> tuple[dict[str, RoadScene], RoadVehicle, str]:
 
 def _outcome(
     result: RoadPlanResult | RoadDrive | RoadFleetResult | RoadFleetDrive,
-    document: dict[str, Any],
+    said: Mapping[str, object],
     *,
     name: str,
     facts: Facts,
@@ -233,6 +232,7 @@ def _outcome(
     first_plan: float | None = None,
 ) -> JobResult:
     """What came of any job on roads; of several vehicles with a row each, and their `source`."""
+    document: dict[str, Any] = dict(said)
     if isinstance(result, RoadFleetResult | RoadFleetDrive):
         notes: Sequence[str] = joint_notes(result)
     else:

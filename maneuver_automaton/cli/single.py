@@ -164,7 +164,7 @@ def _driven(loop: ClosedLoop, name: str) -> JobResult:
 
 def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
     """Drive the loop with seed after seed."""
-    from maneuver_automaton.formats.statistics_json import save_statistics
+    from maneuver_automaton.formats.closed_loop_json import save_statistics
 
     options, count = job.options, job.options.seeds
     assert count is not None

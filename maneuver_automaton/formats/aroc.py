@@ -25,7 +25,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
-from maneuver_automaton.formats.levels import levels_of, nearest_level
+from maneuver_automaton.formats.lattice import levels_of, nearest_level
 from maneuver_automaton.formats.xml_source import Element, read_xml
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import AcceleratingCar

@@ -20,8 +20,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.yaml_source import Document, Where, shown
-from maneuver_automaton.formats.yaml_values import numbers_at, value_at
+from maneuver_automaton.formats.yaml_source import Document, Where, numbers_at, shown, value_at
 from maneuver_automaton.problem import Bounds
 
 FORMAT = "CL-CBS"

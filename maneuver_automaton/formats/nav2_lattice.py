@@ -15,15 +15,24 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NotRequired
 
 import numpy as np
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 from maneuver_automaton._arrays import Array, freeze, wrapped
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.formats.json_source import Place, read_json_document
+from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
+from maneuver_automaton.formats.documents import (
+    Flag,
+    Number,
+    Positive,
+    Whole,
+    check_value,
+    misstated,
+)
 from maneuver_automaton.formats.lattice import (
     ON_GRID,
     SPEED,
@@ -35,8 +44,10 @@ from maneuver_automaton.formats.lattice import (
     continuous,
     lattice_of_automaton,
 )
+from maneuver_automaton.formats.text_source import read_text
 
 KIND = "Nav2 lattice primitives"
+MOST_BYTES = 50_000_000
 MOST_CELLS = 3  # between two poses in a row; Nav2 writes one a cell
 GAP_CELLS = 1.75  # between two poses in a row, where all others of a primitive are nearer
 GAP_TURN = 0.25  # [rad] the same of a turn; Nav2 writes at most 0.232 rad
@@ -46,6 +57,42 @@ DISTINCT = "trajectory_distinctness_ratio"
 ON_HEADING = 1e-6  # [rad] between a last pose and its heading
 SIDEWAYS = 0.5  # sine of the angle to the heading above which a straight is no straight ahead
 DIGITS = 5  # after the point, of what is worked out of poses
+
+
+class Nav2Row(TypedDict):
+    """A primitive of a file."""
+
+    trajectory_id: Whole
+    start_angle_index: Whole
+    end_angle_index: Whole
+    left_turn: Flag
+    trajectory_radius: Number
+    trajectory_length: Number
+    arc_length: Number
+    straight_length: Number
+    poses: list[list[Number]]
+
+
+class Nav2Head(TypedDict):
+    """What holds of all primitives of a file."""
+
+    motion_model: str
+    turning_radius: Positive
+    grid_resolution: Positive
+    stopping_threshold: NotRequired[Whole]
+    num_of_headings: Whole
+    trajectory_distinctness_ratio: NotRequired[Number]
+    heading_angles: list[Number]
+    number_of_trajectories: Whole
+
+
+class Nav2File(TypedDict):
+    """A file of primitives, as JSON holds it."""
+
+    version: NotRequired[Number]
+    date_generated: NotRequired[str]
+    lattice_metadata: Nav2Head
+    primitives: list[Nav2Row]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -98,43 +145,47 @@ def read_nav2_lattice(path: Path) -> Nav2Lattice:
         If a key is missing or holds what it may not, an end is beside the grid or its heading, or
         the primitives are not sorted by their first heading.
     """
-    top = read_json_document(path, what="lattice primitives")
-    head = top.get("lattice_metadata", dict)
-    angles = head.get("heading_angles", list).numbers()
-    n = head.get("num_of_headings", int)
-    if len(angles) != n.value or n.value < 1:
-        raise n.error(f"got {n.value}, but there are {len(angles)} heading_angles; need as many")
-    for k in range(n.value):
-        low = angles[k - 1] if k else -1e-12
-        if not low < angles[k] < 2.0 * math.pi:
-            raise (
-                head.get("heading_angles", list)
-                .item(k)
-                .error(f"got {angles[k]:g}, need rising angles from 0 to less than 2 pi")
-            )
-    motion = head.get("motion_model", str)
-    if motion.value not in MOTIONS:
-        raise motion.error(f"got {motion.value!r:.40}, need one of {', '.join(MOTIONS)}")
-    resolution = head.get("grid_resolution", float).positive()
-    rows = top.get("primitives", list)
-    headings = np.array(angles)
-    primitives = tuple(
-        _primitive(rows.item(k), headings, resolution) for k in range(len(rows.value))
-    )
-    _check_order(rows, primitives, headings.size)
-    count = head.get("number_of_trajectories", int)
-    if count.value != len(primitives):
-        raise count.error(f"got {count.value}, but there are {len(primitives)} primitives")
+    text = read_text(path, most=MOST_BYTES, what="lattice primitives")
+    try:
+        top = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InvalidScenario(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
+    except (RecursionError, ValueError) as error:
+        raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
+    check_value(TypeAdapter(Nav2File), top, path)
+    head, rows = top["lattice_metadata"], top["primitives"]
+    angles, n, motion = head["heading_angles"], head["num_of_headings"], head["motion_model"]
+
+    def wrong(key: str, said: str, *more: int) -> InvalidScenario:
+        return misstated(path, ("lattice_metadata", key, *more), said)
+
+    if len(angles) != n or n < 1:
+        raise wrong(
+            "num_of_headings", f"got {n}, but there are {len(angles)} heading_angles; need as many"
+        )
+    for k, (low, angle) in enumerate(zip([-1e-12, *angles], angles, strict=False)):
+        if not low < angle < 2.0 * math.pi:
+            said = f"got {angle:g}, need rising angles from 0 to less than 2 pi"
+            raise wrong("heading_angles", said, k)
+    if motion not in MOTIONS:
+        raise wrong("motion_model", f"got {motion!r:.40}, need one of {', '.join(MOTIONS)}")
+    headings, resolution = np.array(angles, dtype=np.float64), float(head["grid_resolution"])
+    primitives = tuple(_primitive(row, headings, resolution, path, k) for k, row in enumerate(rows))
+    _check_order(primitives, headings.size, path)
+    count = head["number_of_trajectories"]
+    if count != len(primitives):
+        said = f"got {count}, but there are {len(primitives)} primitives"
+        raise wrong("number_of_trajectories", said)
     return Nav2Lattice(
-        motion_model=motion.value,
-        turning_radius=head.get("turning_radius", float).positive(),
+        motion_model=motion,
+        turning_radius=float(head["turning_radius"]),
         resolution=resolution,
         headings=headings,
         primitives=primitives,
-        version=top.get("version", float).value if "version" in top.value else 1.0,
-        date=top.get("date_generated", str).value if "date_generated" in top.value else "",
-        stopping_threshold=_optional(head, "stopping_threshold", int),
-        distinctness_ratio=_optional(head, DISTINCT, float),
+        version=float(top.get("version", 1.0)),
+        date=top.get("date_generated", ""),
+        stopping_threshold=head.get("stopping_threshold"),
+        distinctness_ratio=head.get(DISTINCT),
     )
 
 
@@ -242,57 +293,67 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
     )
 
 
-def _optional(head: Place, key: str, kind: type[int] | type[float]) -> Any:
-    return head.get(key, kind).value if key in head.value else None
+def _primitive(
+    row: Nav2Row, headings: Array, resolution: float, path: Path, number: int
+) -> Nav2Primitive:
+    def wrong(said: str, *where: str | int) -> InvalidScenario:
+        return misstated(path, ("primitives", number, *where), said)
 
-
-def _primitive(row: Place, headings: Array, resolution: float) -> Nav2Primitive:
-    start, end = (row.get(f"{what}_angle_index", int) for what in ("start", "end"))
-    for place in (start, end):
-        if not 0 <= place.value < headings.size:
-            raise place.error(f"got {place.value}, need 0 to {headings.size - 1}")
-    rows = row.get("poses", list)
-    poses = [rows.item(k).numbers() for k in range(len(rows.value))]
+    for key, index in (
+        ("start_angle_index", row["start_angle_index"]),
+        ("end_angle_index", row["end_angle_index"]),
+    ):
+        if not 0 <= index < headings.size:
+            raise wrong(f"got {index}, need 0 to {headings.size - 1}", key)
+    poses = row["poses"]
     for k, pose in enumerate(poses):
         if len(pose) != 3:
-            raise rows.item(k).error(f"got {len(pose)} numbers, need 3: x, y, yaw")
+            raise wrong(f"got {len(pose)} numbers, need 3: x, y, yaw", "poses", k)
     if not poses:
-        raise rows.error("is empty, need at least one pose")
+        raise wrong("is empty, need at least one pose", "poses")
     made = Nav2Primitive(
-        id=row.get("trajectory_id", int).value,
-        start=start.value,
-        end=end.value,
-        left_turn=row.get("left_turn", bool).value,
-        radius=row.get("trajectory_radius", float).value,
-        length=row.get("trajectory_length", float).value,
-        arc_length=row.get("arc_length", float).value,
-        straight_length=row.get("straight_length", float).value,
-        poses=np.array(poses),
+        id=row["trajectory_id"],
+        start=row["start_angle_index"],
+        end=row["end_angle_index"],
+        left_turn=row["left_turn"],
+        radius=float(row["trajectory_radius"]),
+        length=float(row["trajectory_length"]),
+        arc_length=float(row["arc_length"]),
+        straight_length=float(row["straight_length"]),
+        poses=np.array(poses, dtype=np.float64),
     )
     steps = np.hypot(*np.diff(made.poses[:, :2], axis=0, prepend=0.0).T) / resolution
     if not steps.max() <= MOST_CELLS:
         k = int(steps.argmax())
-        raise rows.item(k).error(
+        raise wrong(
             f"is {steps[k] * resolution:g} m from the pose before, need at most {MOST_CELLS} "
-            "cells: poses are missing"
+            "cells: poses are missing",
+            "poses",
+            k,
         )
     turns = np.abs(wrapped(np.diff(made.poses[:, 2], prepend=headings[made.start])))
     for values, most, unit in ((steps, GAP_CELLS, "cells"), (turns, GAP_TURN, "rad")):
         k, usual = int(values.argmax()), _usual(values)
         if values[k] > max(most, UNEVEN * usual):
-            raise rows.item(k).error(
+            raise wrong(
                 f"is {values[k]:.3g} {unit} from the pose before, need at most "
-                f"{max(most, UNEVEN * usual):.3g} {unit} as between others: a pose is missing"
+                f"{max(most, UNEVEN * usual):.3g} {unit} as between others: a pose is missing",
+                "poses",
+                k,
             )
     last, heading = made.poses[-1], float(headings[made.end])
     across = last[:2] / resolution
     if np.abs(across - np.round(across)).max() > ON_GRID:
-        raise rows.item(len(poses) - 1).error(
-            f"got ({last[0]:g}, {last[1]:g}), need a point of the grid of {resolution:g} m"
+        raise wrong(
+            f"got ({last[0]:g}, {last[1]:g}), need a point of the grid of {resolution:g} m",
+            "poses",
+            len(poses) - 1,
         )
     if abs(float(wrapped(last[2] - heading))) > ON_HEADING:
-        raise rows.item(len(poses) - 1).error(
-            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {made.end}"
+        raise wrong(
+            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {made.end}",
+            "poses",
+            len(poses) - 1,
         )
     return made
 
@@ -308,19 +369,17 @@ def _usual(steps: Array) -> float:
     return math.inf if steps.size == 1 else 0.0
 
 
-def _check_order(rows: Place, primitives: Sequence[Nav2Primitive], n: int) -> None:
+def _check_order(primitives: Sequence[Nav2Primitive], n: int, path: Path) -> None:
     """Sorted by the first heading, from 0 on, none left out: Nav2 counts the changes."""
     expected = 0
     for k, one in enumerate(primitives):
         if one.start not in (expected, expected + 1) or (k == 0 and one.start != 0):
-            raise (
-                rows.item(k)
-                .get("start_angle_index", int)
-                .error(f"got {one.start} after {expected}, need primitives sorted by it, from 0 on")
-            )
+            said = f"got {one.start} after {expected}, need primitives sorted by it, from 0 on"
+            raise misstated(path, ("primitives", k, "start_angle_index"), said)
         expected = one.start
     if expected != n - 1:
-        raise rows.error(f"ends with the heading {expected}, need primitives up to {n - 1}")
+        said = f"ends with the heading {expected}, need primitives up to {n - 1}"
+        raise misstated(path, ("primitives",), said)
 
 
 def _meant(file: Nav2Lattice, one: Nav2Primitive) -> Move:

@@ -25,8 +25,7 @@ from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import OccupancyMap, Polygon
 from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, check_cell
-from maneuver_automaton.formats.grey_image import GreyImage, read_grey_image
+from maneuver_automaton.formats.cells import GreyImage, bounds_around, check_cell, read_grey_image
 from maneuver_automaton.formats.statement import MapFile, Statement, Unknown
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse, shown

@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.recognition import YAML_ENDINGS, reader_of, yaml_statements
+from maneuver_automaton.formats.registry import YAML_ENDINGS, reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
@@ -84,10 +84,6 @@ def load_scenario(
     """
     begin, path = time.perf_counter(), Path(path)
     read = reader_of(path)
-    if read is None and path.suffix.lower() == ".xml":
-        from maneuver_automaton.formats.commonroad import read_commonroad
-
-        read = read_commonroad  # which says what is wrong with the file
     if read is not None:
         statements = read(path)
     else:

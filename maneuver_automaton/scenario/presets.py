@@ -88,8 +88,7 @@ def preset_automaton(name: str, model: Model) -> Automaton:
 
 
 def _lattice(name: str, model: Model) -> Automaton:
-    from maneuver_automaton.formats.lattice import automaton_of_lattice
-    from maneuver_automaton.formats.lattice_making import lattice_of_arcs
+    from maneuver_automaton.formats.lattice import automaton_of_lattice, lattice_of_arcs
     from maneuver_automaton.models.lattice_body import LatticeBody
 
     if not isinstance(model, LatticeBody):

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 import shapely
 
-from maneuver_automaton.formats.benchmr_image import read_benchmr_image
-from maneuver_automaton.formats.benchmr_svg import (
+from maneuver_automaton.formats.benchmr import (
     n_queries,
     outline,
     read_benchmr,
+    read_benchmr_image,
     read_benchmr_queries,
+    read_svg_paths,
 )
-from maneuver_automaton.formats.svg_paths import read_svg_paths
 from maneuver_automaton.groups import SE2
 from tests.formats.outside import DATA, message_of, needs_data
 

@@ -10,8 +10,7 @@ import pytest
 
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.dynobench import read_dynobench
-from maneuver_automaton.formats.dynobench_models import BUILT_IN, READ
+from maneuver_automaton.formats.dynobench import BUILT_IN, READ, read_dynobench
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse
 from maneuver_automaton.models import SecondOrderUnicycle

@@ -9,7 +9,7 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
-from maneuver_automaton.formats.lattice_making import lattice_of_arcs
+from maneuver_automaton.formats.lattice import lattice_of_arcs
 from maneuver_automaton.formats.nav2_lattice import read_nav2_lattice
 from tests.formats.outside import DATA, needs_data
 

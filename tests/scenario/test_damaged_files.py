@@ -19,6 +19,7 @@ from tests.formats import (
     test_dynobench,
     test_movingai,
     test_nav2_map,
+    test_poses_csv,
     test_sbpl_cfg,
     test_tpcap,
 )
@@ -47,6 +48,7 @@ NAV2 = test_nav2_map.HEADER
 # The damaged file, its content, and the file that is loaded.
 FILES = {
     "Case0.csv": (test_tpcap.CASE.encode(), "Case0.csv"),
+    "poses.csv": (test_poses_csv.TABLE.encode(), "poses.csv"),
     "yard.yaml": (test_dynobench.PROBLEM.encode(), "yard.yaml"),
     "models/unicycle1_v0.yaml": (test_dynobench.MODEL.encode(), "yard.yaml"),
     "room.cfg": (test_sbpl_cfg.NAV3D.encode(), "room.cfg"),

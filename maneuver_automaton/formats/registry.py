@@ -1,0 +1,278 @@
+"""Formats of files that state a problem: the one place that knows which format a file is in.
+
+Scenarios are no other format, they are read by `maneuver_automaton.scenario`. A package may bring a
+format of its own: its entry point in the group `maneuver_automaton.formats` names a `Format`.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Protocol, TypeAlias
+
+from maneuver_automaton.collision import OccupancyMap
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.statement import Statement, Unknown
+from maneuver_automaton.formats.yaml_source import Document
+
+GROUP = "maneuver_automaton.formats"  # of entry points
+YAML_ENDINGS = (".yaml", ".yml")
+PRIMITIVES = "motion primitives, need a file that states a problem (see automaton show, convert)"
+NOT_READ: Mapping[str, str] = {
+    ".mprim": f"holds {PRIMITIVES}",
+    ".pb": "is a scenario of CommonRoad as protobuf, need it as XML (commonroad-io writes both)",
+    ".pgm": "is the image of a map, need the YAML file that states its resolution",
+}
+
+Reader: TypeAlias = Callable[[Path], tuple[Statement, ...]]
+
+
+class Format(Protocol):
+    """A format of files that state a problem, or a part of one: obstacles, start, goal."""
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+
+    def recognises(self, path: Path, document: Document | None) -> bool:
+        """Whether a file is in it; the `document` is that of a YAML file, None of any other."""
+
+    def read(self, path: Path, document: Document | None) -> tuple[Statement, ...]:
+        """What a file states, problem by problem.
+
+        Raises
+        ------
+        InvalidScenario
+            If it cannot be used: one line with file, place, value met, what would be right.
+        """
+
+    def writes(self, path: Path) -> bool:
+        """Whether a file of this name is written in it."""
+
+    def write(self, cells: OccupancyMap, path: Path) -> None:
+        """Write a map; called only where `writes` says so."""
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltIn:
+    """A format of this package, whose module is loaded when it is asked; see `Format`."""
+
+    name: str
+    endings: str
+    module: str
+    reads: str  # the function that does
+    test: str = ""  # of a path, or of a YAML document; empty: the ending is enough
+    saves: str = ""
+    alone: bool = True  # a problem by itself, where it is found in a folder
+    count: str = ""  # problems of a path; "several": always so many that --case tells which
+
+    def recognises(self, path: Path, document: Document | None) -> bool:
+        """Whether a file is in it, by its ending and its content."""
+        if path.suffix.lower() not in self.endings.split():
+            return False
+        return not self.test or bool(self.call(self.test, path if document is None else document))
+
+    def read(self, path: Path, document: Document | None) -> tuple[Statement, ...]:
+        """What a file states, problem by problem."""
+        given = (path,) if document is None else (path, document)
+        statements: tuple[Statement, ...] = self.call(self.reads, *given)
+        return statements
+
+    def writes(self, path: Path) -> bool:
+        """Whether a map of this name is written in it."""
+        return bool(self.saves) and path.suffix.lower() in self.endings.split()
+
+    def write(self, cells: OccupancyMap, path: Path) -> None:
+        """Write a map."""
+        self.call(self.saves, cells, path)
+
+    def call(self, function: str, *given: Any) -> Any:
+        """What a function of its module returns."""
+        module = importlib.import_module(f"{__package__}.{self.module}")
+        return getattr(module, function)(*given)
+
+
+YAML, CSV = " ".join(YAML_ENDINGS), ".csv"
+BUILT_IN = (  # of one ending: the last is read where none recognises the file, and says why
+    BuiltIn("Bench-MR", CSV, "benchmr", "read_benchmr_queries", "is_queries", alone=False),
+    BuiltIn("table of poses", CSV, "poses_csv", "read_poses", "is_poses"),
+    BuiltIn("TPCAP", CSV, "tpcap", "read_tpcap", "is_tpcap"),
+    BuiltIn("MovingAI", ".map", "movingai", "read_movingai_map", saves="save_movingai_map"),
+    BuiltIn("MovingAI", ".scen", "movingai", "read_movingai_scenario", count="several"),
+    BuiltIn("SBPL", ".cfg .env .nav2d .nav3d", "sbpl_cfg", "read_sbpl", "is_sbpl"),
+    BuiltIn(
+        "CommonRoad", ".xml", "commonroad", "read_commonroad", "is_commonroad", count="several"
+    ),
+    BuiltIn("Bench-MR", ".svg", "benchmr", "read_benchmr", "n_queries", count="n_queries"),
+    BuiltIn("Bench-MR", ".png .bmp", "benchmr", "read_benchmr_image", alone=False),
+    BuiltIn("dynobench", YAML, "dynobench", "read_dynobench", "is_dynobench"),
+    BuiltIn("CL-CBS", YAML, "cl_cbs", "read_cl_cbs", "is_cl_cbs"),
+    BuiltIn("Nav2", YAML, "nav2_map", "read_nav2_map", "is_nav2_map", saves="save_nav2_map"),
+)
+
+
+@functools.cache
+def from_outside() -> tuple[Format, ...]:
+    """The formats that other packages bring, by the names of their entry points.
+
+    Raises
+    ------
+    InvalidScenario
+        If one cannot be loaded.
+    """
+    found = []
+    for entry in sorted(metadata.entry_points(group=GROUP), key=lambda one: one.name):
+        try:
+            found.append(entry.load())
+        except Exception as error:
+            raise InvalidScenario(
+                f"format {entry.name!r}: {entry.value} cannot be loaded: {error}"
+            ) from error
+    return tuple(found)
+
+
+def format_of(path: Path, document: Document | None = None) -> Format | None:
+    """The format of a file; None of a scenario, and of what nothing recognises.
+
+    Those of other packages are asked first, and all only of files that are no scenario.
+
+    Raises
+    ------
+    InvalidScenario
+        If the ending is that of a format that is not read.
+    """
+    ending = path.suffix.lower()
+    if document is not None and isinstance(document.value, dict) and "schema" in document.value:
+        return None
+    if document is None and ending in YAML_ENDINGS:
+        return None  # not parsed yet
+    for one in from_outside():
+        if one.recognises(path, document):
+            return one
+    if ending == ".xml" and _holds_primitives(path):
+        raise InvalidScenario(f"{path}: holds {PRIMITIVES}")
+    if said := NOT_READ.get(ending):
+        raise InvalidScenario(f"{path}: {said}")
+    of_it = [one for one in BUILT_IN if ending in one.endings.split()]
+    if document is None and of_it:
+        return next((one for one in of_it[:-1] if one.recognises(path, None)), of_it[-1])
+    return next((one for one in of_it if one.recognises(path, document)), None)
+
+
+def reader_of(path: Path) -> Reader | None:
+    """What reads a file that is no YAML; None for scenarios and all that is YAML.
+
+    Raises
+    ------
+    InvalidScenario
+        If the ending is that of a format that is not read.
+    """
+    found = format_of(path)
+    return None if found is None else functools.partial(found.read, document=None)
+
+
+def yaml_statements(document: Document, path: Path) -> tuple[Statement, ...] | None:
+    """What a YAML file of another format states; None for a scenario.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file belongs to a problem and states none, or cannot be used.
+    """
+    if (found := format_of(path, document)) is not None:
+        return found.read(path, document)
+    if said := belongs_to(document):
+        raise document.error((), said)
+    return None
+
+
+def belongs_to(document: Document) -> str:
+    """Why a YAML file states no problem, if it belongs to one; empty if it does not."""
+    from maneuver_automaton.formats import cl_cbs, dynobench
+
+    if dynobench.belongs_to_dynobench(document):
+        return "is a model or a solution of dynobench, need the problem (environment, robots)"
+    if cl_cbs.belongs_to_cl_cbs(document):
+        return "is a solution of CL-CBS, need the problem (agents, map)"
+    return ""
+
+
+def map_writer_of(path: Path) -> Format | None:
+    """The format in which a map of this name is written; None if there is none."""
+    return next((one for one in (*BUILT_IN, *from_outside()) if one.writes(path)), None)
+
+
+def states_a_problem(path: Path, document: Document | None) -> bool:
+    """Whether a file of a folder is a problem by itself; a damaged one is, which tells why.
+
+    The `document` is that of a YAML file; None of one that cannot be read.
+    """
+    ending = path.suffix.lower()
+    if ending in YAML_ENDINGS:
+        return document is None or not belongs_to(document)
+    try:
+        if any(one.recognises(path, None) for one in from_outside()):
+            return True
+        return any(one.alone and one.recognises(path, None) for one in BUILT_IN)
+    except (OSError, InvalidScenario):
+        return True
+
+
+def holds_several(path: Path) -> bool:
+    """Whether a file that is no YAML may hold several problems, for one of which --case asks."""
+    for one in BUILT_IN:
+        if one.count == "several" and path.suffix.lower() in one.endings.split():
+            return True
+        if one.count and path.suffix.lower() in one.endings.split():
+            with contextlib.suppress(InvalidScenario):  # told when it is planned
+                return int(one.call(one.count, path)) > 1
+    return False
+
+
+def _holds_primitives(path: Path) -> bool:
+    """Whether an XML file holds motion primitives of CommonRoad; not if it cannot be read."""
+    from maneuver_automaton.formats.commonroad_primitives import is_commonroad_primitives
+
+    try:
+        return is_commonroad_primitives(path)
+    except (OSError, ValueError):
+        return False
+
+
+def load_map(path: Path | str, *, unknown: Unknown = "blocked") -> OccupancyMap:
+    """The occupancy map of a file: of Nav2 and ROS (.yaml beside an image), or MovingAI (.map).
+
+    A picture alone states no size of its pixels: `OccupancyMap.of_picture` takes both.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    unknown : str
+        How to read the cells of a Nav2 map of which it knows nothing: "blocked" or "free".
+
+    Raises
+    ------
+    InvalidScenario
+        If the file or its image cannot be used: file, line, field, value, what would be right.
+    """
+    path = Path(path)
+    if unknown not in ("blocked", "free"):
+        raise InvalidScenario(f"{path}: unknown: got {unknown!r}, need 'blocked' or 'free'")
+    if path.suffix.lower() in YAML_ENDINGS:
+        from maneuver_automaton.formats.nav2_map import load_nav2_map
+
+        return load_nav2_map(path, unknown=unknown)
+    if path.suffix.lower() == ".map":
+        from maneuver_automaton.formats.movingai import load_movingai_map
+
+        return load_movingai_map(path)
+    raise InvalidScenario(
+        f"{path}: is no map, need a file of Nav2 ({', '.join(YAML_ENDINGS)}) or MovingAI "
+        "(.map); OccupancyMap.of_picture reads an image"
+    )
