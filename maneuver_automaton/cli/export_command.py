@@ -1,4 +1,4 @@
-"""`export`: a plan or a closed loop as a file of another program, without planning."""
+"""`export`: plans or closed loops as a file of another program, without planning."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written
-from maneuver_automaton.cli.planned import road_fleet
+from maneuver_automaton.cli.planned import road_fleet, source_of
 from maneuver_automaton.cli.tables import print_written
 from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 
 if TYPE_CHECKING:
-    from maneuver_automaton.exports import Driven
+    from maneuver_automaton.recording import Recording
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +46,7 @@ FORMATS: Mapping[str, Format] = {
 def export(
     file: Path, kind: str, out: Path | None, *, parts: Parts, step: float | None = None
 ) -> int:
-    """Write the plan or loop of `file` in a format; say where the goal was not reached."""
+    """Write the plans or loops of `file` in a format; say where a goal was not reached."""
     from maneuver_automaton import exports
 
     if kind not in FORMATS:
@@ -54,14 +54,13 @@ def export(
     form = FORMATS[kind]
     if step is not None and not form.steps:
         raise InvalidScenario(f"--step: {kind} has no rows in time; leave it out")
-    several = road_fleet(file, parts) if kind == "commonroad" else None
-    driven: Any = several or _of_one(file, parts)
+    recording = _recording(file, parts)
     path = _target(file, out, form, kind)
     options: dict[str, Any] = {} if step is None else {"step": step}
     write: Callable[..., None] = getattr(exports, form.function)
     make_folder(path.parent)
     try:
-        write(driven, path, **options)
+        write(recording, path, **options)
     except ManeuverAutomatonError:
         raise
     except OSError as error:
@@ -69,21 +68,26 @@ def export(
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
     print_written(path)
-    if several is None:
-        reached = driven.reached
-    else:
-        reached = not any(one.reason for one in several.results.values())
-    if kind == "commonroad" and not reached:
+    clean = all(one.reached and not one.reason for one in recording.movers)
+    if kind == "commonroad" and not clean:
         complain(f"{file}: it is no clean drive to a goal: the official checker refuses {path}")
     return FOUND
 
 
-def _of_one(file: Path, parts: Parts) -> Driven:
-    """The plan or loop of one vehicle."""
+def _recording(file: Path, parts: Parts) -> Recording:
+    """What the file holds; several vehicles in the world that it names itself."""
     from maneuver_automaton import exports
+    from maneuver_automaton.formats.plan_json import read_fleet_document
+    from maneuver_automaton.recording import recording_of
 
+    if (roads := road_fleet(file, parts)) is not None:
+        return recording_of(roads)
+    document = read_fleet_document(file)
+    if document is not None and (parts.beside is not None or document.get("source")):
+        beside, its = source_of(file, document, parts)
+        return exports.load_recording(file, beside=beside, case=its.case)
     own = None if parts.model is None else user_model(parts.model)
-    return exports.load_driven(file, beside=parts.beside, case=parts.case, model=own)
+    return exports.load_recording(file, beside=parts.beside, case=parts.case, model=own)
 
 
 def _target(file: Path, out: Path | None, form: Format, kind: str) -> Path:

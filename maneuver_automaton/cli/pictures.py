@@ -8,12 +8,12 @@ import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton._interrupts import is_main_program
 from maneuver_automaton.cli.options import Options
+from maneuver_automaton.recording import Recording, recording_of
 
 if TYPE_CHECKING:  # Matplotlib takes half a second
     from maneuver_automaton.plotting import Look
@@ -21,87 +21,43 @@ if TYPE_CHECKING:  # Matplotlib takes half a second
 
 def draw(result: Any, name: str, file: Path, options: Options) -> None:
     """Write the pictures of a result that were asked for: `file` with their endings."""
-    moves = not why_no_film(result)
-    if options.plot and (moves or not on_roads(result)):
+    recording, plotting = recording_of(result), ready_to_draw()
+    moves, on_roads = not why_no_film(recording), bool(recording.world.lanes)
+    if options.plot and (moves or not on_roads):
         look = options.look.look(name)
-        save_picture(result, file.with_suffix(".png"), look)
-        if type(result).__name__ == "PlanResult":
-            _draw_more(result, file, options, look.title)
+        plotting.save_picture(recording, file.with_suffix(".png"), look=look)
+        _draw_more(recording, result, file, options, look)
     if options.animate and moves:
-        save_film(result, file.with_suffix(".gif"), options.look.look(name))
+        save_film(recording, file.with_suffix(".gif"), options.look.look(name))
     page = options.html or (options.animate and file.name == "closed_loop")
-    if page and (moves or not type(result).__name__.startswith("RoadFleet")):
+    if page and (moves or not on_roads or len(recording.movers) == 1):
         result.player(title=options.look.title or name).save(file.with_suffix(".html"))
 
 
-def _draw_more(result: Any, file: Path, options: Options, title: str) -> None:
+def _draw_more(recording: Recording, result: Any, file: Path, options: Options, look: Look) -> None:
     """Further pictures of a plan, where there is something to see in them."""
+    plotting, is_plan = ready_to_draw(), recording.kind == "plan"
+    if is_plan and plotting.flies_among_heights(recording):
+        plotting.save_picture(recording, file.with_name("plan_3d.png"), look=look, view="space")
+    if is_plan and options.budgets.gap is not None and recording.movers[0].has_plan:
+        plotting.save_progress_figure(result, file.with_name("progress.png"), title=look.title)
+    if recording.alternatives:
+        path = file.with_name("alternatives.png")
+        plotting.save_picture(recording, path, look=look, view="alternatives")
+
+
+def save_film(recording: Recording, path: Path, look: Look) -> None:
+    """Animate a result; the title stands above those on roads alone."""
     plotting = ready_to_draw()
-    if plotting.flies_among_heights(result.problem):
-        plotting.save_space_figure(result, file.with_name("plan_3d.png"), title=title)
-    if options.budgets.gap is not None and result.plan is not None:
-        plotting.save_progress_figure(result, file.with_name("progress.png"), title=title)
-    if result.alternatives:
-        plotting.save_alternatives_figure(result, file.with_name("alternatives.png"), title=title)
+    titled = plotting.Look(title=look.title) if recording.world.lanes else None
+    plotting.save_film(recording, path, look=titled)
 
 
-def why_no_film(result: Any) -> str:
+def why_no_film(recording: Recording) -> str:
     """Why nothing moves in a result: it holds no plan; empty if something does."""
-    kind = type(result).__name__
-    if kind in ("FleetResult", "RoadFleetResult", "RoadFleetDrive"):
-        moves = bool(result.plans)
-    else:
-        moves = kind not in ("PlanResult", "RoadPlanResult") or result.plan is not None
-    status = getattr(result, "status", "no_plan")
-    return "" if moves else f"holds no plan, its status is {getattr(status, 'value', status)!r}"
-
-
-def on_roads(result: Any) -> bool:
-    """Whether a result is a plan or a drive on roads."""
-    return type(result).__name__.startswith("Road")
-
-
-def save_picture(result: Any, path: Path, look: Look) -> None:
-    """Draw any result."""
-    plotting, kind = ready_to_draw(), type(result).__name__
-    if kind in ("RoadFleetResult", "RoadFleetDrive"):
-        plotting.save_road_fleet_figure(result, _vehicle(result), path, look=look)
-    elif on_roads(result):
-        plan = result.plan if kind == "RoadPlanResult" else result.driven
-        planner = result.planner
-        plotting.save_road_figure(planner.scene, planner.vehicle, plan, path, look=look)
-    elif kind == "PlanResult":
-        plotting.save_plan_figure(result, path, nodes=result.nodes, look=look)
-    elif kind == "FleetResult":
-        plotting.save_fleet_figure(result, path, look=look)
-    elif kind == "FleetLog":
-        plotting.save_fleet_loop_figure(result, path, look=look)
-    else:
-        plotting.save_closed_loop_figure(result, path, look=look)
-
-
-def save_film(result: Any, path: Path, look: Look) -> None:
-    """Animate any result in which something moves."""
-    plotting, kind = ready_to_draw(), type(result).__name__
-    if kind in ("RoadFleetResult", "RoadFleetDrive"):
-        plotting.save_road_fleet_animation(result, _vehicle(result), path, look=look)
-    elif on_roads(result):
-        plan = result.plan if kind == "RoadPlanResult" else result.driven
-        planner = result.planner
-        titled = replace(planner.scene, name=look.title or planner.scene.name)
-        plotting.save_road_animation(titled, planner.vehicle, plan, path)
-    elif kind == "PlanResult":
-        plotting.save_plan_animation(result.plan, path, problem=result.problem)
-    elif kind == "FleetResult":
-        plotting.animate_fleet(result, path)
-    elif kind == "FleetLog":
-        plotting.animate_fleet_loop(result, path)
-    else:
-        plotting.save_closed_loop_animation(result, path)
-
-
-def _vehicle(result: Any) -> Any:
-    return next(iter(result.results.values())).planner.vehicle
+    if any(one.has_plan for one in recording.movers):
+        return ""
+    return f"holds no plan, its status is {recording.status!r}"
 
 
 def ready_to_draw() -> Any:
@@ -187,7 +143,7 @@ def _serve(read: int) -> None:
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
         ready_to_draw()
-        from maneuver_automaton.plotting import plan_figures  # noqa: F401
+        from maneuver_automaton.plotting import pictures  # noqa: F401
 
         with os.fdopen(read, "rb") as pipe:
             order = pipe.read()

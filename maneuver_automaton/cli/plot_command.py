@@ -10,7 +10,7 @@ from typing import Any
 from maneuver_automaton.cli.guard import FOUND
 from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
 from maneuver_automaton.cli.options import LookOptions
-from maneuver_automaton.cli.pictures import ready_to_draw, save_film, save_picture, why_no_film
+from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.planned import fleet_planned, road_fleet
 from maneuver_automaton.cli.tables import print_written
 from maneuver_automaton.errors import InvalidScenario
@@ -27,6 +27,8 @@ from maneuver_automaton.formats.plan_json import (
     read_fleet_document,
     read_plan_document,
 )
+from maneuver_automaton.recording import recording_of
+from maneuver_automaton.recording.plans import stated
 
 ENDINGS = {
     "picture": (".png", ".pdf", ".svg"),
@@ -52,7 +54,6 @@ def plot(
     with _named(file):
         result, name = _result_of(file, beside)
     make_folder(path.parent)
-    ready_to_draw()
     try:
         with _named(file):
             if isinstance(result, dict):
@@ -60,11 +61,11 @@ def plot(
             elif what == "page":
                 result.player(title=look.title or name).save(path)
             elif what == "picture":
-                save_picture(result, path, look.look(name))
-            elif why := why_no_film(result):
+                ready_to_draw().save_picture(result, path, look=look.look(name))
+            elif why := why_no_film(recording_of(result)):
                 raise ValueError(why)
             else:
-                save_film(result, path, look.look(name))
+                save_film(recording_of(result), path, look.look(name))
     except OSError as error:
         raise not_written(path, error) from error
     print_written(path)
@@ -111,17 +112,17 @@ def _draw_motion(document: dict[str, Any], path: Path, what: str, look: LookOpti
     """Draw what a file states: the motion, without body and obstacles."""
     plotting = ready_to_draw()
     name = str(document.get("name") or "")
-    if what == "picture":
-        plotting.save_plan_file_figure(document, path, look=look.look(name))
-        return
-    if document["status"] != "found":
+    found = document["status"] == "found" and bool(document["trajectory"])
+    if not found and what != "picture":
         raise ValueError(f"holds no plan, its status is {document['status']!r}")
-    plan = plan_of_document(document)
-    if what == "animation":
-        plotting.save_plan_animation(plan, path)
-        return
-    title = look.title or name or path.stem
-    plotting.player_of_file(document, plan, title=title).save(path)
+    plan = plan_of_document(document) if found else None
+    if what == "picture":
+        plotting.save_picture(stated(document, plan), path, look=look.look(name))
+    elif what == "animation":
+        plotting.save_film(plan, path)
+    else:
+        title = look.title or name or path.stem
+        plotting.player_of_file(document, plan, title=title).save(path)
 
 
 def _target(file: Path, out: Path | None, what: str) -> Path:

@@ -1,4 +1,4 @@
-"""Exports: plans, loops and drives as files and messages of other programs, one a file."""
+"""Exports: whatever moves as files and messages of other programs, one a file."""
 
 from typing import TYPE_CHECKING
 
@@ -8,26 +8,22 @@ if TYPE_CHECKING:
     from maneuver_automaton.exports.commonroad_solution import (
         save_commonroad_solution as save_commonroad_solution,
     )
-    from maneuver_automaton.exports.driven import Driven as Driven
-    from maneuver_automaton.exports.driven import driven_of as driven_of
     from maneuver_automaton.exports.geojson import save_geojson as save_geojson
-    from maneuver_automaton.exports.messages import ros_messages as ros_messages
-    from maneuver_automaton.exports.reading import load_driven as load_driven
+    from maneuver_automaton.exports.reading import load_recording as load_recording
     from maneuver_automaton.exports.reading import load_road_fleet as load_road_fleet
     from maneuver_automaton.exports.rerun_log import save_rerun as save_rerun
-    from maneuver_automaton.exports.ros2_bag import save_ros2_bag as save_ros2_bag
+    from maneuver_automaton.exports.ros import ros_messages as ros_messages
+    from maneuver_automaton.exports.ros import save_ros2_bag as save_ros2_bag
     from maneuver_automaton.exports.table import save_csv as save_csv
 
 _HOMES = {
-    "Driven": "driven",
-    "driven_of": "driven",
-    "load_driven": "reading",
+    "load_recording": "reading",
     "load_road_fleet": "reading",
-    "ros_messages": "messages",
+    "ros_messages": "ros",
     "save_commonroad_solution": "commonroad_solution",
     "save_csv": "table",
     "save_geojson": "geojson",
     "save_rerun": "rerun_log",
-    "save_ros2_bag": "ros2_bag",
+    "save_ros2_bag": "ros",
 }
 __getattr__, __dir__ = lazily(__name__, _HOMES)

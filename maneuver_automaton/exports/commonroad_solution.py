@@ -14,24 +14,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.driven import Driven, driven_of
-
-if TYPE_CHECKING:
-    from maneuver_automaton.exports.driven import Exportable
-    from maneuver_automaton.roads import (
-        RoadBenchmark,
-        RoadFleetDrive,
-        RoadFleetResult,
-        RoadScene,
-        RoadVehicle,
-    )
+from maneuver_automaton.exports.recorded import drivers, exported
+from maneuver_automaton.recording import Mover
 
 COST_FUNCTION = "SA1"
 SAME_M = 1e-3  # [m] between our vehicle and one of CommonRoad's
@@ -39,10 +30,7 @@ ON_STEP = 1e-6  # of a time step, between a time and the next step
 
 
 def save_commonroad_solution(
-    value: Exportable | RoadFleetResult | RoadFleetDrive | Sequence[Driven],
-    path: Path | str,
-    *,
-    cost_function: str = COST_FUNCTION,
+    value: Any, path: Path | str, *, cost_function: str = COST_FUNCTION
 ) -> None:
     """Write a plan or a drive on a CommonRoad scenario as a solution file (XML).
 
@@ -52,7 +40,7 @@ def save_commonroad_solution(
 
     Parameters
     ----------
-    value : RoadPlanResult, RoadDrive, RoadFleetResult, RoadFleetDrive, or a sequence of Driven
+    value : RoadPlanResult, RoadDrive, RoadFleetResult, RoadFleetDrive, or a Recording of one
         On scenes that were read from a file of CommonRoad.
     path : Path or str
         The file.
@@ -78,43 +66,16 @@ def save_commonroad_solution(
     ...     print(str(error).split(",")[0])
     CommonRoad solution: got no drive on a CommonRoad scenario
     """
-    drives = [_on_road(one) for one in _each(value)]
-    write_text_atomically(Path(path), _text(drives, cost_function))
-
-
-class _Drive(NamedTuple):
-    """A drive on a CommonRoad scenario."""
-
-    driven: Driven
-    scene: RoadScene
-    vehicle: RoadVehicle
-    benchmark: RoadBenchmark
-
-
-def _each(
-    value: Exportable | RoadFleetResult | RoadFleetDrive | Sequence[Driven],
-) -> list[Driven]:
-    """The drives of one vehicle or of several."""
-    from maneuver_automaton.roads import RoadFleetDrive, RoadFleetResult
-
-    if isinstance(value, RoadFleetResult | RoadFleetDrive):
-        value = [driven_of(value.results[name]) for name in value.plans]
-    found = list(value) if isinstance(value, Sequence) else [driven_of(value)]
-    if not found:
-        raise ValueError("CommonRoad solution: nobody has a plan, need at least one")
-    return found
-
-
-def _on_road(driven: Driven) -> _Drive:
-    if driven.scene is None or driven.vehicle is None or driven.scene.benchmark is None:
+    movers = drivers(exported(value))
+    if any(one.road is None or one.road.scene.benchmark is None for one in movers):
         raise ValueError(
             "CommonRoad solution: got no drive on a CommonRoad scenario, need a plan or drive of "
             "its XML file"
         )
-    return _Drive(driven, driven.scene, driven.vehicle, driven.scene.benchmark)
+    write_text_atomically(Path(path), _text(movers, cost_function))
 
 
-def _text(drives: Sequence[_Drive], cost_function: str) -> str:
+def _text(movers: Sequence[Mover], cost_function: str) -> str:
     try:
         from commonroad.common import solution
         from commonroad.scenario.scenario import ScenarioID
@@ -126,8 +87,8 @@ def _text(drives: Sequence[_Drive], cost_function: str) -> str:
     known = [one.name for one in solution.CostFunction]
     if cost_function not in known:
         raise ValueError(f"cost_function: got {cost_function!r}, need one of {', '.join(known)}")
-    answers = [_answer(one, solution, cost_function) for one in drives]
-    benchmark = drives[0].benchmark
+    answers = [_answer(one, solution, cost_function) for one in movers]
+    benchmark = movers[0].road.scene.benchmark
     try:
         name = ScenarioID.from_benchmark_id(benchmark.scenario, benchmark.version)
     except ValueError as error:
@@ -139,12 +100,12 @@ def _text(drives: Sequence[_Drive], cost_function: str) -> str:
     return str(solution.CommonRoadSolutionWriter(whole).dump())
 
 
-def _answer(drive: _Drive, solution: Any, cost_function: str) -> Any:
+def _answer(mover: Mover, solution: Any, cost_function: str) -> Any:
     """The solution of one planning problem."""
     from commonroad.scenario.state import KSState
     from commonroad.scenario.trajectory import Trajectory
 
-    first, states = _states(drive.driven, drive.scene, drive.vehicle)
+    first, states = _states(mover)
     trajectory = Trajectory(
         initial_time_step=first,
         state_list=[
@@ -159,27 +120,27 @@ def _answer(drive: _Drive, solution: Any, cost_function: str) -> Any:
         ],
     )
     return solution.PlanningProblemSolution(
-        planning_problem_id=drive.benchmark.problem,
+        planning_problem_id=mover.road.scene.benchmark.problem,
         vehicle_model=solution.VehicleModel.KS,
-        vehicle_type=_vehicle_type(drive.vehicle, solution.vehicle_parameters),
+        vehicle_type=_vehicle_type(mover.road.vehicle, solution.vehicle_parameters),
         cost_function=solution.CostFunction[cost_function],
         trajectory=trajectory,
     )
 
 
-def _states(driven: Driven, scene: RoadScene, vehicle: RoadVehicle) -> tuple[int, Array]:
+def _states(mover: Mover) -> tuple[int, Array]:
     """Number of the first time step, and from there x, y, heading, speed, steering (n, 5)."""
-    step = scene.step
-    first = driven.start_time / step
+    scene, vehicle, step = mover.road.scene, mover.road.vehicle, mover.road.scene.step
+    first = mover.start_time / step
     if abs(first - round(first)) > ON_STEP:
         raise ValueError(
-            f"CommonRoad solution: the drive starts at {driven.start_time:g} s, need a multiple of "
+            f"CommonRoad solution: the drive starts at {mover.start_time:g} s, need a multiple of "
             f"the scenario's time step of {step:g} s"
         )
-    whole = math.floor(driven.duration / step + ON_STEP)
-    rows = driven.rows(step=step)
+    whole = math.floor(mover.duration / step + ON_STEP)
+    rows = mover.rows(step=step)
     states = np.column_stack([vehicle.middle_of(rows.pose), rows.reduced_state])
-    states, time = states[: whole + 1], driven.start_time + step * whole
+    states, time = states[: whole + 1], mover.start_time + step * whole
     # Goals are met but for rounding, and the checker compares exactly: a stop is at a speed of 0.
     for goal in scene.goals:
         if goal.speed is not None and goal.contains(states[-1, :3], speed=states[-1, 3], time=time):
@@ -187,7 +148,7 @@ def _states(driven: Driven, scene: RoadScene, vehicle: RoadVehicle) -> tuple[int
     return round(first), states
 
 
-def _vehicle_type(vehicle: RoadVehicle, known: Any) -> Any:
+def _vehicle_type(vehicle: Any, known: Any) -> Any:
     """The one of CommonRoad's vehicles that has our wheelbase and body."""
     ours = np.array([vehicle.model.wheelbase, vehicle.ahead, vehicle.length, vehicle.width])
     for kind, theirs in known.items():

@@ -12,43 +12,43 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import Obstacle, Polygon
-from maneuver_automaton.exports.driven import driven_of
-from maneuver_automaton.exports.surroundings import Shown, placed_solids, shown_of, solid
+from maneuver_automaton.exports.recorded import exported, title_of
+from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solids_of
 from maneuver_automaton.plotting.footprint import placed
-from maneuver_automaton.plotting.swept import merged, swept_region
-
-if TYPE_CHECKING:
-    from maneuver_automaton.exports.driven import Exportable
+from maneuver_automaton.recording import Recording
 
 PLACES = (0, 1, 3)  # x, y and altitude of a pose
 METRES = 'LOCAL_CS["plan",LOCAL_DATUM["plan",32767],UNIT["metre",1],AXIS["x",EAST],AXIS["y",NORTH]]'
 
 
-def save_geojson(value: Exportable, path: Path | str) -> None:
-    """Write a plan, a closed loop or a drive as a FeatureCollection of GeoJSON.
+def save_geojson(value: Any, path: Path | str) -> None:
+    """Write a plan, a closed loop, a fleet or a drive as a FeatureCollection of GeoJSON.
 
     Coordinates are metres in the plan's own frame, x and y, and the altitude of a vehicle that
     flies; they are no longitudes and latitudes. The property `kind` tells the features apart:
-    path, primitive (a trim or maneuver), swept, body, start, goal, obstacle, zone, lanelet.
+    path, primitive (a trim or maneuver), swept, body, start, goal, obstacle, zone, lanelet; of
+    several vehicles, `vehicle` tells whose it is.
 
     Parameters
     ----------
-    value : Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive
+    value : any result, or a Recording
         A Plan alone knows neither body nor obstacles.
     path : Path or str
         The file.
 
     Raises
     ------
+    TypeError
+        If nobody moves in the value.
     ValueError
-        If a result has no plan.
+        If nobody has a plan.
     OSError
         If the file cannot be written.
 
@@ -63,11 +63,11 @@ def save_geojson(value: Exportable, path: Path | str) -> None:
     >>> first["properties"]["kind"], first["geometry"]["coordinates"]
     ('path', [[0.0, 0.0], [2.0, 0.0]])
     """
-    shown = shown_of(driven_of(value))
-    features = ",\n".join(json.dumps(one, allow_nan=False) for one in _features(shown))
+    recording = exported(value)
+    features = ",\n".join(json.dumps(one, allow_nan=False) for one in _features(recording))
     head = {
         "type": "FeatureCollection",
-        "name": shown.driven.name or Path(path).stem,
+        "name": title_of(recording, path),
         "crs": {"type": "name", "properties": {"name": METRES}},
         "units": "m",
         "frame": "x and y in metres in the plan's own frame, not longitude and latitude",
@@ -76,74 +76,72 @@ def save_geojson(value: Exportable, path: Path | str) -> None:
     write_text_atomically(Path(path), text)
 
 
-def _features(shown: Shown) -> Iterator[dict[str, Any]]:
-    yield from _path(shown)
-    yield from _bodies(shown)
-    yield from _ends(shown)
-    yield from _around(shown)
+def _features(recording: Recording) -> Iterator[dict[str, Any]]:
+    several = len(recording.movers) > 1
+    for mover in recording.movers:
+        shown = shown_of(mover)
+        features = [*_path(shown), *_bodies(shown)] if mover.has_plan else []
+        for one in (*features, *_ends(shown)):
+            if several:
+                one["properties"]["vehicle"] = mover.name
+            yield one
+    yield from _around(recording)
 
 
 def _path(shown: Shown) -> Iterator[dict[str, Any]]:
-    driven, track = shown.driven, shown.track
-    places = _places(np.concatenate([track.pose, driven.end[None]]))  # pushed, it ends elsewhere
+    mover, track = shown.mover, shown.track
+    places = _places(np.concatenate([track.pose, np.array([mover.end])]))  # pushed, it ends there
     length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-    facts = {"duration_s": driven.duration, "length_m": length, "cost": driven.cost}
+    facts = {"duration_s": mover.duration, "length_m": length, "cost": mover.cost}
     yield _feature(_line(places), kind="path", **facts)
     for piece in track.pieces:
-        yield _feature(
-            _line(_places(piece.pose)),
-            kind="primitive",
-            name=piece.name,
-            begin_s=float(piece.time[0]),
-            end_s=float(piece.time[-1]),
-        )
+        begin, end = piece.time[[0, -1]].tolist()
+        line = _line(_places(piece.pose))
+        yield _feature(line, kind="primitive", name=piece.name, begin_s=begin, end_s=end)
 
 
 def _bodies(shown: Shown) -> Iterator[dict[str, Any]]:
     """The region that all bodies sweep, and where they are when primitives begin and end."""
     import shapely
 
-    parts = [one for one in shown.parts if one[1]]
-    swept = merged([piece for _, body, track in parts for piece in swept_region(track, body)])
-    if swept:
+    if swept := shown.swept:
         yield _feature(_geometry(shapely.union_all(swept)), kind="swept")
     times = shown.track.switching_times
-    times = np.array([shown.driven.start_time]) if not len(times) else times
-    for name, body, track in parts:
+    times = times if len(times) else np.array([shown.mover.start_time])
+    for name, body, track in shown.parts if shown.body else ():
         for time, pose in zip(times.tolist(), track.at(times), strict=True):
             outlines = [solid(Polygon(ring)) for ring in placed(body, pose[None])]
-            yield _feature(
-                _geometry(shapely.union_all(outlines)), kind="body", part=name, time_s=time,
-                heading_rad=float(pose[2]),
-            )  # fmt: skip
+            facts = {"part": name, "time_s": time, "heading_rad": float(pose[2])}
+            yield _feature(_geometry(shapely.union_all(outlines)), kind="body", **facts)
 
 
 def _ends(shown: Shown) -> Iterator[dict[str, Any]]:
-    driven = shown.driven
-    yield _feature(_point(driven.start), kind="start", heading_rad=float(driven.start[2]))
-    for goal in shown.scene.goals:
+    mover = shown.mover
+    yield _feature(_point(mover.start), kind="start", heading_rad=float(mover.start[2]))
+    for goal in mover.goals:
         heading = None if goal.free_heading else float(goal.pose[2])
-        yield _feature(
-            _point(goal.pose), kind="goal", heading_rad=heading, tolerance_m=goal.tolerance_m
-        )
-    for region in driven.scene.goals if driven.scene else ():
+        facts = {"heading_rad": heading, "tolerance_m": goal.tolerance_m}
+        yield _feature(_point(goal.pose), kind="goal", **facts)
+    for region in mover.road.scene.goals if mover.road else ():
+        when = [time if math.isfinite(time) else None for time in region.time]
         for place in region.places or ():
-            yield _feature(_geometry(solid(place)), kind="goal", time_s=_limits(region.time))
+            yield _feature(_geometry(solid(place)), kind="goal", time_s=when)
 
 
-def _around(shown: Shown) -> Iterator[dict[str, Any]]:
+def _around(recording: Recording) -> Iterator[dict[str, Any]]:
     import shapely
 
-    for one, geometry, time in placed_solids(shown.scene.obstacles, shown):
+    for one, geometry, time in solids_of(recording):
         facts: dict[str, Any] = {"name": one.name}
         if isinstance(one, Obstacle) and one.height is not None:
             facts["height_m"] = list(one.height)
         if isinstance(one, Obstacle) and one.motion is not None:
             facts["time_s"] = time
         yield _feature(_geometry(geometry), kind="obstacle", **facts)
-    for zone in shown.driven.problem.zones if shown.driven.problem else ():
+    for zone in recording.world.zones:
         yield _feature(_geometry(solid(zone.shape)), kind="zone", name=zone.name)
-    for lanelet in shown.driven.scene.lanelets if shown.driven.scene else ():
+    road = recording.movers[0].road
+    for lanelet in road.scene.lanelets if road else ():
         area = shapely.make_valid(shapely.Polygon(lanelet.ring), method="structure")
         yield _feature(_geometry(area), kind="lanelet", id=lanelet.number)
 
@@ -152,19 +150,13 @@ def _feature(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[st
     return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": geometry}
 
 
-def _limits(values: tuple[float, float]) -> list[float | None]:
-    """An interval; null where it has no end."""
-    return [value if math.isfinite(value) else None for value in values]
-
-
 def _places(poses: Array) -> Array:
     return poses[:, [k for k in PLACES if k < poses.shape[1]]]
 
 
 def _line(places: Array) -> dict[str, Any]:
     """A line along places (n, 2) or (n, 3); a point where they are all the same."""
-    new = np.append(True, (np.diff(places, axis=0) != 0.0).any(axis=1))
-    kept = places[new]
+    kept = places[np.append(True, (np.diff(places, axis=0) != 0.0).any(axis=1))]
     if len(kept) == 1:
         return {"type": "Point", "coordinates": kept[0].tolist()}
     return {"type": "LineString", "coordinates": kept.tolist()}
@@ -178,6 +170,5 @@ def _geometry(geometry: Any) -> dict[str, Any]:
     """A polygon, or several, outer rings to the left as RFC 7946 wants them."""
     import shapely
 
-    turned = shapely.orient_polygons(geometry)
-    said: dict[str, Any] = json.loads(shapely.to_geojson(turned))
+    said: dict[str, Any] = json.loads(shapely.to_geojson(shapely.orient_polygons(geometry)))
     return said

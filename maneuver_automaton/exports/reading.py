@@ -1,11 +1,11 @@
-"""A plan.json or closed_loop.json, and the problem it answers, as what is to be exported."""
+"""A plan.json or closed_loop.json, and the problem it answers, as a recording."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,28 @@ from maneuver_automaton._arrays import as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.exports.driven import Driven, driven_of, driven_on_road
 from maneuver_automaton.formats.closed_loop_json import load_closed_loop, read_closed_loop_document
-from maneuver_automaton.formats.plan_json import load_plan, plan_of_document, read_plan_document
+from maneuver_automaton.formats.fleet_json import load_fleet
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.formats.plan_json import (
+    load_plan,
+    load_plans,
+    plan_of_document,
+    read_fleet_document,
+    read_plan_document,
+)
+from maneuver_automaton.models import Model
+from maneuver_automaton.recording import Mover, Recording, recording_of
+from maneuver_automaton.recording.values import bodies_of, world_of
+from maneuver_automaton.roads import (
+    RoadFleetResult,
+    RoadPlanner,
+    RoadPlanResult,
+    RoadVerdict,
+    road_planner,
+)
+from maneuver_automaton.roads.plans import plan_of_controls
+from maneuver_automaton.roads.several import judged_together, nearest_pairs
 from maneuver_automaton.scenario import (
     FleetScenario,
     RoadScenario,
@@ -24,21 +43,17 @@ from maneuver_automaton.scenario import (
     load_scenario,
 )
 
-if TYPE_CHECKING:
-    from maneuver_automaton.models import Model
-    from maneuver_automaton.roads import RoadFleetResult
-
 START_TOLERANCE = 1e-6  # [m, rad] between the first pose of a plan and the start of its problem
 
 
-def load_driven(
+def load_recording(
     path: Path | str,
     *,
     beside: Path | str | None = None,
     case: int | None = None,
     model: Model | None = None,
-) -> Driven:
-    """The plan, loop or drive of a plan.json or closed_loop.json.
+) -> Recording:
+    """The plans, loops or drives of a plan.json or closed_loop.json.
 
     Parameters
     ----------
@@ -58,22 +73,29 @@ def load_driven(
         If a file cannot be read, or the scenario is another one.
     """
     path = Path(path)
-    loop = read_closed_loop_document(path)
-    problem = None
-    if beside is not None:
-        problem = load_scenario(beside, case=case, model=model)
-    elif loop is not None:
-        raise InvalidScenario(
-            f"{path}: is a closed loop, need --with and the scenario it was driven in"
-        )
-    if isinstance(problem, RoadScenario):
-        return _on_road(path, problem, loop)
-    if isinstance(problem, FleetScenario):
-        raise InvalidScenario(f"{beside}: states several vehicles, need the scenario of one")
+    loop, fleet = read_closed_loop_document(path), read_fleet_document(path)
+    if beside is None:
+        if loop is not None:
+            raise InvalidScenario(
+                f"{path}: is a closed loop, need --with and the scenario it was driven in"
+            )
+        return _alone(path, fleet)
+    scenario = load_scenario(beside, case=case, model=model)
+    if isinstance(scenario, RoadScenario):
+        if fleet is not None:
+            return recording_of(load_road_fleet(path, beside=beside))
+        return _on_road(path, scenario, loop)
+    if isinstance(scenario, FleetScenario):
+        if fleet is None:
+            raise InvalidScenario(f"{beside}: states several vehicles, need the scenario of one")
+        load = load_fleet if loop is None else load_fleet_loop
+        return replace(recording_of(load(path, scenario.fleet)), title=scenario.name)
+    if fleet is not None:
+        raise InvalidScenario(f"{path}: holds several vehicles, but {beside} states one")
     if loop is not None:
-        assert problem is not None
-        return replace(driven_of(load_closed_loop(path, problem.problem)), name=problem.name)
-    return _planned(path, problem)
+        recording = recording_of(load_closed_loop(path, scenario.problem))
+        return replace(recording, title=scenario.name)
+    return _planned(path, scenario)
 
 
 def load_road_fleet(
@@ -104,10 +126,6 @@ def load_road_fleet(
     InvalidScenario
         If a file cannot be read, nobody has a plan, or a vehicle is none of the planning problems.
     """
-    from maneuver_automaton.formats.plan_json import read_fleet_document
-    from maneuver_automaton.roads import RoadFleetResult, RoadPlanResult, road_planner
-    from maneuver_automaton.roads.several import judged_together, nearest_pairs
-
     path, document = Path(path), read_fleet_document(path)
     roads = {
         str(k if one.scene.benchmark is None else one.scene.benchmark.problem): one
@@ -135,14 +153,7 @@ def load_road_fleet(
     its = next(iter(roads.values())).vehicle
     verdicts = judged_together(scenes, its, plans)
     results = {
-        name: RoadPlanResult(
-            planner=road_planner(scenes[name], its),
-            decision=None,
-            plan=plans.get(name),
-            verdict=verdicts.get(name),
-            reason=str(one.get("reason") or ""),
-            search_s=0.0,
-        )
+        name: _answer(road_planner(scenes[name], its), plans.get(name), one, verdicts.get(name))
         for name, one in stated.items()
     }
     return RoadFleetResult(
@@ -151,6 +162,18 @@ def load_road_fleet(
         pairs=nearest_pairs(its, plans),
         order=tuple(stated),
         search_s=0.0,
+    )
+
+
+def _answer(
+    planner: RoadPlanner,
+    plan: Plan | None,
+    document: Mapping[str, Any],
+    verdict: RoadVerdict | None = None,
+) -> RoadPlanResult:
+    reason = str(document.get("reason") or "")
+    return RoadPlanResult(
+        planner=planner, decision=None, plan=plan, verdict=verdict, reason=reason, search_s=0.0
     )
 
 
@@ -170,31 +193,30 @@ def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -
     return plan
 
 
-def _planned(path: Path, scenario: Scenario | None) -> Driven:
-    """The plan of a plan.json, in the world of its scenario if that is known."""
-    document, plan = read_plan_document(path), load_plan(path)
-    if scenario is None:
-        return Driven(
-            pieces=(plan,),
-            end=plan.end,
-            cost=document.get("cost"),
-            reduced_names=_names(document, "reduced_state"),
-            control_names=_names(document, "control"),
-        )
-    problem = scenario.problem
+def _alone(path: Path, fleet: Mapping[str, Any] | None) -> Recording:
+    """The plans of a file, of which no more is known than it says."""
+    if fleet is None:
+        document, plan = read_plan_document(path), load_plan(path)
+        names = (_names(document, "reduced_state"), _names(document, "control"))
+        movers = [Mover(pieces=(plan,), cost=document.get("cost"), names=names)]
+    else:
+        movers = [Mover(name=name, pieces=(plan,)) for name, plan in load_plans(path).items()]
+    return Recording(kind="plan" if fleet is None else "fleet", title="", movers=tuple(movers))
+
+
+def _planned(path: Path, scenario: Scenario) -> Recording:
+    """The plan of a plan.json in the world of its scenario."""
+    document, plan, problem = read_plan_document(path), load_plan(path), scenario.problem
     if document["automaton_hash"] != automaton_hash(problem.automaton):
         raise InvalidScenario(
             f"{path}: automaton_hash: this plan was made with another library than that of --with"
         )
     _check_start(path, plan, problem.start)
-    return Driven(
-        pieces=(plan,),
-        end=plan.end,
-        model=problem.automaton.model,
-        problem=problem,
-        name=scenario.name,
+    mover = Mover(
+        pieces=(plan,), model=problem.automaton.model, bodies=bodies_of(problem), problem=problem,
         cost=document.get("cost"),
-    )
+    )  # fmt: skip
+    return Recording(kind="plan", title=scenario.name, movers=(mover,), world=world_of(problem))
 
 
 def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
@@ -204,25 +226,21 @@ def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
     return tuple(map(str, names)) if isinstance(names, list) else ()
 
 
-def _on_road(path: Path, road: RoadScenario, loop: Mapping[str, Any] | None) -> Driven:
+def _on_road(path: Path, road: RoadScenario, loop: Mapping[str, Any] | None) -> Recording:
     """The plan or drive on a road, whose file has the rear axle's poses."""
     document = read_plan_document(path) if loop is None else loop
     plan = _plan_on_road(path, document, road)
     if plan is None:
         raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
-    return driven_on_road(
-        road.scene,
-        road.vehicle,
-        plan,
-        cost=document.get("cost"),
-        reached=loop is None or bool(loop["reached"]),
-    )
+    found = _answer(road_planner(road.scene, road.vehicle), plan, document)
+    recording = recording_of(found)
+    reached = loop is None or bool(loop["reached"])
+    mover = replace(recording.movers[0], cost=document.get("cost"), reached=reached)
+    return replace(recording, movers=(mover,))
 
 
 def _road_drive(loop: Mapping[str, Any], road: RoadScenario) -> Plan:
     """What was driven on a road: the controls of all steps from the first state."""
-    from maneuver_automaton.roads.plans import plan_of_controls
-
     first, *_ = steps = loop["steps"]
     if "vehicle_pose" in first:
         raise ValueError("is a closed loop, but the scenario of --with is a road; need its own")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import uuid
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,35 +13,31 @@ from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.driven import driven_of
+from maneuver_automaton.exports.recorded import exported, title_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
-from maneuver_automaton.plotting.bodies import SWEPT
-from maneuver_automaton.plotting.colors import Color
+from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
-from maneuver_automaton.plotting.roads import EGO, GOAL, LANE
-from maneuver_automaton.plotting.swept import merged, swept_region
-from maneuver_automaton.roads.scene import presence_of
-
-if TYPE_CHECKING:
-    from maneuver_automaton.exports.driven import Exportable
+from maneuver_automaton.recording import Mover, Recording
 
 APPLICATION = "maneuver_automaton"
 TIMELINE = "plan"  # [s] on the clock of the plan
 WORLD = "world"
 STEP = 0.05  # [s]
+BODY, GOAL = SEQUENCE[0], SEQUENCE[2]
 
 
-def save_rerun(value: Exportable, path: Path | str, *, step: float = STEP) -> None:
-    """Write a plan, a closed loop or a drive as a recording (.rrd) for the viewer of rerun.
+def save_rerun(value: Any, path: Path | str, *, step: float = STEP) -> None:
+    """Write a plan, a closed loop, a fleet or a drive as a recording (.rrd) for rerun's viewer.
 
     Below `world` are the vehicle and what it carries as moving outlines, the path, the swept
-    region, goals and obstacles; below `curves` its speeds, reduced state and control over time.
-    Times are those of the plan, on the timeline `plan`.
+    region, goals and obstacles; below `curves` its speeds, reduced state and control over time. Of
+    several vehicles each has its own part of both, by its name. Times are those of the plan, on the
+    timeline `plan`.
 
     Parameters
     ----------
-    value : Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive
+    value : any result, or a Recording
         A Plan alone knows neither body nor obstacles.
     path : Path or str
         The file.
@@ -52,8 +48,10 @@ def save_rerun(value: Exportable, path: Path | str, *, step: float = STEP) -> No
     ------
     MissingExtra
         If rerun-sdk is not installed.
+    TypeError
+        If nobody moves in the value.
     ValueError
-        If a result has no plan, or `step` is not positive.
+        If nobody has a plan, or `step` is not positive.
     OSError
         If the file cannot be written.
 
@@ -71,22 +69,26 @@ def save_rerun(value: Exportable, path: Path | str, *, step: float = STEP) -> No
         raise MissingExtra(
             "rerun: rerun-sdk is not installed; need pip install 'maneuver-automaton[rerun]'"
         ) from error
-    driven = driven_of(value)
-    rows, shown, target = driven.rows(step=step), shown_of(driven), Path(path)
+    recording, target = exported(value), Path(path)
+    rows = [one.rows(step=step) for one in recording.movers]
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = target.parent / f"{PART}{uuid.uuid4().hex}"
     beside.touch()  # where that fails, the error names the folder; that of rerun does not
     try:
-        recording = rerun.RecordingStream(APPLICATION)
-        recording.save(beside, default_blueprint=_blueprint(rerun.blueprint))
-        log = _Log(rerun, recording)
-        recording.send_recording_name(driven.name or target.stem)
+        stream = rerun.RecordingStream(APPLICATION)
+        stream.save(beside, default_blueprint=_blueprint(rerun.blueprint))
+        log = _Log(rerun, stream)
+        stream.send_recording_name(title_of(recording, target))
         log.fixed(WORLD, rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
-        _log_motion(log, shown, rows)
-        _log_surroundings(log, shown)
-        _log_curves(log, rows)
-        recording.flush()
-        recording.disconnect()
+        several = len(recording.movers) > 1
+        for mover, table in zip(recording.movers, rows, strict=True):
+            names = (mover.name,) if several else ()
+            _log_motion(log, shown_of(mover), table, names)
+            _log_goals(log, mover, names)
+            _log_curves(log, table, names)
+        _log_surroundings(log, recording)
+        stream.flush()
+        stream.disconnect()
         beside.replace(target)
     finally:
         beside.unlink(missing_ok=True)
@@ -134,12 +136,12 @@ class _Log:
         return self.rerun.TimeColumn(TIMELINE, duration=times)
 
 
-def _log_motion(log: _Log, shown: Shown, rows: PlanArrays) -> None:
+def _log_motion(log: _Log, shown: Shown, rows: PlanArrays, names: tuple[str, ...]) -> None:
     """Path and swept region as they are, bodies as they move, primitives as they begin."""
-    track, colors = shown.track, track_colors(shown.track.twists)
+    mover, track, colors = shown.mover, shown.track, track_colors(shown.track.twists)
     if track.pieces:
         log.fixed(
-            f"{WORLD}/path",
+            log.entity(WORLD, *names, "path"),
             log.rerun.LineStrips3D(
                 [_places(piece.pose) for piece in track.pieces],
                 colors=[_bytes(colors[piece.name]) for piece in track.pieces],
@@ -147,43 +149,40 @@ def _log_motion(log: _Log, shown: Shown, rows: PlanArrays) -> None:
                 show_labels=False,
             ),
         )
-    swept = merged([one for _, body, part in shown.parts for one in swept_region(part, body)])
-    if rings := [ring for one in swept for ring in _rings(one, 0.0)]:
-        log.fixed(f"{WORLD}/swept", log.outlines(rings, SWEPT))
-    problem = shown.driven.problem
-    low, high = (0.0, 0.0) if problem is None else problem.body_height
+    if rings := [ring for one in shown.swept for ring in _rings(one, 0.0)]:
+        log.fixed(log.entity(WORLD, *names, "swept"), log.outlines(rings, SWEPT))
+    low, high = (0.0, 0.0) if mover.problem is None else mover.problem.body_height
     for name, body, part in shown.parts:
-        poses = rows.pose if name == "vehicle" else part.at(rows.time)
-        frame = log.entity(WORLD, name)
-        log.moves(frame, rows.time, poses)
+        frame = log.entity(WORLD, *names, name)
+        log.moves(frame, rows.time, rows.pose if part is track else part.at(rows.time))
         if body:
             rings = [_raised(ring, z) for ring in body for z in sorted({low, high})]
-            log.fixed(f"{frame}/body", log.outlines(rings, EGO))
+            log.fixed(f"{frame}/body", log.outlines(rings, BODY))
         else:
             log.fixed(f"{frame}/body", log.rerun.Points3D([[0.0, 0.0, 0.0]], radii=[0.05]))
     for piece in track.pieces:
-        log.at_time("primitive", float(piece.time[0]), log.rerun.TextLog(piece.name))
+        at = log.entity("primitive", *names)
+        log.at_time(at, float(piece.time[0]), log.rerun.TextLog(piece.name))
 
 
-def _log_surroundings(log: _Log, shown: Shown) -> None:
-    """Start, goals, lanelets and obstacles."""
-    driven = shown.driven
-    for k, goal in enumerate(shown.scene.goals):
-        heading = float(goal.pose[2])
-        arrow = log.rerun.Arrows3D(
-            origins=_places(goal.pose[None]),
-            vectors=[[np.cos(heading), np.sin(heading), 0.0]],
-            colors=[_bytes(GOAL)],
-        )
-        spot = log.rerun.Points3D(_places(goal.pose[None]), colors=[_bytes(GOAL)], radii=[0.1])
-        log.fixed(f"{WORLD}/goals/{k}", spot if goal.free_heading else arrow)
-    if driven.scene is not None:
-        lanes = [_raised(lanelet.ring, 0.0) for lanelet in driven.scene.lanelets]
+def _log_goals(log: _Log, mover: Mover, names: tuple[str, ...]) -> None:
+    for k, goal in enumerate(mover.goals):
+        at, heading = _places(goal.pose[None]), float(goal.pose[2])
+        along = [[np.cos(heading), np.sin(heading), 0.0]]
+        arrow = log.rerun.Arrows3D(origins=at, vectors=along, colors=[_bytes(GOAL)])
+        spot = log.rerun.Points3D(at, colors=[_bytes(GOAL)], radii=[0.1])
+        log.fixed(log.entity(WORLD, *names, "goals", k), spot if goal.free_heading else arrow)
+    if rings := [ring for place in mover.regions for ring in _rings(solid(place), 0.0)]:
+        log.fixed(log.entity(WORLD, *names, "goals", "regions"), log.outlines(rings, GOAL))
+
+
+def _log_surroundings(log: _Log, recording: Recording) -> None:
+    """Lanelets and obstacles."""
+    world = recording.world
+    if world.lanes:
+        lanes = [_raised(ring, 0.0) for ring in world.lanes]
         log.fixed(f"{WORLD}/lanelets", log.outlines(lanes, LANE))
-        places = [place for goal in driven.scene.goals for place in goal.places or ()]
-        if rings := [ring for place in places for ring in _rings(solid(place), 0.0)]:
-            log.fixed(f"{WORLD}/goals/regions", log.outlines(rings, GOAL))
-    for k, one in enumerate(shown.scene.obstacles):
+    for k, one in enumerate(world.obstacles):
         at = log.entity(WORLD, "obstacles", f"{k} {one.name}".strip())
         if isinstance(one, OccupancyMap):
             if one.blocked.any():
@@ -193,14 +192,16 @@ def _log_surroundings(log: _Log, shown: Shown) -> None:
         if one.motion is None:
             log.fixed(at, log.outlines(rings, SOLID))
         else:
-            _log_moving(log, shown, one, at, rings)
+            _log_moving(log, recording, one, at, rings)
 
 
-def _log_moving(log: _Log, shown: Shown, one: Obstacle, at: str, rings: list[Array]) -> None:
+def _log_moving(
+    log: _Log, recording: Recording, one: Obstacle, at: str, rings: list[Array]
+) -> None:
     """A moving obstacle as long as it is there; on roads, as long as it was recorded."""
     assert one.motion is not None
-    begin, end = shown.driven.start_time, shown.driven.start_time + shown.driven.duration
-    first, last = presence_of(one) if shown.leaves else (begin, end)
+    begin, end = recording.begin, recording.end
+    first, last = one.motion.time[[0, -1]].tolist() if recording.world.fleeting else (begin, end)
     low, high = max(first, begin), min(last, end)
     if low > high:
         return
@@ -211,12 +212,11 @@ def _log_moving(log: _Log, shown: Shown, one: Obstacle, at: str, rings: list[Arr
         log.at_time(f"{at}/body", last, log.rerun.Clear(recursive=False))
 
 
-def _log_curves(log: _Log, rows: PlanArrays) -> None:
+def _log_curves(log: _Log, rows: PlanArrays, names: tuple[str, ...]) -> None:
     """Speeds, reduced state and control over time; a pose shows in space."""
-    dof = rows.pose.shape[1]
-    names = list(rows.columns())[1 + dof : -1]
-    for name in names:
-        log.curve(log.entity("curves", name), rows.time, rows.columns()[name], name)
+    columns = rows.columns()
+    for name in list(columns)[1 + rows.pose.shape[1] : -1]:
+        log.curve(log.entity("curves", *names, name), rows.time, columns[name], name)
 
 
 def _blueprint(views: Any) -> Any:

@@ -1,78 +1,58 @@
-"""A motion among its surroundings, as formats that draw need it: track, bodies, solid regions."""
+"""Those who move and what is around them, as formats that draw need it: tracks, solid regions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.collision import Disc, Obstacle, OccupancyMap, Shape
+from maneuver_automaton.collision import Disc, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.rectangles import blocked_rectangles
-from maneuver_automaton.exports.driven import Driven
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.closed_loop_track import joined_track
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.obstacles import round_times
-from maneuver_automaton.plotting.paths import bare_scene
-from maneuver_automaton.plotting.scene import Carried, Scene, scene_of
-from maneuver_automaton.plotting.track import Track
-from maneuver_automaton.roads.scene import presence_of
+from maneuver_automaton.plotting.swept import merged, swept_region
+from maneuver_automaton.plotting.track import Track, joined_track
+from maneuver_automaton.recording import Mover, Recording
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Shown:
-    """What is shown of a plan, a loop or a drive."""
+    """Who moves, with a name, outlines (n, 2) [m] and a track of it and of all that it carries."""
 
-    driven: Driven
-    track: Track
-    scene: Scene  # goals, obstacles, bodies; the times at which moving obstacles are shown
-
-    @property
-    def parts(self) -> list[tuple[str, tuple[Array, ...], Track]]:
-        """Name, outlines (n, 2) [m] and track of the vehicle, then of what it carries."""
-        scene = self.scene
-        carried = [(part.name, part.body, part.track) for part in scene.carried]
-        return [("vehicle", scene.body, self.track), *carried]
+    mover: Mover
+    parts: tuple[tuple[str, tuple[Array, ...], Track], ...]
 
     @property
-    def leaves(self) -> bool:
-        """Whether moving obstacles are there for their motion only, as on roads."""
-        return self.driven.scene is not None
+    def track(self) -> Track:
+        """Where the vehicle itself goes."""
+        return self.parts[0][2]
 
-    def is_there(self, obstacle: Obstacle, time: float) -> bool:
-        """Whether an obstacle is there at a time [s]."""
-        first, last = presence_of(obstacle) if self.leaves else (-np.inf, np.inf)
-        return first <= time <= last
+    @property
+    def body(self) -> tuple[Array, ...]:
+        """Outlines of the vehicle itself; none if they are not known."""
+        return self.parts[0][1]
 
-
-def shown_of(driven: Driven) -> Shown:
-    """A motion among its surroundings, as far as these are known."""
-    track = joined_track(driven.start, driven.pieces)
-    times = round_times(driven.start_time, driven.start_time + driven.duration)
-    if driven.scene is not None and driven.vehicle is not None:
-        body = tuple(footprint_polygons(driven.vehicle.footprint))
-        scene = Scene(goals=(), obstacles=tuple(driven.scene.traffic), body=body, times=times)
-        return Shown(driven=driven, track=track, scene=scene)
-    if driven.problem is None:
-        scene = replace(bare_scene(track, footprint=None), goals=(), times=times)
-        return Shown(driven=driven, track=track, scene=scene)
-    problem = driven.problem
-    scene = scene_of(problem, driven.start_time, driven.start_time + driven.duration)
-    carried = tuple(
-        Carried(name=name, body=tuple(footprint_polygons(shapes)), track=_carried(driven, name))
-        for name, shapes in problem.parts.items()
-        if track.pieces
-    )
-    return Shown(driven=driven, track=track, scene=replace(scene, carried=carried))
+    @property
+    def swept(self) -> list[Any]:
+        """Polygons of shapely that all parts sweep."""
+        return merged(
+            [one for _, body, track in self.parts if body for one in swept_region(track, body)]
+        )
 
 
-def _carried(driven: Driven, part: str) -> Track:
-    plans = driven.carried(part)
-    return joined_track(plans[0].start, plans)
+def shown_of(mover: Mover) -> Shown:
+    """A mover with its track; one that goes nowhere shows itself alone."""
+    carried = mover.parts[1:] if mover.duration > 0.0 else ()
+    names = ["vehicle", *(one.name for one in carried)]
+    rows = [
+        (name, tuple(footprint_polygons(list(one.bodies.get("", ())))),
+         joined_track(one.start, one.pieces))
+        for name, one in zip(names, (mover, *carried), strict=True)
+    ]  # fmt: skip
+    return Shown(mover, tuple(rows))
 
 
 def solid(shape: Shape) -> Any:
@@ -96,6 +76,7 @@ def solid_map(cells: OccupancyMap) -> Any:
 
     Examples
     --------
+    >>> import numpy as np
     >>> corner = OccupancyMap(np.array([[1, 1], [1, 0]], dtype=bool), resolution=0.5)
     >>> solid_map(corner).area
     0.75
@@ -107,15 +88,16 @@ def solid_map(cells: OccupancyMap) -> Any:
     return shapely.transform(whole, SE2(cells.origin).act)
 
 
-def placed_solids(obstacles: Iterable[Any], shown: Shown) -> Iterator[tuple[Any, Any, float]]:
+def solids_of(recording: Recording) -> Iterator[tuple[Any, Any, float]]:
     """Obstacles with their geometry and a time [s]: each static one once, each moving one often."""
-    for one in obstacles:
+    world, begin = recording.world, recording.begin
+    times = round_times(begin, recording.end).tolist()
+    for one in world.obstacles:
         if isinstance(one, OccupancyMap):
             if one.blocked.any():
-                yield one, solid_map(one), shown.driven.start_time
+                yield one, solid_map(one), begin
         elif one.motion is None:
-            yield one, solid(one.shape), shown.driven.start_time
+            yield one, solid(one.shape), begin
         else:
-            for time in shown.scene.times.tolist():
-                if shown.is_there(one, time):
-                    yield one, solid(one.at(time)), time
+            for time in (time for time in times if world.is_there(one, time)):
+                yield one, solid(one.at(time)), time

@@ -5,34 +5,29 @@ from __future__ import annotations
 import csv
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from maneuver_automaton._files import write_text_atomically
-from maneuver_automaton.exports.driven import driven_of
 from maneuver_automaton.exports.kinematics import kinematics
+from maneuver_automaton.exports.recorded import drivers, exported
 from maneuver_automaton.models import Model
-
-if TYPE_CHECKING:
-    from maneuver_automaton.exports.driven import Exportable
+from maneuver_automaton.recording import Mover
 
 
 def save_csv(
-    value: Exportable,
-    path: Path | str,
-    *,
-    step: float | None = None,
-    model: Model | None = None,
+    value: Any, path: Path | str, *, step: float | None = None, model: Model | None = None
 ) -> None:
-    """Write a plan, a closed loop or a drive as CSV: a line of names, then one line an instant.
+    """Write a plan, a closed loop, a fleet or a drive as CSV: names, then one line an instant.
 
     Before the last column of `Plan.as_arrays`, the primitive, stand those of the path: arc length,
     curvature, steering angle, and, where the model is known, accelerations and jerk, as far as the
-    vehicle has them.
+    vehicle has them. Of several vehicles the first column names the vehicle, whose lines follow
+    each other; a column that it does not have is empty.
 
     Parameters
     ----------
-    value : Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive
-        All but a Plan bring their model along.
+    value : any result, or a Recording
+        All but a Plan bring their models along.
     path : Path or str
         The file.
     step : float, optional
@@ -42,8 +37,10 @@ def save_csv(
 
     Raises
     ------
+    TypeError
+        If nobody moves in the value.
     ValueError
-        If a result has no plan, or a maneuver no course.
+        If nobody has a plan, or a maneuver has no course.
     OSError
         If the file cannot be written.
 
@@ -57,14 +54,23 @@ def save_csv(
     >>> print((folder / "plan.csv").read_text().splitlines()[2])
     1.0,1.0,0.0,0.0,1.0,0.0,0.0,1.0,1.0,0.0,ahead
     """
-    driven = driven_of(value, model=model)
-    samples = driven.rows()
-    rows = samples if step is None else driven.rows(step=step)
-    columns = rows.columns()
-    primitive = columns.pop("primitive")  # stays the last one
-    columns |= {**kinematics(rows, samples, driven.model), "primitive": primitive}
+    recording = exported(value, model=model)
+    tables = {one.name: _columns(one, step) for one in drivers(recording)}
+    names = list(dict.fromkeys(name for table in tables.values() for name in table))
+    names.append(names.pop(names.index("primitive")))  # stays the last one
+    several = len(recording.movers) > 1
     text = io.StringIO()
     lines = csv.writer(text, lineterminator="\n")
-    lines.writerow(columns)
-    lines.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+    lines.writerow(["vehicle", *names] if several else names)
+    for name, table in tables.items():
+        nothing = [""] * len(table["primitive"])
+        rows = zip(*(table.get(column, nothing) for column in names), strict=True)
+        lines.writerows([name, *row] if several else row for row in rows)
     write_text_atomically(Path(path), text.getvalue())
+
+
+def _columns(mover: Mover, step: float | None) -> dict[str, list[Any]]:
+    samples = mover.rows()
+    rows = samples if step is None else mover.rows(step=step)
+    columns = rows.columns() | kinematics(rows, samples, mover.model)
+    return {name: column.tolist() for name, column in columns.items()}

@@ -1,8 +1,8 @@
-"""Pictures: draw on the axes given and return the artists, or write a whole figure to a file.
+"""Pictures, films and players of any result.
 
-`draw_plan(ax, plan)` and others that begin with ``draw_`` draw on axes of Matplotlib; those with
-``save_`` and ``figure_`` write a file, whose ending says the format. `draw_fleet` makes a whole
-figure, `animate_fleet` writes a film. ``dir`` lists them.
+`save_picture(result, path)` and `save_film(result, path)` write files, whose ending says the
+format; `draw_plane(ax, result)` draws on axes of Matplotlib; `player_of(result)` is a page. ``dir``
+lists them, and what draws automata and studies.
 """
 
 from __future__ import annotations
@@ -12,151 +12,61 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
-    from maneuver_automaton.plotting.alternatives import draw_alternatives as draw_alternatives
-    from maneuver_automaton.plotting.alternatives_figure import (
-        save_alternatives_figure as save_alternatives_figure,
-    )
-    from maneuver_automaton.plotting.animation import save_plan_animation as save_plan_animation
     from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
     from maneuver_automaton.plotting.automata import draw_motions as draw_motions
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
-    from maneuver_automaton.plotting.closed_loop import (
-        save_closed_loop_figure as save_closed_loop_figure,
-    )
-    from maneuver_automaton.plotting.closed_loop_animation import (
-        save_closed_loop_animation as save_closed_loop_animation,
-    )
-    from maneuver_automaton.plotting.closed_loop_plane import draw_closed_loop as draw_closed_loop
-    from maneuver_automaton.plotting.closed_loop_time import draw_solve_times as draw_solve_times
-    from maneuver_automaton.plotting.closed_loop_time import draw_value as draw_value
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
     from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
-    from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
-    from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
-    from maneuver_automaton.plotting.effort import save_retiming_figure as save_retiming_figure
-    from maneuver_automaton.plotting.effort import (
-        save_uniform_effort_figure as save_uniform_effort_figure,
-    )
     from maneuver_automaton.plotting.factors import draw_factor as draw_factor
     from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
-    from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
-    from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
-    from maneuver_automaton.plotting.fleet import draw_fleet as draw_fleet
-    from maneuver_automaton.plotting.fleet import save_fleet_figure as save_fleet_figure
-    from maneuver_automaton.plotting.fleet_animation import animate_fleet as animate_fleet
-    from maneuver_automaton.plotting.fleet_loop import draw_fleet_loop as draw_fleet_loop
-    from maneuver_automaton.plotting.fleet_loop import (
-        save_fleet_loop_figure as save_fleet_loop_figure,
-    )
-    from maneuver_automaton.plotting.fleet_loop_animation import (
-        animate_fleet_loop as animate_fleet_loop,
-    )
+    from maneuver_automaton.plotting.films import film_of as film_of
+    from maneuver_automaton.plotting.films import save_film as save_film
     from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
     from maneuver_automaton.plotting.labels import control_labels as control_labels
-    from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
-    from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
     from maneuver_automaton.plotting.look import Look as Look
     from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
     from maneuver_automaton.plotting.motions import track_colors as track_colors
     from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
     from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
-    from maneuver_automaton.plotting.paths import draw_plan as draw_plan
-    from maneuver_automaton.plotting.plan_figures import save_plan_figure as save_plan_figure
-    from maneuver_automaton.plotting.plan_figures import (
-        save_plan_file_figure as save_plan_file_figure,
-    )
+    from maneuver_automaton.plotting.pictures import figure_of as figure_of
+    from maneuver_automaton.plotting.pictures import save_picture as save_picture
+    from maneuver_automaton.plotting.plane import draw_plane as draw_plane
     from maneuver_automaton.plotting.player import Player as Player
     from maneuver_automaton.plotting.player import player_of as player_of
     from maneuver_automaton.plotting.player import player_of_file as player_of_file
     from maneuver_automaton.plotting.progress import draw_progress as draw_progress
     from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
-    from maneuver_automaton.plotting.road_fleets import (
-        save_road_fleet_animation as save_road_fleet_animation,
-    )
-    from maneuver_automaton.plotting.road_fleets import (
-        save_road_fleet_figure as save_road_fleet_figure,
-    )
-    from maneuver_automaton.plotting.roads import draw_road as draw_road
-    from maneuver_automaton.plotting.roads import save_road_animation as save_road_animation
-    from maneuver_automaton.plotting.roads import save_road_figure as save_road_figure
-    from maneuver_automaton.plotting.space import SpaceArtists as SpaceArtists
-    from maneuver_automaton.plotting.space import draw_space as draw_space
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
-    from maneuver_automaton.plotting.space import save_space_figure as save_space_figure
-    from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
-    from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
-    from maneuver_automaton.plotting.stability import draw_distances as draw_distances
-    from maneuver_automaton.plotting.stability import draw_growth as draw_growth
-    from maneuver_automaton.plotting.stability import draw_indices as draw_indices
-    from maneuver_automaton.plotting.stability import draw_loops as draw_loops
-    from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
-    from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure
 
 _HOMES = {
-    "draw_alternatives": "alternatives",
-    "save_alternatives_figure": "alternatives_figure",
-    "save_plan_animation": "animation",
     "draw_automaton": "automata",
     "draw_motions": "automata",
     "save_automaton_figure": "automata",
-    "save_closed_loop_figure": "closed_loop",
-    "save_closed_loop_animation": "closed_loop_animation",
-    "draw_closed_loop": "closed_loop_plane",
-    "draw_solve_times": "closed_loop_time",
-    "draw_value": "closed_loop_time",
     "trim_colors": "colors",
     "draw_altitude": "controls",
     "draw_controls": "controls",
-    "draw_efforts": "effort",
-    "draw_node_efforts": "effort",
-    "save_retiming_figure": "effort",
-    "save_uniform_effort_figure": "effort",
     "draw_factor": "factors",
     "save_factor_figure": "factors",
-    "draw_feasible_slice": "feasible",
-    "save_feasible_figure": "feasible",
-    "draw_fleet": "fleet",
-    "save_fleet_figure": "fleet",
-    "animate_fleet": "fleet_animation",
-    "draw_fleet_loop": "fleet_loop",
-    "save_fleet_loop_figure": "fleet_loop",
-    "animate_fleet_loop": "fleet_loop_animation",
+    "film_of": "films",
+    "save_film": "films",
     "footprint_polygons": "footprint",
     "control_labels": "labels",
-    "figure_shift": "lessons",
-    "figure_symmetry": "lessons",
     "Look": "look",
     "draw_maneuvers": "maneuvers",
     "save_maneuvers_figure": "maneuvers",
     "track_colors": "motions",
     "draw_nodes": "nodes",
     "draw_obstacles": "obstacles",
-    "draw_plan": "paths",
-    "save_plan_figure": "plan_figures",
-    "save_plan_file_figure": "plan_figures",
+    "figure_of": "pictures",
+    "save_picture": "pictures",
+    "draw_plane": "plane",
     "Player": "player",
     "player_of": "player",
     "player_of_file": "player",
     "draw_progress": "progress",
     "save_progress_figure": "progress",
-    "save_road_fleet_animation": "road_fleets",
-    "save_road_fleet_figure": "road_fleets",
-    "draw_road": "roads",
-    "save_road_animation": "roads",
-    "save_road_figure": "roads",
-    "SpaceArtists": "space",
-    "draw_space": "space",
     "flies_among_heights": "space",
-    "save_space_figure": "space",
-    "CertificateCurve": "stability",
-    "DrivenLoop": "stability",
-    "draw_distances": "stability",
-    "draw_growth": "stability",
-    "draw_indices": "stability",
-    "draw_loops": "stability",
-    "save_stability_figure": "stability",
-    "save_turnpike_figure": "turnpike",
 }
 __getattr__, __dir__ = lazily(__name__, _HOMES)

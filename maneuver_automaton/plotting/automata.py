@@ -23,7 +23,6 @@ from maneuver_automaton.plotting.automata_arrows import (
     motion,
     trim_pictures,
 )
-from maneuver_automaton.plotting.bodies import DART
 from maneuver_automaton.plotting.colors import GREY, INK, Color, twist_color
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers
@@ -36,6 +35,7 @@ from maneuver_automaton.plotting.pages import (
     title_lines,
     write_figure,
 )
+from maneuver_automaton.plotting.paths import DART
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
 
 MOST_NODES = 30

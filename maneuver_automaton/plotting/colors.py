@@ -58,6 +58,8 @@ TEN: tuple[Color, ...] = (
     (0.52, 0.33, 0.18),
     (0.90, 0.68, 0.00),
 )
+SWEPT: Color = (0.36, 0.60, 0.85)
+LANE: Color = (0.91, 0.91, 0.92)
 NEGLIGIBLE = 1e-6  # of the largest component of a twist
 ALIKE = 0.13  # distance in RGB
 SHADES = (0.0, -0.2, -0.36, 0.25, 0.42, -0.5, 0.58)  # towards white, towards black

@@ -29,7 +29,7 @@ STYLES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
 TIME_LABEL = "time [s]"
 CONSTANT, NEAR = 0.02, 0.2  # of the largest value: varies less, or more, then zero is in view
 CROWDED = 30  # pieces from which on lines where trims change would hide what they part
-CHARACTER, OVER = 0.061, 0.14  # [in] of a label, and how far it may stand over its axes
+CHARACTER, OVER = 0.066, 0.1  # [in] of a label, and how far it may stand over its axes
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -196,12 +196,12 @@ def draw_over_time(
     ax.add_collection(artists.jumps)
     ax.add_collection(artists.switches, autolim=False)
     _set_limits(ax, times, curves)
-    tidy(ax, x=TIME_LABEL, y=_within(ax, label))
+    tidy(ax, x=TIME_LABEL, y=within(ax, label))
     ax.grid(visible=False, axis="x")
     return artists
 
 
-def _within(ax: Axes, label: str) -> str:
+def within(ax: Axes, label: str) -> str:
     """The label, in lines where it is longer than the axes are high."""
     high = ax.bbox.height / ax.get_figure(root=True).dpi  # type: ignore[union-attr]
     most = max(12, int((high + OVER) / CHARACTER))

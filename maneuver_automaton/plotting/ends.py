@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,48 +14,34 @@ from matplotlib.quiver import Quiver
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color
+from maneuver_automaton.plotting.style import mark_handle
 from maneuver_automaton.problem import Goal
 
 ARROW_SIZE = 0.13  # of the size of the path
 SET: Color = (0.00, 0.62, 0.45)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class EndArtists:
-    """Where a vehicle starts and is to end."""
-
-    start: PathCollection
-    goals: tuple[PathCollection, ...]
-    rings: tuple[PathCollection, ...]  # around the goals that any heading will do for
-    sets: tuple[Circle, ...]  # places within the tolerance of a goal
-    headings: Quiver  # of the start, and of the goals that ask for one
-
-
 def draw_ends(
     ax: Axes, start: Array, goals: Sequence[Goal], *, size: float, reached: int | None = None
-) -> EndArtists:
+) -> dict[str, Any]:
     """Draw a start pose (dof,) and all goals; if one is `reached`, the others are pale."""
     pale = [reached is not None and k != reached for k in range(len(goals))]
     colors = [GREY if others else INK for others in pale]
     headed = [k for k, goal in enumerate(goals) if not goal.free_heading]
-    return EndArtists(
-        start=draw_start(ax, start),
-        goals=tuple(
-            draw_goal(ax, goal.pose, color=color) for goal, color in zip(goals, colors, strict=True)
-        ),
-        rings=tuple(
-            _draw_ring(ax, goal.pose, color)
-            for goal, color in zip(goals, colors, strict=True)
-            if goal.free_heading
-        ),
-        sets=tuple(_draw_set(ax, goal) for goal in goals if goal.tolerance_m > 0.0),
-        headings=draw_headings(
-            ax,
-            np.array([start, *(goals[k].pose for k in headed)]),
-            length=ARROW_SIZE * size,
-            color=[INK, *(colors[k] for k in headed)],
-        ),
+    artists: dict[str, Any] = {"start": draw_start(ax, start)}
+    for k, (goal, color) in enumerate(zip(goals, colors, strict=True)):
+        artists[f"goal {k}"] = draw_goal(ax, goal.pose, color=color)
+        if goal.free_heading:
+            artists[f"any heading {k}"] = _draw_ring(ax, goal.pose, color)
+        if goal.tolerance_m > 0.0:
+            artists[f"tolerance {k}"] = _draw_set(ax, goal)
+    artists["headings"] = draw_headings(
+        ax,
+        np.array([start, *(goals[k].pose for k in headed)]),
+        length=ARROW_SIZE * size,
+        color=[INK, *(colors[k] for k in headed)],
     )
+    return artists
 
 
 def draw_start(ax: Axes, pose: Array) -> PathCollection:
@@ -86,27 +71,20 @@ def draw_headings(
 
 def end_handles(goals: Sequence[Goal] = ()) -> tuple[list[Line2D], list[str]]:
     """Legend handles of start and goals, and what else there is of goals."""
-    handles = [_mark("o", size=5.5, face=INK, edge=INK), _mark("D", size=6.0, edge=INK)]
+    handles = [mark_handle("o", size=5.5, face=INK, edge=INK), mark_handle("D", size=6.0, edge=INK)]
     names = ["start", "goal"]
     if goals and all(goal.free_heading for goal in goals):
         names[1] = "goal, any heading"
     elif any(goal.free_heading for goal in goals):
-        handles.append(_mark("o", size=9.0, edge=INK))
+        handles.append(mark_handle("o", size=9.0, edge=INK))
         names.append("any heading")
     if len(goals) > 1:
-        handles.append(_mark("D", size=6.0, edge=GREY))
+        handles.append(mark_handle("D", size=6.0, edge=GREY))
         names.append("other goal")
     if any(goal.tolerance_m > 0.0 for goal in goals):
-        handles.append(_mark("o", size=9.0, face=(*SET, 0.15), edge=SET))
+        handles.append(mark_handle("o", size=9.0, face=(*SET, 0.15), edge=SET))
         names.append("goal tolerance")
     return handles, names
-
-
-def _mark(marker: str, *, size: float, edge: Color, face: Any = "white") -> Line2D:
-    return Line2D(
-        [], [], linestyle="none", marker=marker, markersize=size, markeredgecolor=edge,
-        markerfacecolor=face, markeredgewidth=1.3 if marker == "D" else 1.0,
-    )  # fmt: skip
 
 
 def _draw_ring(ax: Axes, pose: Array, color: Color) -> PathCollection:

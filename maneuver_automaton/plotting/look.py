@@ -26,6 +26,9 @@ class Look:
     style : str
         "screen", or "paper": numbers and word are left to the caption.
 
+    numbered : bool
+        Whether the bodies of several vehicles are numbered by their times.
+
     Examples
     --------
     >>> Look(style="paper", size=(3.5, None)).width, Look().width
@@ -35,6 +38,7 @@ class Look:
     title: str = ""
     size: tuple[float, float | None] | None = None
     style: str = "screen"
+    numbered: bool = False
 
     def __post_init__(self) -> None:
         if self.style not in WIDTHS:

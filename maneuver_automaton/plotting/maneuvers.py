@@ -14,7 +14,6 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.plotting.bodies import DART
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
 from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.plotting.look import Look
@@ -26,6 +25,7 @@ from maneuver_automaton.plotting.pages import (
     title_lines,
     write_figure,
 )
+from maneuver_automaton.plotting.paths import DART
 from maneuver_automaton.plotting.style import SMALL_PT, shortened
 from maneuver_automaton.primitives import Maneuver
 

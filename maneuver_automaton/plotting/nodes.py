@@ -65,16 +65,11 @@ def draw_nodes(ax: Axes, nodes: ArrayLike, *, cost: ArrayLike | None = None) -> 
     return ticks
 
 
-def draw_cost_bar(figure: Figure, ticks: Quiver, *, box: tuple[float, float, float, float]) -> None:
-    """A colour bar of nodes with costs in a `box` (left, bottom, width, height) [in]."""
-    wide, high = figure.get_size_inches()
-    left, bottom, width, height = box
-    at = figure.add_axes((left / wide, bottom / high, width / wide, height / high))
-    bar = figure.colorbar(ticks, cax=at, orientation="horizontal")
+def draw_cost_bar(figure: Figure, ax: Axes, ticks: Quiver) -> None:
+    """A colour bar of nodes with costs, above the axes where they are."""
+    bar = figure.colorbar(
+        ticks, ax=ax, location="top", shrink=0.5, aspect=30, pad=0.02, anchor=(1, 0)
+    )
     bar.outline.set_visible(False)
-    at.xaxis.set_ticks_position("top")
-    at.tick_params(labelsize=SMALL_PT - 1.0, length=2.0, width=0.5, pad=1.5, labelcolor=INK)
-    at.set_ylabel(
-        "cost of expanded nodes", fontsize=SMALL_PT, color=INK, rotation=0.0, ha="right",
-        va="center",
-    )  # fmt: skip
+    bar.ax.tick_params(labelsize=SMALL_PT - 1.0, length=2.0, width=0.5, pad=1.5, labelcolor=INK)
+    bar.set_label("cost of expanded nodes", fontsize=SMALL_PT, color=INK)

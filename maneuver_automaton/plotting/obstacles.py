@@ -25,6 +25,7 @@ ROBOT: Color = (0.90, 0.58, 0.05)  # the vehicle, at the times at which moving o
 PALEST, DARKEST = 0.72, -0.15  # of moving obstacles, at the first of several times and at the last
 TRACK_POINTS, TURN_RAD = 60, 0.05  # of a track at least, and between two of them on an arc at most
 THERE_ALPHA, GONE_ALPHA = 0.62, 0.08  # of a moving obstacle while it is there, and while it is not
+SLACK_S = 1e-9
 MOST_STEPS = 5  # between the times at which moving obstacles are shown
 
 
@@ -69,6 +70,7 @@ def draw_obstacles(
     obstacles: AnyObstacle | Sequence[AnyObstacle],
     *,
     time: ArrayLike | None = None,
+    fleeting: bool = False,
 ) -> ObstacleArtists:
     """Draw `obstacles` on `ax`, which keeps its limits.
 
@@ -85,6 +87,8 @@ def draw_obstacles(
     time : array_like, optional
         One time or several in a row [s]; if left out, where each motion begins, over its whole
         track.
+    fleeting : bool
+        Whether what moves is there only while its motion lasts; it has no track then.
 
     Returns
     -------
@@ -101,7 +105,7 @@ def draw_obstacles(
     (1, 2)
     """
     known = as_obstacles(obstacles)
-    moving = moving_shapes(known)
+    moving = moving_shapes(known, fleeting=fleeting)
     if time is None:
         shown = [one.at(float(one.motion.time[0])) for one in moving]
         there = [True] * len(shown)
@@ -109,10 +113,15 @@ def draw_obstacles(
         colors = [MOVING] * len(shown)
     else:
         times = np.atleast_1d(as_array("obstacles: time", time))
-        shown = [one.at(t) for t in times.tolist() for one in moving]
-        there = [one.there(t) for t in times.tolist() for one in moving]
-        tracks = [one.track(float(times[0]), float(times[-1])) for one in moving]
-        colors = [color for color in moment_colors(len(times)) for _ in moving]
+        shades = zip(times.tolist(), moment_colors(len(times)), strict=True)
+        rows = [(one, t, color) for t, color in shades for one in moving]
+        rows = [row for row in rows if not fleeting or row[0].there(row[1])]
+        shown = [one.at(t) for one, t, _ in rows]
+        there = [one.there(t) for one, t, _ in rows]
+        tracks = (
+            [] if fleeting else [one.track(float(times[0]), float(times[-1])) for one in moving]
+        )
+        colors = [color for *_, color in rows]
     artists = ObstacleArtists(
         static=_solid([shape_path(one.shape) for one in static_shapes(known)]),
         maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
@@ -131,10 +140,16 @@ def static_shapes(obstacles: Sequence[AnyObstacle]) -> list[Obstacle]:
     return [one for one in obstacles if isinstance(one, Obstacle) and one.motion is None]
 
 
-def moving_shapes(obstacles: Sequence[AnyObstacle]) -> list[MovingShape]:
-    """The moving shapes, ready to be drawn at many times."""
+def moving_shapes(obstacles: Sequence[AnyObstacle], *, fleeting: bool = False) -> list[MovingShape]:
+    """The moving shapes, ready to be drawn at many times; `fleeting` ones last as their motion."""
     return [
-        MovingShape(path=shape_path(one.shape), motion=one.motion, presence=one.presence)
+        MovingShape(
+            path=shape_path(one.shape),
+            motion=one.motion,
+            presence=(one.motion.time[0] - SLACK_S, one.motion.time[-1] + SLACK_S)
+            if fleeting
+            else one.presence,
+        )
         for one in obstacles
         if isinstance(one, Obstacle) and one.motion is not None
     ]

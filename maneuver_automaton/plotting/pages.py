@@ -1,4 +1,4 @@
-"""Figures as files: laid out in inches, rendered without a display, replaced in one step."""
+"""Figures as files: pages of a plane and panels, drawn without a display, replaced in one step."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import textwrap
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,12 @@ VECTOR: Any = {
     "svg.hashsalt": "picture",
 }
 UNDATED: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
+PLANE = 0.57  # share of the width that the plane has beside what is over time
+FLAT = 1.7  # a plane so much wider than high is given the width of the page
+LOW, HIGH, LEAST_PLANE = 3.6, 5.6, 1.2  # [in] height of the plane
+PANEL, LEAST_PANEL, COLUMN = 1.15, 0.55, 2.15  # [in] heights over time, and the least width
+TICKS, LABEL, EDGE = 0.2, 0.4, 0.12  # [in] of numbers, of numbers and a label, and of the page
+FIRST = 4.0  # [in] height of a page before it is known
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -119,6 +126,145 @@ def bottom_legend(
         columnspacing=1.6, labelspacing=0.45,
     )  # fmt: skip
     plain(legend, labels, length=length)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Page:
+    """A figure with its axes: the plane, and what is over time, beside or below it."""
+
+    figure: Figure
+    plane: Any  # Axes, or Axes3D
+    panels: tuple[Axes, ...]
+    is_stacked: bool  # the panels stand above each other
+
+    def share_times(self) -> None:
+        """Leave the times to the lowest of panels that stand above each other."""
+        if self.is_stacked:
+            hide_times(self.panels[:-1])
+
+
+def page_of(
+    look: Look,
+    lines: Sequence[str],
+    legend: tuple[Sequence[Artist], Sequence[str]],
+    *,
+    shape: float,
+    panels: Sequence[float] = (),
+) -> Page:
+    """A page with a heading of some lines, a legend along its lower edge, a plane, and panels.
+
+    The plane is `shape` times as wide as high; `panels` are their heights, compared with others'.
+    They stand beside the plane, or below it if that is flat or the page narrow. A page whose stated
+    height leaves too little room has none.
+    """
+    figure, top, foot = _framed(look, lines, legend)
+    flat = shape > FLAT or look.is_narrow or not panels
+    columns = max(1, min(len(panels), int(look.width / COLUMN))) if flat else 1
+    rows = math.ceil(len(panels) / columns)
+    frame = top + foot + LABEL
+    if look.height is not None:
+        least = rows * (LEAST_PANEL + LABEL) + LEAST_PLANE if flat else LEAST_PANEL * len(panels)
+        if look.height - frame < least:
+            panels, flat, rows = (), True, 0
+    wide = look.width - LABEL - EDGE
+    below = rows * (PANEL + LABEL) if flat else 0.0
+    if look.height is not None:
+        high = max(look.height - frame - below, LEAST_PLANE)
+    elif flat:
+        high = min(max(wide / shape, 1.5 * LEAST_PLANE), HIGH)
+    else:
+        stacked = sum(panels) * PANEL + (len(panels) - 1) * TICKS
+        high = max(min(max(PLANE * wide / shape, LOW), HIGH), stacked)
+    _settle(figure, frame + high + below, top)
+    count = len(panels)
+    if flat:
+        names: list[Any] = [
+            [str(k) if k < count else "." for k in range(first, first + columns)]
+            for first in range(0, count, columns)
+        ]
+        heights = [high, *[PANEL] * rows]
+        axes = figure.subplot_mosaic([["plane"] * columns, *names], height_ratios=heights)
+    else:
+        axes = figure.subplot_mosaic(
+            [["plane", str(k)] for k in range(count)],
+            width_ratios=(PLANE, 1.0 - PLANE),
+            height_ratios=list(panels),
+        )
+    over_time = tuple(axes[str(k)] for k in range(count))
+    return Page(figure, axes["plane"], over_time, is_stacked=not flat or columns == 1)
+
+
+def space_page(
+    look: Look,
+    lines: Sequence[str],
+    legend: tuple[Sequence[Artist], Sequence[str]],
+    *,
+    shape: float,
+) -> Page:
+    """A page with axes in space above two of the plane, each `shape` times as wide as high."""
+    figure, top, foot = _framed(look, lines, legend)
+    below = min(max(0.45 * look.width / shape, 1.5 * LEAST_PLANE), 0.5 * HIGH)
+    frame = top + foot + 2.0 * LABEL
+    above = 0.54 * look.width if look.height is None else look.height - frame - below
+    above = max(above, LEAST_PLANE)
+    _settle(figure, frame + above + below, top)
+    axes = figure.subplot_mosaic(
+        [["space", "space"], ["above", "aside"]],
+        height_ratios=(above, below),
+        per_subplot_kw={"space": {"projection": "3d", "computed_zorder": False}},
+    )
+    axes["space"].patch.set_alpha(0.0)
+    return Page(figure, axes["space"], (axes["above"], axes["aside"]), is_stacked=False)
+
+
+def _framed(
+    look: Look, lines: Sequence[str], legend: tuple[Sequence[Artist], Sequence[str]]
+) -> tuple[Figure, float, float]:
+    """A figure with heading and legend, and the heights [in] that these take."""
+    heading = title_lines(look, look.width - 2.0 * EDGE, *lines)
+    figure = new_figure(look.width, FIRST)
+    foot = _legend_below(figure, *legend) + EDGE
+    heading_text(figure, heading, left=EDGE)
+    return figure, heading_height(heading) + 0.5 * EDGE, foot
+
+
+def _settle(figure: Figure, height: float, top: float) -> None:
+    """Give a figure its height [in], of which the axes have what is below the heading."""
+    height = even_height(height)
+    figure.set_figheight(height)
+    left, low = EDGE / figure.get_figwidth(), EDGE / height
+    rect = (left, low, 1.0 - 2.0 * left, 1.0 - low - top / height)
+    figure.set_layout_engine("constrained", rect=rect)
+    for text in figure.texts:  # they were placed from the upper edge of another height
+        text.set_y(1.0 - (1.0 - text.get_position()[1]) * FIRST / height)
+
+
+def even_height(inches: float) -> float:
+    """A height that is an even number of pixels, as films need it."""
+    return 2.0 * round(inches * DPI / 2.0) / DPI
+
+
+def _legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> float:
+    """Put a legend along the lower edge, and return its height [in]."""
+    if not labels:
+        return 0.0
+    legend = figure.legend(
+        handles, [str(k) for k in range(len(labels))], loc="outside lower left", frameon=False,
+        borderaxespad=1.0,
+        ncols=_columns(labels, figure.get_figwidth() - 2.0 * EDGE, NAME_LENGTH),
+        fontsize=SMALL_PT, borderpad=0.0, handlelength=1.8, columnspacing=1.6, labelspacing=0.45,
+    )  # fmt: skip
+    plain(legend, labels)
+    return float(legend.get_window_extent().height / figure.dpi)
+
+
+def settled(figure: Figure) -> Figure:
+    """The figure laid out once, so that what moves later moves no axes."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
+    return figure
 
 
 def write_figure(figure: Figure, path: str | Path) -> None:

@@ -1,190 +1,154 @@
-"""Draw a plan in the plane: its path, what its body sweeps, and what it is among."""
+"""Draw one vehicle in the plane: its path in the colours of its trims, and where its body is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.plotting.bodies import (
-    SWEPT,
-    SWEPT_ALPHA,
-    darts,
-    draw_switches,
-    goal_bodies,
-    moment_bodies,
-    swept_area,
-    switch_bodies,
-)
-from maneuver_automaton.plotting.colors import INK, Color
-from maneuver_automaton.plotting.ends import EndArtists, draw_ends, end_handles
-from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton.plotting.cast import Actor, Cast
+from maneuver_automaton.plotting.colors import GREY, INK, SWEPT, Color
+from maneuver_automaton.plotting.ends import SET, draw_ends
+from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.labels import shown_name
-from maneuver_automaton.plotting.limits import LimitArtists, draw_limits, limit_handles
-from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
-from maneuver_automaton.plotting.obstacles import (
-    ROBOT,
-    ObstacleArtists,
-    draw_obstacles,
-    obstacle_handles,
-)
-from maneuver_automaton.plotting.scene import (
-    Scene,
-    mark_size,
-    plan_scene,
-    scene_points,
-    scene_size,
-    set_view,
-    view_box,
-)
-from maneuver_automaton.plotting.style import line_handle, outer_legend
-from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names
+from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
+from maneuver_automaton.plotting.regions import region_path
+from maneuver_automaton.plotting.scene import Scene
+from maneuver_automaton.plotting.style import dashed_handle, line_handle, mark_handle
+from maneuver_automaton.plotting.swept import merged, swept_region
+from maneuver_automaton.plotting.track import Piece, Track
 
-SPIN_RADIUS = 0.09  # of the size of the path
-ARC_POINTS = 61  # of a turn on the spot
+SPIN_RADIUS, ARC_POINTS, MOST_SPINS = 0.09, 61, 12  # of the size; more cannot be told apart
 RING, CLIMB, SINK = "o", "^", "v"
+FAINT_DARTS = 9  # along a path
+DART = np.array([[0.6, 0.0], [-0.4, 0.32], [-0.22, 0.0], [-0.4, -0.32]])
+DART_SIZE = 0.066  # of the size of the path
+DARTS_APART = 2.5  # of their size, at least, between those where trims begin
+TURNED_RAD = 0.3  # of two bodies in one place, at least
+SWEPT_ALPHA = 0.20
+MOST_MOTIONS, INNER_BODIES = 6, 3  # so few motions have bodies within, at most so many each
+BODIES_APART = 2.0  # of the reach, at least, between bodies within a motion
+STEPS_APART = 0.4  # of the reach, between the bodies at two steps of a loop
+FEW_BODIES, LEAST_ALPHA = 8, 0.3  # more bodies than that are fainter, but not more than this
+JUMP: Color = (0.85, 0.15, 0.45)
+JUMP_STYLE, HELD_STYLE = (0, (1.0, 1.2)), (0, (5.0, 2.0))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlanArtists:
-    """Artists of `draw_plan`; `path` has one segment per trim that drives."""
+def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
+    """Draw the only vehicle of a cast; the artists by what they show.
 
-    path: LineCollection
-    halo: LineCollection  # white, below the path
-    swept: PathCollection  # what the body covers; empty if it is not known
-    darts: PolyCollection  # along the path, where the body is not known
-    bodies: PolyCollection  # at the switching times
-    moment_bodies: PolyCollection  # at the times at which moving obstacles are shown
-    goal_bodies: PolyCollection  # at the goals that are not reached
-    switches: PathCollection  # dots where one trim follows another
-    spins: LineCollection  # arcs for turns on the spot
-    spin_heads: PolyCollection
-    still: tuple[PathCollection, ...]  # a ring for each rest, a triangle for a climb on the spot
-    ends: EndArtists
-    obstacles: ObstacleArtists
-    limits: LimitArtists
-    legend: Legend | None
-
-
-def draw_plan(
-    ax: Axes,
-    plan: Plan,
-    *,
-    problem: Problem | None = None,
-    footprint: Any = None,
-    goal: ArrayLike | None = None,
-    colors: Mapping[str, Color] | None = None,
-    legend: bool = True,
-) -> PlanArtists:
-    """Draw a `plan` in the plane on `ax`, to scale, each trim in its colour.
-
-    Moving obstacles are shown at a few times, and the body at the same times in the same colours.
-
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw; its scale is made equal in x and y.
-    plan : Plan
-        What to draw.
-    problem : Problem, optional
-        Obstacles, goals and body to draw with it.
-    footprint : any form of `footprint_polygons`, optional
-        The body, drawn at the switching times, and what it sweeps; that of the problem if left
-        out. Where there is none, small darts stand for it.
-    goal : (dof,) array_like, optional
-        Pose of the goal [m, m, rad(, m)]; those of the problem, or else the end of the plan, if
-        left out.
-    colors : mapping, optional
-        Colour of each trim by name; `track_colors` of the plan's trims if left out.
-    legend : bool
-        Whether to name the trims beside the axes.
-
-    Returns
-    -------
-    PlanArtists
-        The artists, by what they show.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> from maneuver_automaton.primitives import Trim
-    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
-    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[2.0])
-    >>> artists = draw_plan(Figure().add_subplot(), plan)
-    >>> artists.path.get_segments()[0].tolist()
-    [[0.0, 0.0], [2.0, 0.0]]
+    A plan has its body where trims begin and what it sweeps, a closed loop its body at steps that
+    are apart, the plan of each step, pale, and a dotted line for each disturbance.
     """
-    track = track_of_plan(plan)
-    used = dict(track_colors(track.twists) if colors is None else colors)
-    if problem is None:
-        scene = bare_scene(track, footprint=footprint)
-    else:
-        scene = plan_scene(problem, plan, footprint=footprint)
-    if goal is not None:
-        at = Goal(pose=as_array("goal", goal, last=plan.start.size))
-        scene = replace(scene, goals=(at,), reached=0)
-    return draw_track(ax, track, scene, colors=used, legend=legend)
-
-
-def bare_scene(track: Track, *, footprint: Any) -> Scene:
-    """A scene of which nothing is known but the end of the track, and a body."""
-    body = tuple(footprint_polygons(footprint))
-    return Scene(goals=(Goal(pose=track.end),), reached=0, body=body, times=np.zeros(1))
-
-
-def draw_track(
-    ax: Axes, track: Track, scene: Scene, *, colors: Mapping[str, Color], legend: bool
-) -> PlanArtists:
-    """Draw a `track` in a `scene`; see `draw_plan`."""
-    size = scene_size(scene, track)
-    box = view_box(scene, scene_points(scene, track, size=size), size=size)
-    size = mark_size(scene, box, size=size)
+    (one,), scene, colors, size = cast.actors, cast.scene, cast.colors, cast.size
+    track = one.track
     driving = [piece for piece in track.pieces if piece.drives]
     lines = [piece.pose[:, :2] for piece in driving]
     spins = [piece for piece in track.pieces if not piece.drives and piece.turn]
-    arcs, heads = spin_symbols(spins, size=size)
-    spin_colors = [colors[piece.name] for piece in spins]
-    artists = PlanArtists(
-        path=LineCollection(
+    arcs, heads = _spin_symbols(spins if len(spins) <= MOST_SPINS else [], size=size)
+    spin_colors = [colors[piece.name] for piece in spins[: len(arcs)]]
+    still = [p for p in track.pieces if _symbol(p) and p.name in track.seen]
+    loop = bool(one.held) or len(one.mover.pieces) > 1
+    artists: dict[str, Any] = {
+        "path": LineCollection(
             lines, colors=[colors[piece.name] for piece in driving],
             linewidths=2.6, capstyle="butt", joinstyle="round", zorder=3.0,
         ),
-        halo=LineCollection(
+        "halo": LineCollection(
             lines, colors=["white"], linewidths=4.0, capstyle="butt", joinstyle="round", zorder=2.9
         ),
-        swept=swept_area(track, scene),
-        darts=darts(track, scene, size=size),
-        bodies=switch_bodies(track, scene),
-        moment_bodies=moment_bodies(track, scene),
-        goal_bodies=goal_bodies(scene),
-        switches=draw_switches(ax, track, scene, size=size),
-        spins=LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
-        spin_heads=PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
-        still=draw_still(ax, track, colors),
-        ends=draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached),
-        obstacles=draw_obstacles(ax, scene.obstacles, time=scene.times),
-        limits=draw_limits(ax, scene.zones, scene.bounds),
-        legend=_legend(ax, track, scene, colors) if legend else None,
-    )  # fmt: skip
-    for part in (
-        artists.path, artists.halo, artists.swept, artists.darts, artists.bodies,
-        artists.moment_bodies, artists.goal_bodies, artists.spins, artists.spin_heads,
-    ):  # fmt: skip
-        ax.add_collection(part)
-    set_view(ax, box, track.start[:2])
-    return artists
+        "swept": _swept_area(track, scene),
+        "spins": LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
+        "spin_heads": PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
+        "moments": _moment_bodies(track, scene),
+        "wanted": _goal_bodies(scene),
+    }  # fmt: skip
+    if loop:
+        artists |= _steps_of(ax, cast, one)
+    else:
+        artists |= {
+            "darts": _darts(track, scene, size=size),
+            "bodies": _switch_bodies(track, scene),
+        }
+        poses = _between_ends(track, scene, apart=1e-6 * size)[: None if scene.body else 0]
+        artists["switches"] = ax.scatter(
+            poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK],
+            linewidths=0.7, zorder=3.6,
+        )  # fmt: skip
+    for kind in (RING, CLIMB, SINK):
+        some = [piece for piece in still if _symbol(piece) == kind]
+        at = np.array([piece.pose[0, :2] for piece in some]).reshape(-1, 2)
+        artists[f"still {kind}"] = ax.scatter(
+            at[:, 0], at[:, 1], s=150.0, marker=kind, facecolors="none",
+            edgecolors=[colors[piece.name] for piece in some], linewidths=1.8, zorder=4.5,
+        )  # fmt: skip
+    for part in artists.values():
+        if part.axes is None:
+            ax.add_collection(part)
+    return artists | draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached)
+
+
+def _steps_of(ax: Axes, cast: Cast, one: Actor) -> dict[str, Any]:
+    """The plan of every step, where it replanned, bodies at steps, and what pushed it."""
+    again = {event.time for event in cast.recording.events if event.kind == "replanned"}
+    plans = [(track.pose[:, :2], time in again) for time, track in one.held]
+    places = np.array([path[0] for path, new in plans if new]).reshape(-1, 2)
+    return {
+        "held": LineCollection(
+            [path for path, _ in plans], colors=[(*GREY, 0.5)], linewidths=0.8, zorder=1.5
+        ),
+        "held anew": LineCollection(
+            [path for path, new in plans if new], colors=[(*INK, 0.6)], linewidths=0.9,
+            linestyles=[HELD_STYLE], zorder=1.8,
+        ),
+        "replanned": ax.scatter(
+            places[:, 0], places[:, 1], s=22.0, facecolors="white", edgecolors=[INK],
+            linewidths=1.0, zorder=4.2,
+        ),
+        "jumps": LineCollection(
+            [line for _, line in one.jumps], colors=[JUMP], linewidths=1.5,
+            linestyles=[JUMP_STYLE], zorder=3.4,
+        ),
+        "bodies": _step_bodies(one, size=cast.size),
+    }  # fmt: skip
+
+
+def path_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], list[str]]:
+    """Legend handles and names of the only vehicle of a cast: its trims, its body, its steps.
+
+    In a film the trims alone, if they are few.
+    """
+    one, scene = cast.actors[0], cast.scene
+    handles, names = trim_handles(one.track, cast.colors)
+    if moving:
+        few = len(names) <= MOST_TRIMS
+        return ([*handles], names) if few else ([], [])
+    more: list[tuple[Artist, str]] = []
+    swept = bool(scene.body and one.track.pieces)
+    if swept:
+        by = " and the ".join(["swept by the body", *(part.name for part in scene.carried)])
+        more.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), by))
+    if swept and scene.moves:
+        said = "body at the same times"
+        more.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), said))
+    if one.held:
+        more.append((line_handle(GREY, width=0.9), "plan of a step"))
+    if any(event.kind == "replanned" for event in cast.recording.events):
+        ring = mark_handle("o", size=5.0)
+        ring.set(linestyle=HELD_STYLE, linewidth=0.9, color=INK)
+        more.append((ring, "replanned"))
+    if one.jumps:
+        more.append((dashed_handle(JUMP, JUMP_STYLE, width=1.5), "disturbance"))
+    return [*handles, *(handle for handle, _ in more)], [*names, *(name for _, name in more)]
 
 
 def trim_handles(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D], list[str]]:
@@ -199,21 +163,6 @@ def trim_handles(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D
     return handles, [shown_name(name) for name in entries]
 
 
-def scene_handles(track: Track, scene: Scene) -> tuple[list[Artist], list[str]]:
-    """Legend handles and names of start, goals, obstacles, limits, and what the body sweeps."""
-    ends, names = end_handles(scene.goals)
-    around, around_names = obstacle_handles(scene.obstacles, scene.times)
-    swept = bool(scene.body and track.pieces)
-    patches = [Patch(facecolor=(*SWEPT, SWEPT_ALPHA))] if swept else []
-    by = " and the ".join(["swept by the body", *(part.name for part in scene.carried)])
-    said = [by] if swept else []
-    if swept and scene.moves:
-        patches.append(Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK))
-        said.append("body at the same times")
-    limits, limit_names = limit_handles(scene.zones, scene.bounds)
-    return [*ends, *patches, *around, *limits], [*names, *said, *around_names, *limit_names]
-
-
 def _symbol(piece: Piece) -> str:
     """Marker of a piece that stays where it is, empty if a line shows it."""
     if piece.drives or piece.turn:
@@ -221,7 +170,7 @@ def _symbol(piece: Piece) -> str:
     return RING if not piece.climb else CLIMB if piece.climb > 0.0 else SINK
 
 
-def spin_symbols(spins: list[Piece], *, size: float) -> tuple[list[Array], list[Array]]:
+def _spin_symbols(spins: list[Piece], *, size: float) -> tuple[list[Array], list[Array]]:
     """Arcs about the place of each turn and their arrow heads; later turns there lie outside."""
     arcs, heads, places = [], [], np.zeros((0, 2))
     for piece in spins:
@@ -239,19 +188,136 @@ def spin_symbols(spins: list[Piece], *, size: float) -> tuple[list[Array], list[
     return arcs, heads
 
 
-def draw_still(ax: Axes, track: Track, colors: Mapping[str, Color]) -> tuple[PathCollection, ...]:
-    """A marker for every piece that stays where it is."""
-    return tuple(
-        ax.scatter(
-            piece.pose[0, 0], piece.pose[0, 1], s=150.0, marker=_symbol(piece), facecolors="none",
-            edgecolors=[colors[piece.name]], linewidths=1.8, zorder=4.5,
-        )
-        for piece in track.pieces
-        if _symbol(piece) and piece.name in track.seen
+def _swept_area(track: Track, scene: Scene) -> PathCollection:
+    """Area that the body covers along a track; empty where the body is not known."""
+    region = swept_region(track, scene.body) if scene.body and track.pieces else []
+    carried = [swept_region(part.track, part.body) for part in scene.carried]
+    region = merged([*region, *chain.from_iterable(carried)]) if carried else region
+    return PathCollection(
+        [region_path(region)] if region else [], facecolors=[(*SWEPT, SWEPT_ALPHA)],
+        linewidths=0.0, zorder=1.4,
     )  # fmt: skip
 
 
-def _legend(ax: Axes, track: Track, scene: Scene, colors: Mapping[str, Color]) -> Legend:
-    handles, labels = trim_handles(track, colors)
-    marks, names = scene_handles(track, scene)
-    return outer_legend(ax, [*handles, *marks], [*labels, *names])
+def _darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
+    """Where the body is not known: darts along a path, and white ones where trims begin.
+
+    The white ones leave the path between them free.
+    """
+    if scene.body:
+        return PolyCollection([])
+    dart = [DART_SIZE * size * DART]
+    faint = track.spread(FAINT_DARTS, reach=0.0)
+    switches = _between_ends(track, scene, apart=1e-6 * size)
+    clear = switches[_apart(switches, DARTS_APART * DART_SIZE * size)]
+    return PolyCollection(
+        [*placed(dart, faint), *placed(dart, clear)],
+        facecolors=[(*GREY, 0.6)] * len(faint) + [(1.0, 1.0, 1.0, 1.0)] * len(clear),
+        edgecolors=[(*INK, 0.0)] * len(faint) + [(*INK, 1.0)] * len(clear),
+        linewidths=0.9,
+        zorder=3.5,
+    )
+
+
+def _apart(poses: Array, apart: float) -> list[int]:
+    """Which of the poses (n, dof) are `apart` [m], or turned, from the one kept before."""
+    kept: list[int] = []
+    for k, pose in enumerate(poses):
+        gap = np.inf if not kept else float(np.linalg.norm(pose[:2] - poses[kept[-1], :2]))
+        if gap >= apart or abs(pose[2] - poses[kept[-1], 2]) > TURNED_RAD:
+            kept.append(k)
+    return kept
+
+
+def _switch_bodies(track: Track, scene: Scene) -> PolyCollection:
+    """Outlines where trims begin and at the end, which is clear; many others are fainter.
+
+    Those of what it carries stand beside them; a motion by optimal control has a few within.
+    """
+    times = _shown_times(track, apart=BODIES_APART * scene.reach)
+    poses = track.at(times) if len(times) > len(track.switching_times) else track.switching_poses
+    outlines = placed(scene.body, poses)
+    for part in scene.carried:
+        outlines += placed(part.body, part.track.at(times))
+    alpha = max(LEAST_ALPHA, 0.8 * min(1.0, FEW_BODIES / len(poses)))
+    inner, bodies = len(poses) - 2, len(outlines) // len(poses)
+    return PolyCollection(
+        outlines,
+        facecolors="none",
+        edgecolors=[(*INK, 0.95), *[(*INK, alpha)] * inner, (*INK, 0.95)] * bodies,
+        linewidths=[1.3, *[0.7] * inner, 1.3] * bodies,
+        zorder=2.1,
+    )
+
+
+def _shown_times(track: Track, *, apart: float) -> Array:
+    """Switching times (n,), and a few within motions that are long and not steady [s]."""
+    times = track.switching_times
+    if not 1 <= len(track.pieces) <= MOST_MOTIONS:
+        return times
+    inner = [
+        np.linspace(piece.time[0], piece.time[-1], _bodies_within(piece, apart=apart) + 2)[1:-1]
+        for piece in track.pieces
+        if np.ptp(piece.control, axis=0).any()
+    ]
+    return np.sort(np.concatenate([times, *inner]))
+
+
+def _bodies_within(piece: Piece, *, apart: float) -> int:
+    """How many bodies have room within a piece, `apart` [m] from each other and from its ends."""
+    length = float(np.linalg.norm(np.diff(piece.pose[:, :2], axis=0), axis=1).sum())
+    return min(INNER_BODIES, max(0, int(length / apart) - 1)) if apart > 0.0 else 0
+
+
+def _step_bodies(one: Actor, *, size: float) -> PolyCollection:
+    """The body, a dart if it has none, at those steps that are apart, and all that it carries."""
+    body, poses = one.body or [DART_SIZE * size * DART], one.decisions
+    reach = one.reach or DART_SIZE * size
+    shown = [0] if len(poses) == 1 else [0, len(poses) - 1]
+    for k, pose in enumerate(poses[1:-1], start=1):
+        gaps = poses[shown, :3] - pose[:3]
+        apart = np.hypot(gaps[:, 0], gaps[:, 1]) > STEPS_APART * reach
+        if (apart | (np.abs(wrapped(gaps[:, 2])) > TURNED_RAD)).all():
+            shown.append(k)
+    outlines = placed(body, poses[shown])
+    for part in one.parts[1:]:
+        at = np.array([*(piece.start for piece in part.pieces), part.end])
+        outlines += placed(footprint_polygons(list(part.bodies[""])), at[shown])
+    return PolyCollection(
+        outlines, facecolors=[(*GREY, 0.06 if one.body else 0.35)], edgecolors=[(*INK, 0.55)],
+        linewidths=0.7, zorder=2.0,
+    )  # fmt: skip
+
+
+def _moment_bodies(track: Track, scene: Scene) -> PolyCollection:
+    """The body at the times at which moving obstacles are shown, the darker the later."""
+    times = scene.times if scene.moves and track.pieces else scene.times[:0]
+    outlines = placed(scene.body, track.at(times))
+    for part in scene.carried:
+        outlines += placed(part.body, part.track.at(times))
+    bodies = len(outlines) // max(len(times), 1)
+    colors = moment_colors(len(times), color=ROBOT) * bodies
+    return PolyCollection(
+        outlines, facecolors=[(*color, 0.85) for color in colors],
+        edgecolors=[INK], linewidths=1.1, zorder=3.7,
+    )  # fmt: skip
+
+
+def _goal_bodies(scene: Scene) -> PolyCollection:
+    """Dashed outlines at the goals that are not reached and ask for a heading."""
+    poses = [
+        goal.pose
+        for k, goal in enumerate(scene.goals)
+        if k != scene.reached and not goal.free_heading
+    ]
+    return PolyCollection(
+        placed(scene.body, np.array(poses)) if poses else [], facecolors="none",
+        edgecolors=[SET], linewidths=1.2, linestyles=[(0, (3, 2))], zorder=2.0,
+    )  # fmt: skip
+
+
+def _between_ends(track: Track, scene: Scene, *, apart: float) -> Array:
+    """Poses where trims begin, but none at the start or a goal, where other marks are."""
+    ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
+    gaps = np.linalg.norm(track.switching_poses[:, None, :2] - ends[:, :2], axis=-1)
+    return np.asarray(track.switching_poses[gaps.min(axis=1) > apart])

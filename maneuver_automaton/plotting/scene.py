@@ -95,6 +95,12 @@ def carried_parts(problem: Problem, plan: Plan) -> tuple[Carried, ...]:
     )
 
 
+def bare_scene(track: Track, *, footprint: Any) -> Scene:
+    """A scene of which nothing is known but the end of the track, and a body."""
+    body = tuple(footprint_polygons(footprint))
+    return Scene(goals=(Goal(pose=track.end),), reached=0, body=body, times=np.zeros(1))
+
+
 def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = None) -> Scene:
     """The scene of a `problem` from time `begin` to `end` [s]; its own body if none is given."""
     return Scene(

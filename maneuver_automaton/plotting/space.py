@@ -1,14 +1,14 @@
-"""A flight in space: buildings as prisms, the path above its shadow, seen from above and aside."""
+"""A flight in space: buildings as prisms, paths above their shadows, seen from above and aside."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
@@ -19,30 +19,15 @@ from mpl_toolkits.mplot3d.axes3d import Axes3D
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.planning import PlanResult
+from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
-from maneuver_automaton.plotting.labels import result_text, shown_name
 from maneuver_automaton.plotting.look import Look
-from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
-from maneuver_automaton.plotting.pages import (
-    axes_at,
-    bottom_legend,
-    heading_height,
-    heading_text,
-    legend_rows,
-    new_figure,
-    title_lines,
-    write_figure,
-)
+from maneuver_automaton.plotting.pages import space_page
+from maneuver_automaton.plotting.paths import trim_handles
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, line_handle, tidy
-from maneuver_automaton.plotting.track import Track, track_of_plan
-from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.recording import recording_of
 
-WIDTH, SPACE, FLAT = 9.6, 5.2, 1.75  # [in] of the page; heights of the axes
-HIGHEST = 2.6  # [in] of the plane
-LEFT, GAP = 0.7, 0.62  # [in]
 ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
 LIGHT = np.array([0.42, -0.76, 0.5])  # direction from which walls are lit
 BUILDING: Color = (0.72, 0.74, 0.78)
@@ -53,50 +38,56 @@ STROKE = 1.0  # [m] of the path in one piece
 BROAD, SHADOW, POST = 0.0055, 0.0022, 0.0012  # of the scene's size: widths of what is drawn
 RIM = 0.3  # [pt] one for all: nearer faces are drawn later, line widths would not follow
 POSTS = 14  # lines from the path down to the ground
-NAMES = 40  # characters of a trim's name
 HIDDEN = 0.3  # opacity of the path where a building is before it
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SpaceArtists:
-    """Artists of `draw_space`."""
-
-    faces: Poly3DCollection  # walls, roofs, and strokes of the path, nearer ones above
-    ends: tuple[Line2D, ...]
-
-
-def flies_among_heights(problem: Problem) -> bool:
-    """Whether a vehicle in space has obstacles with heights, so that a plane does not show all."""
-    return problem.start.size > 3 and any(_height(one) is not None for one in problem.obstacles)
+def flies_among_heights(result: Any) -> bool:
+    """Whether all fly, and among obstacles with heights, so that a plane does not show all."""
+    recording = recording_of(result)
+    flies = all(one.start.size > 3 for one in recording.movers)
+    return flies and any(_height(one) is not None for one in recording.world.obstacles)
 
 
-def draw_space(ax: Axes3D, result: PlanResult) -> SpaceArtists:
-    """Draw a plan in space to scale: buildings, path, its shadow on the ground, start and goals.
+def space_figure(cast: Cast, lines: Sequence[str], look: Look) -> Figure:
+    """The picture of a flight: in space, from above, and from the side, all to scale.
 
-    Coasts have the colours of their trims, maneuvers are dark. An obstacle without heights is as
-    high as the picture.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> axes = Figure().add_subplot(projection="3d")
-    >>> hasattr(axes, "set_box_aspect")
-    True
+    Raises
+    ------
+    ValueError
+        If a vehicle is one of the plane.
     """
-    problem = result.problem
-    track = _track(result)
-    low, high = _box(problem, track)
+    for one in cast.actors:
+        if one.track.start.size < 4:
+            name = "vehicle" if one.mover.model is None else one.mover.model.name
+            raise ValueError(f"a picture in space: the {name} has no altitude")
+    low, high = _box(cast)
+    wide, deep, _ = (high - low).tolist()
+    page = space_page(look, lines, _entries(cast), shape=wide / deep)
+    draw_space(page.plane, cast)
+    above, aside = page.panels
+    _draw_flat(above, cast, across=1, low=low, high=high)
+    _draw_flat(aside, cast, across=2, low=low, high=high)
+    return page.figure
+
+
+def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
+    """Draw a cast in space to scale: buildings, paths, their shadows on the ground, ends.
+
+    One vehicle has the colours of its trims, several have one each. An obstacle without heights is
+    as high as the picture. What comes back are walls, roofs, and strokes of paths.
+    """
+    low, high = _box(cast)
     faces: list[Array] = []
     inner: list[Color] = []
     rims: list[tuple[float, ...]] = []
     size = float((high - low).max())
-    for obstacle in _standing(problem):
+    for obstacle in _standing(cast):
         bottom, top = _height(obstacle) or (low[2], high[2])
         for face, shade in _prism(obstacle, max(bottom, low[2]), min(top, high[2])):
             faces.append(face)
             inner.append(shaded(BUILDING, shade))
             rims.append((*shaded(BUILDING, -0.25), 0.5))
-    for places, color, width in _strokes(result, track, ground=float(low[2])):
+    for places, color, width in _strokes(cast, ground=float(low[2])):
         faces.append(_ribbon(places, width * size))
         inner.append(color)
         rims.append((*color, 1.0))
@@ -110,75 +101,38 @@ def draw_space(ax: Axes3D, result: PlanResult) -> SpaceArtists:
     )
     if faces:
         ax.add_collection3d(collection)
-    path = [(places, color) for places, color, _ in _strokes(result, track, ground=None)]
+    path = [(places, color) for places, color, _ in _strokes(cast, ground=None)]
     if path:
         through = Line3DCollection(
             [places for places, _ in path], colors=[color for _, color in path],
             linewidths=1.6, alpha=HIDDEN, zorder=5, clip_on=False,
         )  # fmt: skip
         ax.add_collection3d(through)
-    ends = [_mark(ax, track.start, START, "o")]
-    ends += [_mark(ax, goal.pose, GOAL, "*") for goal in problem.goals]
+    for pose, color, marker in _ends(cast):
+        _mark(ax, pose, color, marker)
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(tuple(high - low), zoom=1.32)
     ax.view_init(elev=ELEVATION, azim=AZIMUTH)
     _bare_axes(ax)
-    return SpaceArtists(faces=collection, ends=tuple(ends))
+    for part in ax.get_children():  # what stands out of its box makes it no smaller
+        part.set_in_layout(False)
+    return collection
 
 
-def save_space_figure(result: PlanResult, path: str | Path, *, title: str = "") -> None:
-    """Write a picture of a flight: in space, from above, and from the side, all to scale.
-
-    A `title` stands above the numbers.
-
-    Raises
-    ------
-    ValueError
-        If the vehicle is one of the plane, or Matplotlib does not know the ending.
-    OSError
-        If the file cannot be written; an old one stays as it was.
-    """
-    if result.problem.start.size < 4:
-        raise ValueError(
-            f"a picture in space: the {result.problem.automaton.model.name} has no altitude"
-        )
-    write_figure(_figure(result, title), path)
+def _ends(cast: Cast) -> list[tuple[Array, Color, str]]:
+    """Poses of starts and goals, with the colours and forms of their marks."""
+    rows = []
+    for one in cast.actors:
+        colors = (START, GOAL) if cast.is_alone else (one.color, one.color)
+        rows.append((one.track.start, colors[0], "o"))
+        rows += [(goal.pose, colors[1], "*") for goal in one.mover.goals]
+    return rows
 
 
-def _figure(result: PlanResult, title: str) -> Figure:
-    import mpl_toolkits.mplot3d  # noqa: F401 - Matplotlib knows the projection from then on
-
-    track, problem = _track(result), result.problem
-    handles, names = _legend(result, track)
-    bottom = 0.6 + 0.2 * legend_rows(names, WIDTH - 2 * LEFT, length=NAMES)
-    low, high = _box(problem, track)
-    span = high - low
-    room = WIDTH - LEFT - 0.2 - GAP
-    each = 0.5 * room
-    height = max(FLAT, min(each * span[1] / span[0], HIGHEST))
-    lines = title_lines(Look(title=title), WIDTH - LEFT, _headline(result))
-    figure = new_figure(WIDTH, bottom + height + 0.15 + SPACE + heading_height(lines))
-    tall = float(figure.get_size_inches()[1])
-    base = bottom + height + 0.15
-    box = (0.0, base / tall, 1.0, SPACE / tall)
-    space: Any = figure.add_axes(box, projection="3d", computed_zorder=False)
-    space.patch.set_alpha(0.0)
-    draw_space(space, result)
-    from_above = axes_at(figure, left=LEFT, bottom=bottom, width=each, height=height)
-    aside = axes_at(figure, left=LEFT + each + GAP, bottom=bottom, width=each, height=height)
-    _draw_flat(from_above, result, track, across=1, low=low, high=high)
-    _draw_flat(aside, result, track, across=2, low=low, high=high)
-    heading_text(figure, lines, left=0.35)
-    bottom_legend(figure, handles, names, left=LEFT, width=WIDTH - 2 * LEFT, length=NAMES)
-    return figure
-
-
-def _draw_flat(
-    ax: Axes, result: PlanResult, track: Track, *, across: int, low: Array, high: Array
-) -> None:
-    """Draw the scene along x and another axis: 1 for y, from above, or 2 for the altitude."""
+def _draw_flat(ax: Axes, cast: Cast, *, across: int, low: Array, high: Array) -> None:
+    """Draw a cast along x and another axis: 1 for y, from above, or 2 for the altitude."""
     places = [0, 1, 3]
-    standing = sorted(_standing(result.problem), key=lambda one: (_height(one) or (0, math.inf))[1])
+    standing = sorted(_standing(cast), key=lambda one: (_height(one) or (0, math.inf))[1])
     if across == 2:
         standing = sorted(standing, key=lambda one: -_ring(one)[:, 1].mean())
     for obstacle in standing:
@@ -196,37 +150,36 @@ def _draw_flat(
         if across == 1 and _height(obstacle):
             ax.text(
                 *ring.mean(axis=0), f"{top:g}", fontsize=SMALL_PT - 2.0, color=INK,
-                ha="center", va="center",
+                ha="center", va="center", clip_on=True,
             )  # type: ignore[call-arg] # fmt: skip
-    lines, colors = [], []
-    for stroke, color, _ in _strokes(result, track, ground=None):
-        lines.append(stroke[:, [0, across]])
-        colors.append(color)
-    ax.add_collection(LineCollection(lines, colors=colors, linewidths=1.8, capstyle="round"))
-    ends = [(track.start, START, "o"), *((g.pose, GOAL, "*") for g in result.problem.goals)]
-    for pose, color, marker in ends:
+    strokes = [(stroke[:, [0, across]], color) for stroke, color, _ in _strokes(cast, ground=None)]
+    ax.add_collection(
+        LineCollection(
+            [line for line, _ in strokes], colors=[color for _, color in strokes],
+            linewidths=1.8, capstyle="round",
+        )
+    )  # fmt: skip
+    for pose, color, marker in _ends(cast):
         ax.plot(*pose[places][[0, across]], marker, color=color, ms=6 if marker == "o" else 10)
     ax.set(xlim=(low[0], high[0]), ylim=(low[across], high[across]), aspect="equal", anchor="S")
     tidy(ax, x="x [m]", y="y [m]" if across == 1 else "altitude [m]")
 
 
-def _strokes(
-    result: PlanResult, track: Track, *, ground: float | None
-) -> list[tuple[Array, Color, float]]:
-    """Stretches (n, 3) of the path with colour and width; with a ground its shadow and posts."""
-    colors = _colors(result, track)
+def _strokes(cast: Cast, *, ground: float | None) -> list[tuple[Array, Color, float]]:
+    """Stretches (n, 3) of the paths with colour and width; with a ground shadows and posts."""
     strokes: list[tuple[Array, Color, float]] = []
-    if ground is not None and track.pieces:
-        for piece in track.pieces:
-            shadow = piece.pose[:, [0, 1, 3]].copy()
-            shadow[:, 2] = ground
-            strokes += [(part, shaded(INK, 0.5), SHADOW) for part in _parts(shadow)]
-        for pose in track.spread(POSTS, reach=0.0):
-            post = np.array([[pose[0], pose[1], ground], [pose[0], pose[1], pose[3]]])
-            strokes += [(part, shaded(GREY, 0.2), POST) for part in _parts(post)]
-    for piece in track.pieces:
-        color = colors.get(piece.name, INK)
-        strokes += [(part, color, BROAD) for part in _parts(piece.pose[:, [0, 1, 3]])]
+    for one in cast.actors:
+        if ground is not None and one.track.pieces:
+            for piece in one.track.pieces:
+                shadow = piece.pose[:, [0, 1, 3]].copy()
+                shadow[:, 2] = ground
+                strokes += [(part, shaded(INK, 0.5), SHADOW) for part in _parts(shadow)]
+            for pose in one.track.spread(POSTS, reach=0.0):
+                post = np.array([[pose[0], pose[1], ground], [pose[0], pose[1], pose[3]]])
+                strokes += [(part, shaded(GREY, 0.2), POST) for part in _parts(post)]
+        for piece in one.track.pieces:
+            color = cast.colors[piece.name] if cast.is_alone else one.color
+            strokes += [(part, color, BROAD) for part in _parts(piece.pose[:, [0, 1, 3]])]
     return strokes
 
 
@@ -301,46 +254,31 @@ def _height(obstacle: Any) -> tuple[float, float] | None:
     return obstacle.height if isinstance(obstacle, Obstacle) else None
 
 
-def _standing(problem: Problem) -> list[Obstacle]:
-    return [one for one in problem.obstacles if isinstance(one, Obstacle)]
+def _standing(cast: Cast) -> list[Obstacle]:
+    return [one for one in cast.scene.obstacles if isinstance(one, Obstacle)]
 
 
-def _track(result: PlanResult) -> Track:
-    if result.plan is None:
-        return Track(result.problem.start, ())
-    return track_of_plan(result.plan)
-
-
-def _colors(result: PlanResult, track: Track) -> dict[str, Color]:
-    """Colours of the trims in which the plan coasts; without any, of the parts of its motion."""
-    if result.plan is None:
-        return {}
-    coasts = {one.name for one in result.plan.primitives if isinstance(one, Trim)} & track.seen
-    shown = coasts or track.seen
-    return track_colors({name: twist for name, twist in track.twists.items() if name in shown})
-
-
-def _legend(result: PlanResult, track: Track) -> tuple[list[Line2D], list[str]]:
-    colors = _colors(result, track)
-    shown = {name: twist for name, twist in track.twists.items() if name in colors}
-    entries = motion_names(shown, many=len(shown) > MOST_TRIMS)
-    handles = [line_handle(colors[name]) for name in entries.values()]
-    names = [shown_name(name) for name in entries]
-    if track.seen - colors.keys():
-        handles.append(line_handle(INK))
-        names.append("maneuvers")
+def _entries(cast: Cast) -> tuple[list[Artist], list[str]]:
+    handles: list[Artist]
+    if cast.is_alone:
+        handles, names = trim_handles(cast.actors[0].track, cast.colors)  # type: ignore[assignment]
+    else:
+        named = [] if cast.is_many else cast.actors
+        handles, names = [line_handle(one.color) for one in named], [one.name for one in named]
     for color, marker in ((START, "o"), (GOAL, "*")):
-        handles.append(line_handle(color, marker=marker))
-        handles[-1].set_markerfacecolor(color)
+        handle = line_handle(color if cast.is_alone else INK, marker=marker)
+        handle.set_markerfacecolor(color if cast.is_alone else INK)
+        handles.append(handle)
     return handles, [*names, "start", "goal"]
 
 
-def _box(problem: Problem, track: Track) -> tuple[Array, Array]:
+def _box(cast: Cast) -> tuple[Array, Array]:
     """Corners (3,) of what is shown, the ground at the lowest building."""
-    poses = [track.pose[:, [0, 1, 3]], *(goal.pose[None, [0, 1, 3]] for goal in problem.goals)]
-    points = np.concatenate(poses)
+    poses = [one.track.pose[:, [0, 1, 3]] for one in cast.actors]
+    goals = [goal.pose[None, [0, 1, 3]] for one in cast.actors for goal in one.mover.goals]
+    points = np.concatenate([*poses, *goals])
     low, high = points.min(axis=0), points.max(axis=0)
-    for obstacle in _standing(problem):
+    for obstacle in _standing(cast):
         ring, heights = _ring(obstacle), _height(obstacle)
         low[:2] = np.minimum(low[:2], ring.min(axis=0))
         high[:2] = np.maximum(high[:2], ring.max(axis=0))
@@ -370,16 +308,3 @@ def _bare_axes(ax: Axes3D) -> None:
         axis.pane.set_edgecolor((*GREY, 0.4))
         axis._axinfo["grid"].update(color=(*GREY, 0.25), linewidth=0.5)
     ax.locator_params(axis="z", nbins=4)
-
-
-def _headline(result: PlanResult) -> str:
-    if result.plan is None:
-        return f"{result.status.value.replace('_', ' ')}: {result.reason}".rstrip(": ")
-    error = result.terminal_error
-    return result_text(
-        cost=result.cost,
-        duration=result.plan.duration,
-        error_m=None if error is None else error.position_m,
-        error_rad=None if error is None else error.heading_rad,
-        clearance_m=result.clearance_m,
-    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -66,6 +67,21 @@ def line_handle(color: Color, *, width: float = 2.6, marker: str = "") -> Line2D
             markerfacecolor="none", markeredgewidth=1.8,
         )  # fmt: skip
     return Line2D([], [], color=color, linewidth=width, solid_capstyle="butt")
+
+
+def dashed_handle(color: Color, style: Any, *, width: float) -> Line2D:
+    """A legend handle: a short line of a style."""
+    handle = line_handle(color, width=width)
+    handle.set_linestyle(style)
+    return handle
+
+
+def mark_handle(marker: str, *, size: float, edge: Color = INK, face: Any = "white") -> Line2D:
+    """A legend handle: a marker with an edge."""
+    return Line2D(
+        [], [], linestyle="none", marker=marker, markersize=size, markeredgecolor=edge,
+        markerfacecolor=face, markeredgewidth=1.3 if marker == "D" else 1.0,
+    )  # fmt: skip
 
 
 def plain(legend: Legend, labels: Sequence[str], *, length: int = NAME_LENGTH) -> Legend:

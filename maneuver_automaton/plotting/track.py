@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import groupby, pairwise
@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.plotting.labels import POLISHED
@@ -24,6 +24,7 @@ LEAST_TURN_RAD = 0.05  # [rad] that a part of a maneuver turns, if it is told ap
 STRAIGHT = 0.1  # of the fastest turn of a maneuver: slower is straight on
 LEAST_STRAIGHT = 0.05  # of its duration that a straight part takes
 TINIEST_S = 1e-12
+END_TOLERANCE = 1e-9  # [m, rad, s] between the end of a piece and the start of the next
 SEEN = 5e-3  # of the duration: what takes less can hardly be seen in a picture
 
 
@@ -160,39 +161,35 @@ def track_of_plan(plan: Plan) -> Track:
     )
 
 
-def track_of_document(document: Mapping[str, Any]) -> Track | None:
-    """The track of a loaded plan.json `document`, None if it holds no trajectory.
+def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
+    """Track of one plan after the other; a trim that goes on in the next plan is one piece."""
+    pieces: list[Piece] = []
+    for plan in plans:
+        for piece in track_of_plan(plan).pieces:
+            if pieces and _goes_on(pieces[-1], piece):
+                pieces[-1] = _one_piece(pieces[-1], piece)
+            else:
+                pieces.append(piece)
+    return Track(start, tuple(pieces))
 
-    Raises
-    ------
-    ValueError
-        If its trajectory holds no numbers, or its columns differ in length.
-    KeyError
-        If a key of the contract is missing.
-    """
-    trajectory, primitives = document["trajectory"], document["primitives"]
-    if not trajectory or not trajectory["time_s"]:
-        return None
-    time = as_array("plan: trajectory.time_s", trajectory["time_s"])
-    pose = as_array("plan: trajectory.pose", trajectory["pose"], last=(3, 4)).copy()
-    if pose.shape[:-1] != time.shape:
-        raise ValueError(f"plan: got {len(pose)} poses for {len(time)} times")
-    pose[:, :2] += as_array(
-        "plan: trajectory.origin", trajectory.get("origin") or (0.0, 0.0), last=2
+
+def _goes_on(one: Piece, other: Piece) -> bool:
+    scale = 1.0 + float(np.abs(one.pose[-1]).max())
+    return bool(
+        one.name == other.name
+        and abs(one.time[-1] - other.time[0]) <= END_TOLERANCE * (1.0 + abs(one.time[-1]))
+        and np.abs(one.pose[-1] - other.pose[0]).max() <= END_TOLERANCE * scale
     )
-    durations = np.array([primitive["duration_s"] for primitive in primitives], dtype=np.float64)
-    times = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
-    control = as_array("plan: trajectory.control", trajectory["control"]).reshape(len(time), -1)
-    state = as_array("plan: trajectory.reduced_state", trajectory["reduced_state"])
-    samples = _Samples(time, pose, control, state.reshape(len(time), -1))
-    return Track(
-        pose[0],
-        tuple(
-            piece
-            for primitive, rows in zip(primitives, _rows_between(time, times), strict=True)
-            if rows.size > 1
-            for piece in _sampled(str(primitive["name"]), primitive["kind"], samples.part(rows))
-        ),
+
+
+def _one_piece(one: Piece, other: Piece) -> Piece:
+    return Piece(
+        name=one.name,
+        twist=one.twist,
+        time=np.concatenate([one.time, other.time[1:]]),
+        pose=np.concatenate([one.pose, other.pose[1:]]),
+        control=np.concatenate([one.control, other.control[1:]]),
+        state=np.concatenate([one.state, other.state[1:]]),
     )
 
 
@@ -323,16 +320,6 @@ def _turning_points(samples: _Samples) -> list[int]:
     driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
     changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
     return [int(driven[k + 1]) for k in changes]
-
-
-def _rows_between(time: Array, switching_times: Array) -> Sequence[np.ndarray[Any, Any]]:
-    """Rows from each switching time to the next, both included; at most one if they coincide."""
-    slack = 1e-9 * max(1.0, float(np.abs(time).max()))
-    rows = []
-    for begin, end in pairwise(switching_times.tolist()):
-        inside = np.flatnonzero((time >= begin - slack) & (time <= end + slack))
-        rows.append(inside if end - begin > slack else inside[:1])
-    return rows
 
 
 def _held(control: Array) -> Array:

@@ -96,7 +96,14 @@ def _loop(log: FleetLog) -> Recording:
     times = np.minimum(log.times, last)
     total = np.where(np.isfinite(log.values), log.values, math.nan)
     total = np.append(total, 0.0 if log.reached else math.nan)[: log.times.size]
-    curves = [Curve(label="value", time=times, value=total)]
+    spent = np.zeros(log.times.size)
+    for name in fleet.names:
+        for step, cost in log.costs_of(name).items():
+            spent[step + 1] += cost
+    curves = [
+        Curve(label="value", time=times, value=total),
+        Curve(label="spent", time=times, value=np.cumsum(spent)),
+    ]
     curves += [
         Curve(label="value", time=times, value=_values(log, name), mover=name)
         for name in fleet.names
@@ -137,6 +144,7 @@ def _driven(log: FleetLog, k: int) -> Mover:
         bodies=bodies_of(problem),
         problem=problem,
         reached=arrived is not None,
+        arrived_s=arrived,
         reason="" if arrived is not None else why,
         there=(first if joins else -math.inf, gone),
         held=_held(log, name),
@@ -202,6 +210,7 @@ def _events(log: FleetLog) -> list[Event]:
         broken = [str(one) for one in step.violations]
         for kind, texts in (("exchanged", exchanges), ("broken", broken)):
             rows += [Event(time=float(step.time), kind=kind, text=text) for text in texts]
+        rows += [Event(time=float(step.time), kind="void", mover=name) for name in step.void]
     return rows
 
 

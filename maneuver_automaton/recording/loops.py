@@ -41,6 +41,16 @@ def _loop(loop: ClosedLoop) -> Recording:
     values = Curve(
         label="value", time=loop.times, value=np.array([*(s.value for s in loop.steps), loop.value])
     )
+    spent = Curve(
+        label="spent",
+        time=loop.times,
+        value=np.array([*(step.accumulated_cost for step in loop.steps), loop.cost]),
+    )
+    bound = Curve(
+        label="lower bound",
+        time=loop.times[:-1],
+        value=np.array([step.lower_bound for step in loop.steps]),
+    )
     solve = Curve(label="solve time", unit="s", time=loop.times[:-1], value=loop.solve_s)
     return Recording(
         kind="closed_loop",
@@ -52,7 +62,7 @@ def _loop(loop: ClosedLoop) -> Recording:
         movers=(mover,),
         world=world_of(problem),
         events=tuple(_events(loop)),
-        curves=(values, solve),
+        curves=(values, spent, bound, solve),
     )
 
 

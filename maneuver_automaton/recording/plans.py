@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -49,6 +51,30 @@ def _answer(result: PlanResult) -> Recording:
         ),
         search=_search(result),
     )
+
+
+def stated(document: Mapping[str, Any], plan: Plan | None) -> Recording:
+    """The recording of a loaded plan.json alone: of its `plan`, without body and obstacles."""
+    if plan is None:
+        ended = f"{str(document['status']).replace('_', ' ')}: {document.get('reason') or ''}"
+        stands = Plan(np.zeros(3), (), durations=[])
+        fact = Fact(label="no plan", value=ended.rstrip(": "))
+        mover = Mover(pieces=(stands,), has_plan=False, reached=False)
+        return Recording(
+            kind="plan", title="Plan", status=document["status"], facts=(fact,), movers=(mover,)
+        )
+    error, vehicle = document.get("terminal_error") or {}, document.get("vehicle") or {}
+    apart, turned = error.get("position_m"), error.get("heading_rad")
+    facts = plan_facts(
+        cost=document.get("cost"),
+        duration=plan.duration,
+        bound=None if document.get("gap") is None else document.get("lower_bound"),
+        clearance=document.get("clearance_m"),
+        error=None if apart is None or turned is None else (apart, turned),
+    )
+    names = tuple(vehicle.get("reduced_state") or ()), tuple(vehicle.get("control") or ())
+    mover = Mover(pieces=(plan,), names=names, cost=document.get("cost"))
+    return Recording(kind="plan", title="Plan", facts=tuple(facts), movers=(mover,))
 
 
 def plan_facts(
@@ -98,4 +124,5 @@ def _search(result: PlanResult) -> Search:
         nodes=result.nodes,
         reached=result.reached,
         narrowest=None if narrowest is None else np.array(narrowest.place),
+        missing_m=0.0 if narrowest is None else narrowest.missing,
     )

@@ -54,6 +54,7 @@ def _plan(result: RoadPlanResult) -> Recording:
         facts=tuple(facts),
         movers=(_mover("", result.planner, plan, result.reason, cost=result.cost),),
         world=_world(scene, ()),
+        curves=() if plan is None else (_across("", result.planner, plan),),
     )
 
 
@@ -75,7 +76,7 @@ def _drive(drive: RoadDrive) -> Recording:
         movers=(_driven("", drive),),
         world=_world(scene, ()),
         events=tuple(_events("", drive)),
-        curves=(_solve_times("", drive),),
+        curves=(_across("", drive.planner, drive.driven), _solve_times("", drive)),
     )
 
 
@@ -92,6 +93,9 @@ def _plans(result: RoadFleetResult) -> Recording:
         facts=(Fact(label="vehicles", value=number), *_nearest(result)),
         movers=tuple(_mover(name, one.planner, one.plan, one.reason) for name, one in rows),
         world=_world(_first(result.results), result.results),
+        curves=tuple(
+            _across(name, one.planner, one.plan) for name, one in rows if one.plan is not None
+        ),
     )
 
 
@@ -114,7 +118,10 @@ def _drives(drive: RoadFleetDrive) -> Recording:
         movers=tuple(_driven(name, one) for name, one in rows),
         world=_world(_first(drive.results), drive.results),
         events=tuple(event for name, one in rows for event in _events(name, one)),
-        curves=tuple(_solve_times(name, one) for name, one in rows),
+        curves=(
+            *(_across(name, one.planner, one.driven) for name, one in rows if one.steps),
+            *(_solve_times(name, one) for name, one in rows),
+        ),
     )
 
 
@@ -171,6 +178,7 @@ def _mover(
         reason=reason,
         cost=cost,
         there=there if leaves else (-math.inf, math.inf),
+        road=planner,
     )
 
 
@@ -180,6 +188,15 @@ def _events(name: str, drive: RoadDrive) -> list[Event]:
         for step in drive.steps
         if step.replanned
     ]
+
+
+def _across(name: str, planner: RoadPlanner, plan: Plan) -> Curve:
+    """The acceleration across the road."""
+    driven = plan.sample()
+    speed, steering = driven.reduced_state[:, 0], driven.reduced_state[:, 1]
+    across = speed**2 * np.tan(steering) / planner.vehicle.model.wheelbase
+    label = "lateral acceleration"
+    return Curve(label=label, unit="m/s²", time=driven.time, value=across, mover=name)
 
 
 def _solve_times(name: str, drive: RoadDrive) -> Curve:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,7 +49,7 @@ class Event:
     """What happened at a time: a plan made anew, an exchange, a guarantee broken."""
 
     time: float  # [s]
-    kind: str  # replanned | exchanged | broken | disturbed
+    kind: str  # replanned | exchanged | void | broken | disturbed
     text: str = ""
     mover: str = ""  # whom it concerns; empty: all
 
@@ -95,11 +96,13 @@ class Mover:
     regions: tuple[Shape, ...] = ()  # goals on roads
     has_plan: bool = True
     reached: bool = True  # whether it ends at a goal
+    arrived_s: float | None = None  # [s]; None: at the end of the last piece, if at all
     reason: str = ""  # why it has no plan, or did not arrive
     cost: float | None = None
     there: tuple[float, float] = (-math.inf, math.inf)  # [s] when it appears, and is gone
     held: tuple[tuple[float, Plan], ...] = ()  # the plan held from a time on [s]
     names: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())  # of state and control, by a file
+    road: Any = None  # the RoadPlanner of one that drives on roads
 
     __repr__ = brief
 
@@ -129,6 +132,11 @@ class Mover:
     def end_time(self) -> float:
         """Time at the end of the last piece [s]."""
         return float(self.pieces[-1].start_time + self.pieces[-1].duration)
+
+    @property
+    def arrival(self) -> float:
+        """When it arrived [s]; the end of the last piece if it did not."""
+        return self.end_time if self.arrived_s is None else self.arrived_s
 
     @property
     def duration(self) -> float:
@@ -242,8 +250,9 @@ class Search:
     bound: float | None = None
     kind: str = ""  # of the bound
     nodes: Array | None = None  # (n, 3 or 4) places that were expanded, and cost
-    reached: Array | None = None  # (n, 2) places a search came to that found no plan
+    reached: Array | None = None  # (n, 4, 2) places that a pose may get to, if there is no plan
     narrowest: Array | None = None  # (2,) place it could not pass
+    missing_m: float = 0.0  # by which that is too narrow
 
     __repr__ = brief
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports import driven_of
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.roads import RoadBenchmark, RoadVehicle, drive_scene, road_planner
 from tests.exports.cases import assert_close, drive_on_lanes
 from tests.plotting.cases import parking_plan
@@ -40,10 +40,12 @@ def test_states_are_those_of_the_middle_at_the_steps_of_the_scenario(step, tmp_p
     recorded = car(7, x=60.0, y=2.0, speed=8.0, steps=40, step=step)
     drive = drive_on_lanes(tmp_path, *LANES, recorded, problem(321), step=step)
     named = RoadBenchmark(scenario="ZAM_Lanes-1_1_T-1", version="2020a", problem=321)
-    driven = driven_of(drive)
-    assert driven.scene.benchmark == replace(named, scenario="TST_Lanes-1_1_T-1", version="2018b")
-    driven = replace(driven, scene=replace(driven.scene, benchmark=named))
-    ma.save_commonroad_solution(driven, tmp_path / "solution.xml", cost_function="WX1")
+    scene = drive.planner.scene
+    assert scene.benchmark == replace(named, scenario="TST_Lanes-1_1_T-1", version="2018b")
+    planner = replace(drive.planner, scene=replace(scene, benchmark=named))
+    ma.save_commonroad_solution(
+        replace(drive, planner=planner), tmp_path / "solution.xml", cost_function="WX1"
+    )
     attributes, trajectory, rows = states_of(tmp_path / "solution.xml")
     assert attributes["benchmark_id"] == "KS2:WX1:ZAM_Lanes-1_1_T-1:2020a"
     assert (trajectory.tag, trajectory.get("planningProblem")) == ("ksTrajectory", "321")
@@ -51,7 +53,9 @@ def test_states_are_those_of_the_middle_at_the_steps_of_the_scenario(step, tmp_p
     times = step * rows[:, 0]
     middle = RoadVehicle().middle_of(drive.driven.pose_at(times))
     assert_close(rows[:, 1:4], middle, atol=1e-9)
-    assert_close(rows[:, 4:], driven_of(drive).rows(step=step).reduced_state[: len(rows)])
+    assert_close(
+        rows[:, 4:], recording_of(drive).movers[0].rows(step=step).reduced_state[: len(rows)]
+    )
     assert times[-1] > drive.driven.duration - step
 
 
@@ -81,7 +85,7 @@ def test_other_vehicles_other_plans_and_other_costs_are_refused(tmp_path):
         "CommonRoad solution: the scenario is named 'TST_Lanes-1_1_T-1', need a benchmark's name "
         "such as DEU_Ffb-1_6_T-1: "
     )
-    late = replace(driven_of(drive), pieces=(replace(drive.driven, start_time=0.05),))
+    late = replace(drive, driven=replace(drive.driven, start_time=0.05))
     with pytest.raises(ValueError) as off:
         ma.save_commonroad_solution(late, tmp_path / "solution.xml")
     assert str(off.value) == (

@@ -1,24 +1,33 @@
-"""Rows of what is to be exported, whatever it is."""
+"""Rows of what is to be exported, whatever it is, and tables of them."""
 
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports import driven_of
+from maneuver_automaton.exports.recorded import exported
+from maneuver_automaton.recording import recording_of
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes, ends
 from tests.plotting.cases import parking_plan
+from tests.plotting.fleets import crossing
 from tests.plotting.loops import pushed_loop
+
+
+def driver(value):
+    """The one that drives."""
+    (mover,) = exported(value).movers
+    return mover
 
 
 @pytest.mark.parametrize("name", list(VALUES))
 @pytest.mark.parametrize("step", [None, 0.3])
 def test_rows_lead_from_the_first_pose_to_the_last(name, step):
     value = VALUES[name]()
-    driven = driven_of(value)
+    driven = driver(value)
     rows = driven.rows(step=step)
     first, last = ends(value)
     assert_close(rows.pose[0], first)
@@ -34,7 +43,7 @@ def test_rows_of_a_plan_are_its_own(name):
     value = VALUES[name]()
     plan = value if isinstance(value, ma.Plan) else value.plan
     model = None if isinstance(value, ma.Plan) else value.problem.automaton.model
-    ours, theirs = driven_of(value).rows(step=0.25), plan.as_arrays(step=0.25, model=model)
+    ours, theirs = driver(value).rows(step=0.25), plan.as_arrays(step=0.25, model=model)
     for name in ("time", "pose", "twist", "reduced_state", "control", "index"):
         np.testing.assert_array_equal(getattr(ours, name), getattr(theirs, name))
     assert ours.primitive.tolist() == theirs.primitive.tolist()
@@ -42,7 +51,7 @@ def test_rows_of_a_plan_are_its_own(name):
 
 def test_rows_of_a_loop_are_where_it_was_at_every_step():
     loop = pushed_loop()
-    rows = driven_of(loop).rows(step=0.5)
+    rows = driver(loop).rows(step=0.5)
     assert_close(rows.time, loop.times)
     assert_close(rows.pose, loop.poses)  # after each push
     names = [plan.word[0] for plan in loop.driven]
@@ -55,7 +64,7 @@ def test_every_kind_is_a_table(tmp_path):
         ma.save_csv(value, tmp_path / f"{name}.csv", step=0.1)
         with (tmp_path / f"{name}.csv").open(newline="") as stream:
             header, *lines = csv.reader(stream)
-        rows = driven_of(value).rows(step=0.1)
+        rows = driver(value).rows(step=0.1)
         known = list(rows.columns())
         assert (header[: len(known) - 1], header[-1]) == (known[:-1], "primitive")
         numbers = np.array([[float(cell) for cell in line[:-1]] for line in lines])
@@ -63,22 +72,50 @@ def test_every_kind_is_a_table(tmp_path):
     assert "state_steering" in header  # of the road
 
 
+def test_the_lines_of_a_fleet_begin_with_the_name(tmp_path):
+    result = crossing()  # the third of them has no plan
+    ma.save_csv(result, tmp_path / "fleet.csv", step=0.5)
+    with (tmp_path / "fleet.csv").open(newline="") as stream:
+        header, *lines = csv.reader(stream)
+    assert header[:4] == ["vehicle", "time_s", "x_m", "y_m"]
+    for name, plan in result.plans.items():
+        of_it = np.array([line[1:4] for line in lines if line[0] == name], dtype=np.float64)
+        rows = plan.as_arrays(step=0.5)
+        assert_close(of_it[:, 0], rows.time)
+        assert_close(of_it[:, 1:], rows.pose[:, :2])
+    assert {line[0] for line in lines} == {"there", "back"}
+
+
+def test_a_column_that_a_vehicle_does_not_have_is_empty(tmp_path):
+    car, robot = VALUES["inertia"](), VALUES["among obstacles"]()
+    movers = [replace(recording_of(one).movers[0], name=n) for n, one in
+              (("car", car), ("robot", robot))]  # fmt: skip
+    ma.save_csv(replace(recording_of(car), movers=tuple(movers)), tmp_path / "two.csv", step=1.0)
+    with (tmp_path / "two.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert all(row["state_steering"] for row in rows if row["vehicle"] == "car")
+    assert not any(row["state_steering"] for row in rows if row["vehicle"] == "robot")
+    assert all(row["control_speed"] for row in rows if row["vehicle"] == "robot")
+    assert all(row["primitive"] for row in rows)
+
+
 def test_what_is_no_plan_is_told():
     problem = VALUES["among obstacles"]().problem
     empty = ma.PlanResult(problem=problem, status=ma.PlanStatus.NO_PLAN, reason="none at all")
     with pytest.raises(ValueError) as error:
-        driven_of(empty)
+        exported(empty)
     assert str(error.value) == "the result has no plan to write: none at all"
     with pytest.raises(TypeError) as wrong:
-        driven_of(3)
+        exported(3)
     assert str(wrong.value) == (
-        "export: got int, need a Plan, PlanResult, ClosedLoop, RoadPlanResult or RoadDrive"
+        "export: got int, in which nobody moves; need a plan or its result, a closed loop, a fleet "
+        "or its loop, or a plan or drive on roads"
     )
 
 
 def test_a_plan_that_is_there_already_has_one_row():
     there = ma.Plan([1.0, 2.0, 0.5], (), durations=[])
-    rows = driven_of(there).rows(step=0.1)
+    rows = driver(there).rows(step=0.1)
     assert rows.pose.tolist() == [[1.0, 2.0, 0.5]]
     assert rows.primitive.tolist() == [""]
-    assert driven_of(parking_plan()).model is None
+    assert driver(parking_plan()).model is None

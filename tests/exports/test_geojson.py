@@ -11,10 +11,10 @@ import shapely
 from shapely.geometry import shape
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports import driven_of
 from maneuver_automaton.groups import SE2
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes, ends, slalom, trailer
 from tests.plotting.cases import parking_plan
+from tests.plotting.fleets import crossing
 from tests.roads.files import LANES, car, parked, problem
 
 
@@ -102,11 +102,24 @@ def test_a_road_has_lanelets_goals_and_those_who_are_there(tmp_path):
 
 
 def test_no_limit_is_null(tmp_path):
-    driven = driven_of(drive_on_lanes(tmp_path))
-    goal = replace(driven.scene.goals[0], time=(2.0, np.inf))
-    endless = replace(driven, scene=replace(driven.scene, goals=(goal,)))
-    ((_, facts),) = features(written(endless, tmp_path), "goal")
+    drive = drive_on_lanes(tmp_path)
+    scene = drive.planner.scene
+    goal = replace(scene.goals[0], time=(2.0, np.inf))
+    planner = replace(drive.planner, scene=replace(scene, goals=(goal,)))
+    ((_, facts),) = features(written(replace(drive, planner=planner), tmp_path), "goal")
     assert facts["time_s"] == [2.0, None]
+
+
+def test_what_several_do_is_told_apart(tmp_path):
+    result = crossing()
+    document = written(result, tmp_path)
+    paths = {facts["vehicle"]: path for path, facts in features(document, "path")}
+    assert {name: one.coords[-1] for name, one in paths.items()} == {
+        name: tuple(plan.end[:2]) for name, plan in result.plans.items()
+    }
+    assert [facts["vehicle"] for _, facts in features(document, "start")] == list(result.results)
+    once = [facts["name"] for _, facts in features(document, "obstacle") if "time_s" not in facts]
+    assert once == [""]  # the wall, which all three have around them
 
 
 def test_a_moved_plan_has_moved_features(tmp_path):

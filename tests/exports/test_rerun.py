@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports import driven_of
+from maneuver_automaton.recording import recording_of
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes
 from tests.plotting.cases import parking_plan
 from tests.roads.files import LANES, car, problem
@@ -40,7 +40,7 @@ def test_the_body_is_where_the_plan_is(name, tmp_path):
     ma.save_rerun(value, tmp_path / "plan.rrd", step=0.25)
     assert [one.name for one in tmp_path.iterdir()] == ["plan.rrd"]
     found = columns_of(tmp_path / "plan.rrd")
-    rows = driven_of(value).rows(step=0.25)
+    rows = recording_of(value).movers[0].rows(step=0.25)
     times, places = found["/world/vehicle", "translation"]
     assert_close(seconds(times), rows.time, atol=1e-6)
     altitude = rows.pose[:, 3] if rows.pose.shape[1] > 3 else np.zeros(len(rows.time))

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports.messages import TYPES
-from maneuver_automaton.exports.ros2_bag import ACKERMANN
+from maneuver_automaton.exports.ros import ACKERMANN, TYPES
 from tests.exports.cases import CAR, VALUES, assert_close, drive_on_lanes, ends, inertia, trailer
 from tests.plotting.cases import parking_plan
+from tests.plotting.fleets import crossing
 from tests.plotting.loops import pushed_loop
 
 
@@ -216,3 +217,31 @@ def test_a_bag_is_replaced_and_other_folders_are_kept(tmp_path):
 
 def test_the_one_package_beside_ros_is_defined_as_it_is():
     assert list(ACKERMANN) == ["ackermann_msgs/msg/AckermannDrive", TYPES["ackermann_cmd"]]
+
+
+def test_topics_and_frames_of_a_fleet_begin_with_the_name(tmp_path):
+    result = crossing()  # `back` begins half a second later, `stuck` has no plan
+    messages = ma.ros_messages(result, step=0.5, stamp=10.0)
+    assert set(messages) == {
+        f"{name}/{topic}"
+        for name in ("there", "back")
+        for topic in ("path", "trajectory", "cmd_vel")
+    } | {"tf"}
+    assert seconds(messages["back/path"]["poses"][0]["header"]["stamp"]) == 10.5
+    assert messages["back/cmd_vel"][0]["header"]["frame_id"] == "back/base_link"
+    stamps = [seconds(one["transforms"][0]["header"]["stamp"]) for one in messages["tf"]]
+    assert stamps == sorted(stamps)
+    names = {one["transforms"][0]["child_frame_id"] for one in messages["tf"]}
+    assert names == {"there/base_link", "back/base_link"}
+    pytest.importorskip("rosbags")
+    ma.save_ros2_bag(result, tmp_path / "bag", step=0.5, stamp=10.0)
+    types, found = read_bag(tmp_path / "bag")
+    assert types == {f"/{topic}": TYPES[topic.split("/")[-1]] for topic in messages}
+    assert [time for time, *_ in found] == sorted(time for time, *_ in found)
+
+
+def test_names_that_ros_does_not_take_are_changed():
+    result = replace(crossing(), problem=replace(crossing().problem, names=("100", "a-b", "c")))
+    plans = dict(zip(result.problem.names, crossing().results.values(), strict=True))
+    messages = ma.ros_messages(replace(result, results=plans), step=1.0)
+    assert {"vehicle_100/path", "a_b/path", "tf"} <= set(messages)

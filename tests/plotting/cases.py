@@ -10,6 +10,7 @@ from PIL import Image
 
 from maneuver_automaton.audit import TerminalError
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
@@ -60,6 +61,25 @@ def flight_plan():
         for name, twist in twists.items()
     )
     return Plan(np.zeros(4), trims, durations=np.array([3.0, 4.0, 5.0]))
+
+
+TOWN = (
+    Obstacle(Box([4.0, 3.0], [10.0, 4.0], 0.3), height=(0.0, 9.0)),
+    Obstacle(Disc(2.0, [18.0, -4.0]), height=(2.0, 5.0)),
+    Obstacle(Polygon([[25.0, 0.0], [30.0, 0.0], [30.0, 5.0], [28.0, 1.0]])),
+    Obstacle(Box([1.0, 1.0]), height=(0.0, 3.0), motion=Motion([0.0, 1.0], np.ones((2, 3)))),
+)
+
+
+def flight(obstacles=TOWN, plan=None):
+    """The answer of a helicopter that flies over a town."""
+    craft = load_stock_library("helicopter")
+    plan = flight_plan() if plan is None else plan
+    problem = Problem(craft, plan.start, plan.end, obstacles=obstacles)
+    return PlanResult(
+        problem=problem, status=PlanStatus.FOUND, reason="", plan=plan, goal_index=0, cost=12.0,
+        terminal_error=NO_ERROR, clearance_m=0.5,
+    )  # fmt: skip
 
 
 def slalom_problem(plan, **more):

@@ -14,7 +14,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.fleet_distances import thinned
+from maneuver_automaton.plotting.distances import thinned
 from maneuver_automaton.plotting.player.local import POSE_DIGITS, rounded
 from maneuver_automaton.plotting.regions import map_paths
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.plotting.footprint import footprint_polygons
@@ -21,14 +22,13 @@ from maneuver_automaton.plotting.player.composing import (
 from maneuver_automaton.plotting.player.local import Local
 from maneuver_automaton.plotting.player.motions import curve_entries, motion_entry
 from maneuver_automaton.plotting.player.surroundings import body_entries, obstacle_entries
-from maneuver_automaton.plotting.roads import road_box
 from maneuver_automaton.plotting.scene import Scene
 from maneuver_automaton.plotting.track import track_of_plan
 from maneuver_automaton.roads import RoadPlanner
 
 
 def drive_content(
-    planner: RoadPlanner, plan: Plan | None, facts: Sequence[Fact], *, ending: str
+    planner: RoadPlanner, plan: Plan | None, facts: Sequence[Fact], box: Array, *, ending: str
 ) -> dict[str, Any]:
     """A motion of the rear axle on lanelets, among traffic; without a plan, the start alone."""
     road, vehicle = planner.scene, planner.vehicle
@@ -53,9 +53,7 @@ def drive_content(
             }
         ],
         "bodies": body_entries(vehicle.footprint, {}),
-        **around(
-            scene, local, np.array(road_box(road, vehicle, plan)), size=vehicle.length, leave=True
-        ),
+        **around(scene, local, box, size=vehicle.length, leave=True),
         "lanes": [local.places(lanelet.ring) for lanelet in road.lanelets],
         "regions": obstacle_entries(places, local, leave=False),
         "ending": ending,

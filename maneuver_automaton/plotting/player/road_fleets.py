@@ -12,6 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.cast import cast_of
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.player.clearances import (
@@ -23,10 +24,9 @@ from maneuver_automaton.plotting.player.composing import Fact, around, names_of,
 from maneuver_automaton.plotting.player.local import Local, hex_color
 from maneuver_automaton.plotting.player.motions import curve_entries, motion_entry
 from maneuver_automaton.plotting.player.surroundings import body_entries, obstacle_entries
-from maneuver_automaton.plotting.road_fleets import AnyRoadFleet, road_fleet_colors
-from maneuver_automaton.plotting.roads import road_box
 from maneuver_automaton.plotting.scene import Scene
 from maneuver_automaton.plotting.track import track_of_plan
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.roads import RoadFleetDrive, RoadFleetResult, RoadPlanner, RoadVehicle
 
 LOOK_S = 0.02  # [s] between looks at distances
@@ -54,13 +54,18 @@ def road_loop_content(drive: RoadFleetDrive) -> dict[str, Any]:
 
 
 def _content(
-    what: AnyRoadFleet, facts: list[Fact], reasons: Mapping[str, str], *, ending: str
+    what: RoadFleetResult | RoadFleetDrive,
+    facts: list[Fact],
+    reasons: Mapping[str, str],
+    *,
+    ending: str,
 ) -> dict[str, Any]:
     planners = {name: one.planner for name, one in what.results.items()}
     first = next(iter(planners.values()))
     vehicle, local = first.vehicle, Local(first.scene.start.middle[:2])
     plans = {name: what.plans.get(name) or _standing(planner) for name, planner in planners.items()}
-    colors = road_fleet_colors(what)
+    cast = cast_of(recording_of(what))
+    colors = {one.mover.name: one.color for one in cast.actors}
     tracks = {name: track_of_plan(plan) for name, plan in plans.items()}
     every = {name: twist for track in tracks.values() for name, twist in track.twists.items()}
     trims = track_colors(every)
@@ -93,7 +98,6 @@ def _content(
         )
     if what.pairs:
         facts.append(("nearest", f"{what.distance_m:.3g} m"))
-    boxes = np.array([road_box(planners[k].scene, vehicle, plan) for k, plan in plans.items()])
     traffic = tuple(one for one in first.scene.traffic if one.name not in planners)
     there = Scene(goals=(), obstacles=traffic, body=(), times=np.zeros(1))
     least = np.min([*nearest.values(), np.full(len(times), np.inf)], axis=0)
@@ -106,7 +110,7 @@ def _content(
         **around(
             there,
             local,
-            np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)]),
+            cast.box,
             size=vehicle.length,
             leave=True,
         ),

@@ -8,18 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet import FleetLog, FleetResult
 from maneuver_automaton.planning import PlanResult
-from maneuver_automaton.plotting.closed_loop_track import (
-    driven_track,
-    loop_colors,
-    loop_scene,
-    loop_view,
-)
+from maneuver_automaton.plotting.cast import cast_of
 from maneuver_automaton.plotting.labels import stated_labels
 from maneuver_automaton.plotting.motions import track_colors
-from maneuver_automaton.plotting.paths import bare_scene
 from maneuver_automaton.plotting.player.composing import (
     Fact,
     around,
@@ -35,9 +30,10 @@ from maneuver_automaton.plotting.player.motions import motion_entry
 from maneuver_automaton.plotting.player.page import Player
 from maneuver_automaton.plotting.player.road_fleets import road_loop_content, road_plans_content
 from maneuver_automaton.plotting.player.surroundings import body_entries
-from maneuver_automaton.plotting.scene import plan_scene
+from maneuver_automaton.plotting.scene import bare_scene, plan_scene
 from maneuver_automaton.plotting.track import Track, track_of_plan
 from maneuver_automaton.receding_horizon import ClosedLoop, Step
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.roads import RoadDrive, RoadFleetDrive, RoadFleetResult, RoadPlanResult
 
 MOST_NODES = 20_000  # shown of a search
@@ -156,20 +152,20 @@ def _(result: PlanResult) -> dict[str, Any]:
 
 @content_of.register
 def _(loop: ClosedLoop) -> dict[str, Any]:
-    track, colors, scene = driven_track(loop), loop_colors(loop), loop_scene(loop)
+    cast = cast_of(recording_of(loop))
+    track, colors, scene = cast.actors[0].track, cast.colors, cast.scene
     local, names, problem = Local(loop.poses[0, :2]), names_of(colors), loop.problem
     motion = played(track, local, names, scene=scene, problem=problem)
     motion["poses"][-1] = local.poses(loop.poses[-1])  # what pushed it at the end included
     motion["times"][-1] = float(loop.times[-1])
     motion["curves"].append(_values(loop))
-    box, size = loop_view(loop, scene)
     return {
         "title": "Closed loop",
         "facts": _loop_facts(loop),
         "trims": trim_entries(colors),
         "motions": [motion],
         "bodies": body_entries(problem.footprint, problem.parts),
-        **around(scene, local, box, size=size),
+        **around(scene, local, cast.box, size=cast.size),
         "steps": [_step(step, local, names) for step in loop.steps],
         "ending": "goal reached" if loop.reached else loop.reason,
     }
@@ -186,7 +182,7 @@ def _(result: RoadPlanResult) -> dict[str, Any]:
             ("clearance", f"{verdict.clearance_m:.3g} m"),
             ("to the edge of the road", f"{verdict.edge_m:.3g} m"),
         ]
-    return drive_content(result.planner, plan, facts, ending=result.reason)
+    return drive_content(result.planner, plan, facts, _box(result), ending=result.reason)
 
 
 @content_of.register
@@ -199,7 +195,12 @@ def _(drive: RoadDrive) -> dict[str, Any]:
         ("clearance", f"{verdict.clearance_m:.3g} m"),
     ]
     ending = "goal reached" if drive.reached else drive.reason
-    return drive_content(drive.planner, drive.driven, facts, ending=ending)
+    return drive_content(drive.planner, drive.driven, facts, _box(drive), ending=ending)
+
+
+def _box(result: RoadPlanResult | RoadDrive) -> Array:
+    """The box (2, 2) around a drive and what is beside it."""
+    return cast_of(recording_of(result)).box
 
 
 def _plan_facts(

@@ -13,20 +13,20 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.fleet_cast import Cast, Member
+from maneuver_automaton.plotting.cast import Actor, rings_with_radius
 
 STEP_S, MOST_STEPS = 0.05, 20_000  # between samples; no more of them, however long it takes
 AT_ONCE = 2_000_000  # pairs in memory
 Numbers = NDArray[Any]
 
 
-def distance_times(cast: Cast) -> Array:
+def distance_times(begin: float, end: float) -> Array:
     """Times (n,) at which distances are measured [s], 0.05 s apart unless it takes long."""
-    steps = min(max(1, int(np.ceil((cast.end - cast.begin) / STEP_S))), MOST_STEPS)
-    return np.linspace(cast.begin, cast.end, steps + 1)
+    steps = min(max(1, int(np.ceil((end - begin) / STEP_S))), MOST_STEPS)
+    return np.linspace(begin, end, steps + 1)
 
 
-def nearest_others(members: Sequence[Member], times: Array) -> Array:
+def nearest_others(actors: Sequence[Actor], times: Array) -> Array:
     """Distance of each vehicle from the nearest other at times (n,) [s]: (n, vehicles) [m].
 
     It is inf where there is no other. Pairs that a circle around each shows to be further apart
@@ -36,24 +36,25 @@ def nearest_others(members: Sequence[Member], times: Array) -> Array:
     --------
     >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
     >>> from maneuver_automaton.fleet import FleetProblem, plan_fleet
-    >>> from maneuver_automaton.plotting.fleet_cast import cast_of
+    >>> from maneuver_automaton.plotting.cast import cast_of
+    >>> from maneuver_automaton.recording import recording_of
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
     >>> rows = [Problem(robot, [0, y, 0], [3, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
-    >>> cast = cast_of(plan_fleet(FleetProblem(rows), max_rounds=0))
-    >>> nearest_others(cast.members, np.array([0.0, 1.5])).round(9).tolist()
+    >>> cast = cast_of(recording_of(plan_fleet(FleetProblem(rows), max_rounds=0)))
+    >>> nearest_others(cast.actors, np.array([0.0, 1.5])).round(9).tolist()
     [[0.4, 0.4], [0.4, 0.4]]
     """
     rows = [
-        (owner, ring, grown, part.motion.pose_at(times))
-        for owner, one in enumerate(members)
+        (owner, ring, grown, part.pose_at(times))
+        for owner, one in enumerate(actors)
         for part in one.parts
-        for ring, grown in part.rings
+        for ring, grown in rings_with_radius(part.bodies.get("", ()))
     ]
     owners = np.array([owner for owner, *_ in rows])
-    seen = [[one.is_there(time) for time in times.tolist()] for one in members]
+    seen = [[one.mover.is_there(time) for time in times.tolist()] for one in actors]
     there = np.array(seen)[owners]  # (parts, n)
-    heights = np.array([_heights(one, times) for one in members])[owners]  # (parts, n, 2)
-    apart = np.full((len(times), len(members)), np.inf)
+    heights = np.array([_heights(one, times) for one in actors])[owners]  # (parts, n, 2)
+    apart = np.full((len(times), len(actors)), np.inf)
     chunk = max(1, AT_ONCE // len(rows) ** 2)
     for first in range(0, len(times), chunk):
         part = slice(first, first + chunk)
@@ -64,11 +65,11 @@ def nearest_others(members: Sequence[Member], times: Array) -> Array:
     return apart
 
 
-def _heights(one: Member, times: Array) -> Array:
+def _heights(one: Actor, times: Array) -> Array:
     """Lowest and highest point of a vehicle at times (n,) [s]: (n, 2) [m], infinite if any."""
-    low, high = one.problem.body_height
-    altitude = one.parts[0].motion.pose_at(times)[:, 3:].sum(axis=1)  # 0 in the plane
-    if one.problem.start.size == 3 and not low < high:
+    low, high = (0.0, 0.0) if one.mover.problem is None else one.mover.problem.body_height
+    altitude = one.mover.pose_at(times)[:, 3:].sum(axis=1)  # 0 in the plane
+    if one.mover.start.size == 3 and not low < high:
         low, high = -np.inf, np.inf
     return np.column_stack([altitude + low, altitude + high])
 

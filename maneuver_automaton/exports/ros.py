@@ -1,0 +1,480 @@
+"""Messages of ROS 2 as plain dicts, which need no ROS, and a bag of them, written by rosbags."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+import uuid
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import PART
+from maneuver_automaton.automaton.plan_arrays import PlanArrays
+from maneuver_automaton.errors import MissingExtra
+from maneuver_automaton.exports.kinematics import accelerations, twist_rates
+from maneuver_automaton.exports.recorded import drivers, exported
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.models import Model
+from maneuver_automaton.recording import Mover
+
+TYPES = {  # by topic
+    "path": "nav_msgs/msg/Path",
+    "trajectory": "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    "cmd_vel": "geometry_msgs/msg/TwistStamped",
+    "ackermann_cmd": "ackermann_msgs/msg/AckermannDriveStamped",
+    "tf": "tf2_msgs/msg/TFMessage",
+}
+SINGLE = ("path", "trajectory")  # topics of one message, at the beginning
+STEP = 0.1  # [s]
+NANO = 1_000_000_000
+METADATA, STORED = "metadata.yaml", (".db3", ".mcap")  # what is in a bag
+VERSION: Literal[8] = 8  # of metadata.yaml: Humble cannot read the profiles of 9
+# Source: ackermann_msgs, by J. O'Quin; the one package among these that is not part of ROS itself.
+ACKERMANN = {
+    "ackermann_msgs/msg/AckermannDrive": """
+float32 steering_angle
+float32 steering_angle_velocity
+float32 speed
+float32 acceleration
+float32 jerk
+""",
+    "ackermann_msgs/msg/AckermannDriveStamped": """
+std_msgs/Header header
+ackermann_msgs/AckermannDrive drive
+""",
+}
+
+Message = dict[str, Any]
+
+
+def ros_messages(
+    value: Any,
+    *,
+    step: float = STEP,
+    stamp: float = 0.0,
+    frame: str = "map",
+    body_frame: str = "base_link",
+    model: Model | None = None,
+) -> dict[str, Any]:
+    """A plan, a closed loop, a fleet or a drive as messages of ROS 2: fields by name, nested.
+
+    ``set_message_fields`` of `rosidl_runtime_py` fills a message with such a dict.
+
+    Parameters
+    ----------
+    value : any result, or a Recording
+        A Plan alone knows no model.
+    step : float
+        Time between poses [s]; the last one is the end.
+    stamp : float
+        Time of the first pose on the clock of ROS [s]: that of the plan counts from there.
+    frame, body_frame : str
+        Names of the frames of the world and the vehicle.
+    model : Model, optional
+        The vehicle of a Plan.
+
+    Returns
+    -------
+    dict
+        By topic: `path`, a nav_msgs/Path with a stamp for every pose; `trajectory`, a
+        trajectory_msgs/MultiDOFJointTrajectory of the vehicle and the parts that it carries, its
+        velocities and accelerations in `frame`, by the model's equations where it is known,
+        otherwise by differences, as of the parts; and lists of one message for every pose:
+        `cmd_vel`, of geometry_msgs/TwistStamped in `body_frame`; `tf`, of tf2_msgs/TFMessage; and
+        for a model with a steering angle `ackermann_cmd`, of ackermann_msgs/AckermannDriveStamped.
+        Of several vehicles all topics but `tf`, and the frames of their bodies, begin with the name
+        of the vehicle and a slash.
+
+    Raises
+    ------
+    TypeError
+        If nobody moves in the value.
+    ValueError
+        If nobody has a plan, `step` is not positive, or `stamp` is not finite or negative.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Plan
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
+    >>> messages = ros_messages(Plan([0, 0, 0], (ahead,), durations=[2.0]), step=1.0)
+    >>> messages["path"]["poses"][1]["header"]
+    {'stamp': {'sec': 1, 'nanosec': 0}, 'frame_id': 'map'}
+    >>> messages["path"]["poses"][1]["pose"]["position"]
+    {'x': 1.0, 'y': 0.0, 'z': 0.0}
+    """
+    if not (math.isfinite(stamp) and stamp >= 0.0):
+        raise ValueError(f"stamp: must not be negative, got {stamp} s")
+    recording = exported(value, model=model)
+    start = round(stamp * NANO)  # whole: today's seconds leave a float no nanoseconds
+    found: dict[str, Any] = {}
+    frames: list[Message] = []
+    for mover in drivers(recording):
+        begin = start + round((mover.start_time - recording.begin) * NANO)
+        name = f"{_ros_name(mover.name)}/" if len(recording.movers) > 1 else ""
+        messages = _messages(
+            mover, step=step, begin=begin, frame=frame, body_frame=name + body_frame, prefix=name
+        )
+        frames += messages.pop("tf")
+        found |= {name + topic: messages[topic] for topic in messages}
+    return found | {"tf": sorted(frames, key=_stamp_of)}
+
+
+def _messages(
+    mover: Mover, *, step: float, begin: int, frame: str, body_frame: str, prefix: str
+) -> dict[str, Any]:
+    """The messages of one vehicle, whose first pose is at `begin` [ns]."""
+    rows = mover.rows(step=step)
+    since = rows.time - rows.time[0]
+    stamps = [_time(one, begin) for one in since.tolist()]
+    headers = [{"stamp": one, "frame_id": frame} for one in stamps]
+    parts = [(prefix + name, poses) for name, poses in _carried(mover, rows)]
+    frames = [(body_frame, rows.pose), *parts]
+    places = zip(headers, _poses(rows.pose), strict=True)
+    messages: dict[str, Any] = {
+        "path": {
+            "header": headers[0],
+            "poses": [{"header": header, "pose": pose} for header, pose in places],
+        },
+        "trajectory": _trajectory(frames, rows, since, headers[0], mover.model),
+        "cmd_vel": [
+            {"header": {"stamp": one, "frame_id": body_frame}, "twist": twist}
+            for one, twist in zip(stamps, _twists(rows.twist), strict=True)
+        ],
+    }
+    steering = _column(rows, "steering")
+    if steering is not None:
+        messages["ackermann_cmd"] = _ackermann(rows, steering, stamps, body_frame)
+    return messages | {"tf": _frames(frames, headers)}
+
+
+def _ros_name(name: str) -> str:
+    """A name that ROS takes for a part of a topic: letters, digits and underscores."""
+    kept = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return kept if kept[:1].isalpha() else f"vehicle_{kept}"
+
+
+def _trajectory(
+    frames: Sequence[tuple[str, Array]],
+    rows: PlanArrays,
+    since: Array,
+    header: Message,
+    model: Model | None,
+) -> Message:
+    """Transforms, velocities and accelerations of all frames, seen from the world."""
+    transforms = [_transforms(poses) for _, poses in frames]
+    velocity = _in_world(rows.pose, rows.twist)
+    if model is None:
+        acceleration = _rates(rows.time, velocity)
+    else:
+        acceleration = twist_rates(model, rows.reduced_state, rows.control)
+        acceleration[:, :2] = accelerations(rows.twist, acceleration)
+        acceleration = _in_world(rows.pose, acceleration)
+    carried = [_rates(rows.time, poses) for _, poses in frames[1:]]
+    velocities = list(map(_twists, (velocity, *carried)))
+    changes = (acceleration, *(_rates(rows.time, one) for one in carried))
+    accelerations_of = list(map(_twists, changes))
+    return {
+        "header": header,
+        "joint_names": [name for name, _ in frames],
+        "points": [
+            {
+                "transforms": [one[k] for one in transforms],
+                "velocities": [one[k] for one in velocities],
+                "accelerations": [one[k] for one in accelerations_of],
+                "time_from_start": _time(time),
+            }
+            for k, time in enumerate(since.tolist())
+        ],
+    }
+
+
+def _frames(frames: Sequence[tuple[str, Array]], headers: Sequence[Message]) -> list[Message]:
+    """Transforms from the world to all frames, one message an instant."""
+    transforms = [_transforms(poses) for _, poses in frames]
+    return [
+        {
+            "transforms": [
+                {"header": header, "child_frame_id": name, "transform": one[k]}
+                for (name, _), one in zip(frames, transforms, strict=True)
+            ]
+        }
+        for k, header in enumerate(headers)
+    ]
+
+
+def _ackermann(
+    rows: PlanArrays, steering: Array, stamps: Sequence[Message], frame: str
+) -> list[Message]:
+    """Speed and steering angle; a rate of zero asks for the change at once."""
+    nothing = np.zeros(len(rows.time))
+    rate, acceleration = (_column(rows, name) for name in ("steering_rate", "acceleration"))
+    fields = {
+        "steering_angle": steering,
+        "steering_angle_velocity": nothing if rate is None else rate,
+        "speed": rows.twist[:, 0],
+        "acceleration": nothing if acceleration is None else acceleration,
+        "jerk": nothing,
+    }
+    return [
+        {
+            "header": {"stamp": stamp, "frame_id": frame},
+            "drive": {name: float(values[k]) for name, values in fields.items()},
+        }
+        for k, stamp in enumerate(stamps)
+    ]
+
+
+def _column(rows: PlanArrays, name: str) -> Array | None:
+    """A component (n,) of the reduced state or the control; None if the model has none."""
+    for names, values in (
+        (rows.reduced_names, rows.reduced_state),
+        (rows.control_names, rows.control),
+    ):
+        if name in names:
+            return np.asarray(values[:, names.index(name)])
+    return None
+
+
+def _carried(mover: Mover, rows: PlanArrays) -> list[tuple[str, Array]]:
+    """Names and poses (n, dof) of the parts that the vehicle carries."""
+    model = mover.model
+    if model is None or not model.part_names:
+        return []
+    seen = np.asarray(model.part_poses(rows.reduced_state))
+    vehicle = SE2(rows.pose[:, :3])
+    return [
+        (name, np.concatenate([(vehicle @ SE2(seen[:, k, :3])).pose, rows.pose[:, 3:]], axis=1))
+        for k, name in enumerate(model.part_names)
+    ]
+
+
+def _in_world(pose: Array, twist: Array) -> Array:
+    """Twists (n, dof) of the body frame, turned into that of the world."""
+    turned = twist.copy()
+    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    turned[:, 0] = cos * twist[:, 0] - sin * twist[:, 1]
+    turned[:, 1] = sin * twist[:, 0] + cos * twist[:, 1]
+    return turned
+
+
+def _rates(time: Array, pose: Array) -> Array:
+    """Rates (n, dof) of poses, by differences."""
+    if len(time) < 2:
+        return np.zeros_like(pose)
+    return np.asarray(np.gradient(pose, time, axis=0))
+
+
+def _poses(pose: Array) -> list[Message]:
+    return [
+        {"position": one["translation"], "orientation": one["rotation"]}
+        for one in _transforms(pose)
+    ]
+
+
+def _transforms(pose: Array) -> list[Message]:
+    """Transforms of poses (n, dof): a quaternion about z."""
+    altitude = pose[:, 3] if pose.shape[1] > 3 else np.zeros(len(pose))
+    half = 0.5 * np.remainder(pose[:, 2] + np.pi, 2.0 * np.pi) - 0.5 * np.pi
+    table = zip(*(column.tolist() for column in (
+        pose[:, 0], pose[:, 1], altitude, np.sin(half), np.cos(half)
+    )), strict=True)  # fmt: skip
+    return [
+        {
+            "translation": {"x": x, "y": y, "z": z},
+            "rotation": {"x": 0.0, "y": 0.0, "z": sin, "w": cos},
+        }
+        for x, y, z, sin, cos in table
+    ]
+
+
+def _twists(twist: Array) -> list[Message]:
+    climb = twist[:, 3] if twist.shape[1] > 3 else np.zeros(len(twist))
+    table = zip(*(c.tolist() for c in (*twist[:, :3].T, climb)), strict=True)
+    return [
+        {"linear": {"x": x, "y": y, "z": z}, "angular": {"x": 0.0, "y": 0.0, "z": turn}}
+        for x, y, turn, z in table
+    ]
+
+
+def _time(seconds: float, begin: int = 0) -> Message:
+    """A builtin_interfaces/Time or Duration: seconds since `begin` [ns]."""
+    sec, nanosec = divmod(begin + round(seconds * NANO), NANO)
+    return {"sec": sec, "nanosec": nanosec}
+
+
+def save_ros2_bag(
+    value: Any,
+    path: Path | str,
+    *,
+    step: float = STEP,
+    stamp: float = 0.0,
+    frame: str = "map",
+    body_frame: str = "base_link",
+    model: Model | None = None,
+) -> None:
+    """Write a plan, a closed loop, a fleet or a drive as a bag of ROS 2, a folder with SQLite.
+
+    ``ros2 bag play`` and Foxglove play it. The topics are those of `ros_messages`, each with a
+    slash before its name; `/path` and `/trajectory` come first, and are latched.
+
+    Parameters
+    ----------
+    value : any result, or a Recording
+        A Plan alone knows no model.
+    path : Path or str
+        The folder; a bag that is there already is replaced.
+    step, stamp, frame, body_frame, model : optional
+        See `ros_messages`.
+
+    Raises
+    ------
+    MissingExtra
+        If rosbags is not installed.
+    TypeError, ValueError
+        As `ros_messages`.
+    OSError
+        If the folder cannot be written, or is there and no bag.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Plan
+    >>> from maneuver_automaton.primitives import Trim
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
+    >>> folder = getfixture("tmp_path") / "bag"
+    >>> save_ros2_bag(Plan([0, 0, 0], (ahead,), durations=[2.0]), folder)
+    >>> sorted(file.name for file in folder.iterdir())
+    ['bag.db3', 'metadata.yaml']
+    """
+    messages = ros_messages(
+        value, step=step, stamp=stamp, frame=frame, body_frame=body_frame, model=model
+    )
+    folder = Path(path)
+    _check_free(folder)
+    beside = folder.parent / f"{PART}{uuid.uuid4().hex}"
+    beside.mkdir(parents=True)
+    try:
+        _write(messages, beside / folder.name)
+        _replace(folder, by=beside / folder.name, old=beside / "old")
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def _check_free(folder: Path) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise FileExistsError(17, "is a file, need a folder for a bag", str(folder))
+    if any(one.name != METADATA and one.suffix not in STORED for one in folder.iterdir()):
+        raise FileExistsError(17, "is a folder with other files, need a new one", str(folder))
+
+
+def _replace(folder: Path, *, by: Path, old: Path) -> None:
+    """Put a folder in the place of another; where that fails, the old one stays."""
+    there = folder.exists()
+    if there:
+        folder.rename(old)
+    try:
+        by.rename(folder)
+    except OSError:
+        if there:
+            old.rename(folder)
+        raise
+
+
+def _write(messages: dict[str, Any], folder: Path) -> None:
+    try:
+        from rosbags.rosbag2 import Writer
+        from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    except ImportError as error:
+        raise MissingExtra(
+            "ROS 2 bag: rosbags is not installed; need pip install 'maneuver-automaton[ros]'"
+        ) from error
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in ACKERMANN.items():
+        store.register(get_types_from_msg(text, name))
+    with Writer(folder, version=VERSION) as bag:
+        kinds = {topic: TYPES[topic.rpartition("/")[2]] for topic in messages}
+        connections = {
+            topic: bag.add_connection(
+                f"/{topic}",
+                kind,
+                typestore=store,
+                offered_qos_profiles=_latched() if _is_single(topic) else (),
+            )
+            for topic, kind in kinds.items()
+        }
+        for time, topic, message in _in_time(messages):
+            built = _built(store, kinds[topic], message)
+            bag.write(connections[topic], time, store.serialize_cdr(built, kinds[topic]))
+
+
+def _is_single(topic: str) -> bool:
+    return topic.rpartition("/")[2] in SINGLE
+
+
+def _in_time(messages: dict[str, Any]) -> list[tuple[int, str, Message]]:
+    """Time [ns], topic and message, in the order of the times; single ones first."""
+    topics = sorted(messages, key=lambda topic: not _is_single(topic))
+    timed = [
+        (_stamp_of(one), topic, one)
+        for topic in topics
+        for one in ([messages[topic]] if _is_single(topic) else messages[topic])
+    ]
+    return sorted(timed, key=lambda row: row[0])
+
+
+def _stamp_of(message: Message) -> int:
+    """The time of a message, or of the first transform in it [ns]."""
+    header = message["header"] if "header" in message else message["transforms"][0]["header"]
+    stamp = header["stamp"]
+    return int(stamp["sec"] * NANO + stamp["nanosec"])
+
+
+def _built(store: Any, name: str, value: dict[str, Any]) -> Any:
+    """A message of rosbags from the fields of a dict."""
+    _, fields = store.fielddefs[name]
+    return store.types[name](**{field: _field(store, kind, value[field]) for field, kind in fields})
+
+
+def _field(store: Any, kind: Any, value: Any) -> Any:
+    from rosbags.interfaces import Nodetype
+
+    node, inner = kind
+    if node == Nodetype.NAME:
+        return _built(store, inner, value)
+    if node == Nodetype.SEQUENCE:
+        return [_field(store, inner[0], one) for one in value]
+    return value
+
+
+def _latched() -> list[Any]:
+    """Who subscribes later gets the last message too."""
+    from rosbags.interfaces import (
+        Qos,
+        QosDurability,
+        QosHistory,
+        QosLiveliness,
+        QosReliability,
+        QosTime,
+    )
+
+    never = QosTime(0, 0)
+    return [
+        Qos(
+            history=QosHistory.KEEP_LAST,
+            depth=1,
+            reliability=QosReliability.RELIABLE,
+            durability=QosDurability.TRANSIENT_LOCAL,
+            deadline=never,
+            lifespan=never,
+            liveliness=QosLiveliness.SYSTEM_DEFAULT,
+            liveliness_lease_duration=never,
+            avoid_ros_namespace_conventions=False,
+        )
+    ]

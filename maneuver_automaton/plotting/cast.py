@@ -1,0 +1,337 @@
+"""A recording as pictures see it: who is drawn along which track, in which colour, among what."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision import Disc, Obstacle, Shape
+from maneuver_automaton.collision.outline import outlines, rings_of
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.colors import SEQUENCE, Color, fleet_colors
+from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.labels import word_text
+from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.obstacles import round_times
+from maneuver_automaton.plotting.regions import shape_path
+from maneuver_automaton.plotting.scene import (
+    ROOM,
+    STILL_SIZE_M,
+    Carried,
+    Scene,
+    mark_size,
+    view_box,
+)
+from maneuver_automaton.plotting.track import Track, joined_track, track_of_plan
+from maneuver_automaton.problem import Goal
+from maneuver_automaton.recording import Mover, Recording
+
+MOST_NAMES = 12  # of vehicles in a legend; more have numbers at their starts
+MOST_LABEL = 4  # characters of a name that stands at a start itself
+STEPS, STEPS_OF_MANY = 10, 5  # between the times at which bodies are shown
+REST = 1e-9  # [m/s, rad/s]: what is slower rests
+JUMP_M = 1e-9  # [m] between the end of a piece and the start of the next
+BESIDE_M = 25.0  # [m] on roads, others are in view so near to those who drive
+ROADSIDE_M = 12.0  # [m] around all that drives on roads
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Actor:
+    """A vehicle: what it drove as a track, its body, and how it is told from others."""
+
+    mover: Mover
+    name: str
+    label: str  # where there is little room
+    color: Color
+    track: Track
+    parts: tuple[Mover, ...]  # the vehicle, then what it carries
+    held: tuple[tuple[float, Track], ...]  # the plan held from a time on [s]
+
+    @property
+    def drives(self) -> bool:
+        """Whether it has a plan."""
+        return self.mover.has_plan
+
+    @property
+    def begin(self) -> float:
+        """When it may leave its start [s]."""
+        return self.mover.start_time
+
+    @property
+    def arrival(self) -> float:
+        """When it arrives, or its course ends [s]; its begin if it has none."""
+        return self.mover.arrival
+
+    @property
+    def body(self) -> list[Array]:
+        """Outlines (n, 2) of its body in its own frame [m]; none if it is not known."""
+        return footprint_polygons(list(self.mover.bodies.get("", ())))
+
+    @property
+    def reach(self) -> float:
+        """No point of its body is further from its pose [m]."""
+        return max((float(np.linalg.norm(one, axis=1).max()) for one in self.body), default=0.0)
+
+    @property
+    def goal_outlines(self) -> list[Array]:
+        """Outlines (n, 2) of its body at its goals, those of any heading left out [m]."""
+        poses = [goal.pose for goal in self.mover.goals if not goal.free_heading]
+        return placed(self.body, np.array(poses)) if poses else []
+
+    @property
+    def spans(self) -> list[tuple[float, float, bool]]:
+        """Begin, end [s] and whether it rests, of all that it does in a row."""
+        rows: list[tuple[float, float, bool]] = []
+        for piece in self.track.pieces:
+            first, last = float(piece.time[0]), min(float(piece.time[-1]), self.arrival)
+            if first >= last:
+                break
+            rests = float(np.abs(np.diff(piece.pose, axis=0)).max(initial=0.0)) <= REST
+            if rows and rows[-1][2] == rests:
+                rows[-1] = (rows[-1][0], last, rests)
+            else:
+                rows.append((first, last, rests))
+        return rows
+
+    @property
+    def jumps(self) -> list[tuple[float, Array]]:
+        """When and from where to where (2, 2) it was put beside what it drove [s, m]."""
+        pieces = self.mover.pieces
+        rows = [
+            (after.start_time, np.array([one.end[:2], after.start[:2]]))
+            for one, after in pairwise(pieces)
+        ]
+        last = np.array([pieces[-1].end[:2], np.asarray(self.mover.end)[:2]])
+        rows.append((self.arrival, last))
+        return [(time, line) for time, line in rows if np.abs(line[1] - line[0]).max() > JUMP_M]
+
+    @property
+    def decisions(self) -> Array:
+        """Poses (n, dof) at which its pieces begin, and its end; none between if it has a plan."""
+        return np.array([*(piece.start for piece in self.mover.pieces), self.mover.end])
+
+    def bodies_at(self, time: float) -> list[Array]:
+        """Outlines (n, 2) of all its parts at a time [s]; none where it is a point, or gone."""
+        if not self.mover.is_there(time):
+            return []
+        return self.bodies_along(np.array([time]))
+
+    def bodies_along(self, times: Array) -> list[Array]:
+        """Outlines (n, 2) of all its parts at times (n,) [s], first one shape, then the next."""
+        return (
+            [
+                ring
+                for part in self.parts
+                for ring in placed(footprint_polygons(list(part.bodies[""])), part.pose_at(times))
+            ]
+            if self.body
+            else []
+        )
+
+    def points(self, size: float) -> Array:
+        """Places (n, 2) where something happens: tracks, bodies along them, start and goals."""
+        goals = [goal.pose for goal in self.mover.goals]
+        ends = np.array([self.track.start, np.asarray(self.mover.end), *goals])
+        room = 0.0 if self.body else ROOM * size
+        held = [track.pose[:, :2] for _, track in self.held]
+        times = np.append(self.begin, self.track.switching_times)
+        bodies = self.bodies_along(times) + placed(
+            self.body, np.concatenate([ends, self.decisions])
+        )
+        return np.concatenate(
+            [self.track.pose[:, :2], ends[:, :2] - room, ends[:, :2] + room, *held, *bodies]
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Cast:
+    """All vehicles of a recording, what is around them, and the box (2, 2) around all that."""
+
+    recording: Recording
+    actors: tuple[Actor, ...]
+    scene: Scene
+    colors: Mapping[str, Color]  # of trims, by name
+    box: Array
+    size: float  # [m] of the marks in the picture
+
+    @property
+    def begin(self) -> float:
+        """When the first may leave its start [s]."""
+        return self.recording.begin
+
+    @property
+    def end(self) -> float:
+        """When the last arrives [s]."""
+        return max(one.arrival for one in self.actors)
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether there is one vehicle, so that colours are free to tell its trims apart."""
+        return len(self.actors) == 1 and not self.on_roads
+
+    @property
+    def on_roads(self) -> bool:
+        """Whether there are lanes."""
+        return bool(self.recording.world.lanes)
+
+    @property
+    def is_many(self) -> bool:
+        """Whether they are too many for a legend."""
+        return len(self.actors) > MOST_NAMES
+
+    @property
+    def flies(self) -> bool:
+        """Whether they are vehicles in space."""
+        return all(one.track.start.size > 3 for one in self.actors)
+
+
+def cast_of(recording: Recording) -> Cast:
+    """The vehicles of a recording, and what is around them.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
+    >>> from maneuver_automaton.fleet import FleetProblem, plan_fleet
+    >>> from maneuver_automaton.recording import recording_of
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
+    >>> rows = [Problem(robot, [0, y, 0], [3, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
+    >>> fleet = plan_fleet(FleetProblem(rows, names=["a", "b"]), max_rounds=0)
+    >>> cast = cast_of(recording_of(fleet))
+    >>> [(one.name, one.arrival) for one in cast.actors], cast.end
+    ([('a', 3.0), ('b', 3.0)], 3.0)
+    """
+    movers = recording.movers
+    names = [one.name for one in movers]
+    short = max(map(len, names)) <= MOST_LABEL
+    colors = fleet_colors(len(movers))
+    what = "problem " if recording.world.lanes and names[0] else ""
+    actors = tuple(
+        _actor(one, f"{what}{one.name}", one.name if short else str(k + 1), color)
+        for k, (one, color) in enumerate(zip(movers, colors, strict=True))
+    )
+    return _cast(recording, actors)
+
+
+def cast_of_alternatives(recording: Recording, *, width: int) -> Cast:
+    """The plans of one vehicle as if each had one of its own; names of about `width` characters."""
+    plans = (recording.movers[0], *recording.alternatives)
+    actors = []
+    for rank, one in enumerate(plans):
+        price = "" if one.cost is None else f"cost {one.cost:.5g}   "
+        word = word_text(one.pieces[0].word, width=width - len(price), lines=1)
+        actors.append(_actor(one, price + word, str(rank + 1), SEQUENCE[rank % len(SEQUENCE)]))
+    return _cast(replace(recording, movers=plans), tuple(actors))
+
+
+def _actor(mover: Mover, name: str, label: str, color: Color) -> Actor:
+    return Actor(
+        mover=mover,
+        name=name,
+        label=label,
+        color=color,
+        track=joined_track(mover.start, mover.pieces) if mover.has_plan else Track(mover.start, ()),
+        parts=mover.parts if mover.has_plan else (mover,),
+        held=tuple((time, track_of_plan(plan)) for time, plan in mover.held),
+    )
+
+
+def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
+    first, world = actors[0], recording.world
+    alone = len(actors) == 1 and not world.lanes
+    scene = Scene(
+        goals=first.mover.goals if alone else (),
+        reached=first.mover.goal_index if alone else None,
+        obstacles=world.obstacles,
+        zones=world.zones,
+        bounds=world.bounds,
+        body=tuple(first.body) if alone else (),
+        carried=tuple(_carried(part) for part in first.parts[1:]) if alone else (),
+        times=_times(recording, alone=alone),
+    )
+    if alone and first.mover.problem is None:
+        scene = replace(scene, goals=(Goal(pose=first.track.end),), reached=0)
+    size = max(_size(one) for one in actors)
+    points = np.concatenate([one.points(size) for one in actors])
+    if not alone:
+        points = np.concatenate([points, *(ring for one in actors for ring in one.goal_outlines)])
+        size = float(np.ptp(points, axis=0).max()) or STILL_SIZE_M
+    box = _road_box(recording, points) if world.lanes else view_box(scene, points, size=size)
+    return Cast(
+        recording=recording, actors=actors, scene=scene, colors=_trim_colors(actors), box=box,
+        size=mark_size(scene, box, size=size) if alone else size,
+    )  # fmt: skip
+
+
+def _carried(part: Mover) -> Carried:
+    body = tuple(footprint_polygons(list(part.bodies[""])))
+    return Carried(name=part.name, body=body, track=joined_track(part.start, part.pieces))
+
+
+def _times(recording: Recording, *, alone: bool) -> Array:
+    """Times (n,) at which bodies and what moves are shown [s]."""
+    begin, end = recording.begin, max(one.arrival for one in recording.movers)
+    motions = [
+        one.motion for one in recording.world.obstacles if isinstance(one, Obstacle) and one.motion
+    ]
+    if alone and not recording.movers[0].has_plan:
+        end = max((float(one.time[-1]) for one in motions), default=begin)
+    few = alone or motions or len(recording.movers) > MOST_NAMES
+    return round_times(begin, end, most=STEPS_OF_MANY if few else STEPS)
+
+
+def _size(one: Actor) -> float:
+    """Size of what a vehicle does [m]: the symmetry leaves it alone."""
+    places = [one.track.pose[:, :2], *(track.pose[:, :2] for _, track in one.held)]
+    goals = [goal.pose[None, :2] for goal in one.mover.goals]
+    apart = np.linalg.norm(np.concatenate([*places, *goals]) - one.track.start[:2], axis=1)
+    size = max(float(apart.max()), 2.0 * one.reach)
+    return size if size > 1e-9 else STILL_SIZE_M
+
+
+def _trim_colors(actors: Sequence[Actor]) -> dict[str, Color]:
+    """A colour for every trim that is planned or driven."""
+    twists: dict[str, Array] = {}
+    for one in actors:
+        for track in (*(track for _, track in one.held), one.track):
+            twists |= {name: twist for name, twist in track.twists.items() if name not in twists}
+    return track_colors(twists)
+
+
+def _road_box(recording: Recording, points: Array) -> Array:
+    """Corners (2, 2) around those who drive, the goals ahead of them, and who is beside them."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    here = float((high - low).max())
+    every = [points]
+    for shape in (shape for one in recording.movers for shape in one.regions):
+        corners = np.asarray(shape_path(shape).vertices)
+        if float(np.ptp(corners, axis=0).max()) <= here:
+            every.append(corners)
+    low, high = low - BESIDE_M, high + BESIDE_M
+    for one in (one for one in recording.world.obstacles if isinstance(one, Obstacle)):
+        for time in np.linspace(recording.begin, recording.end, STEPS_OF_MANY):
+            if recording.world.is_there(one, float(time)):
+                corners = _corners_at(one, float(time))
+                if (corners > low).all() and (corners < high).all():
+                    every.append(corners)
+    whole = np.concatenate(every)
+    return np.array([whole.min(axis=0) - ROADSIDE_M, whole.max(axis=0) + ROADSIDE_M])
+
+
+def _corners_at(one: Obstacle, time: float) -> Array:
+    corners = np.asarray(shape_path(one.shape).vertices)
+    return corners if one.motion is None else np.asarray(SE2(one.motion.at(time)).act(corners))
+
+
+def rings_with_radius(shapes: Sequence[Shape]) -> list[tuple[Array, float]]:
+    """Corners (n, 2) of each shape and by how much it is larger [m]; a disc has one corner."""
+    rows: list[tuple[Array, float]] = []
+    for shape in shapes:
+        if isinstance(shape, Disc):
+            rows.append((np.asarray(shape.center)[None], shape.radius))
+        else:
+            rows += [(next(iter(rings_of(one))), 0.0) for one in outlines(shape)]
+    return rows or [(np.zeros((1, 2)), 0.0)]
