@@ -20,6 +20,7 @@ from maneuver_automaton.fleet import (
     simulate_fleet,
     verify_driven,
 )
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.scenario import FleetScenario
 
@@ -149,7 +150,8 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
     steps, seed = options.budgets.steps or part.steps or STEPS, options.seed
     if seed is None:
         seed = 0 if part.disturbance is None else part.disturbance.seed
-    first = _first_plans(job, scenario)
+    log = None if options.resume is None else load_fleet_loop(options.resume, scenario.fleet)
+    first = _first_plans(job, scenario) if log is None else None
     with progress_bar("steps", steps, quiet=options.quiet) as advance:
         try:
             return simulate_fleet(
@@ -159,6 +161,7 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
                 disturbance=scenario.disturbances,
                 seed=seed,
                 first=first,
+                log=log,
                 margin=part.margin,
                 tube_m=part.tube_m,
                 time_limit=options.budgets.time_limit or part.time_limit_s,
@@ -175,7 +178,7 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
 
 def _first_plans(job: Job, scenario: FleetScenario) -> FleetResult | None:
     """Plans of those that are there from the begin on, if there are any, as a loop needs them."""
-    from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
+    from maneuver_automaton.fleet.held import fleet_with_room, tube_of
 
     part, fleet = scenario.receding_horizon, scenario.fleet
     assert part is not None

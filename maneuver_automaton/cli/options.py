@@ -96,7 +96,7 @@ UNKNOWN: Mapping[tuple[str, str], Mapping[str, str]] = {  # options that a kind 
     ("plan", "road"): {"--leave": LEAVE, "--dask": DASK, "--model": NO_MODEL},
     ("plan", "roads"): {"--leave": LEAVE, "--dask": DASK, "--model": OF_SEVERAL},
     ("mpc", "one"): {},
-    ("mpc", "fleet"): {"--seeds": ONE, "--resume": ONE, "--gap": ONE},
+    ("mpc", "fleet"): {"--seeds": ONE, "--gap": ONE},
     ("mpc", "road"): {"--seeds": NO_ROADS, "--resume": NO_ROADS, "--model": NO_MODEL},
     ("mpc", "roads"): {"--model": OF_SEVERAL, "--seeds": OF_SEVERAL, "--resume": OF_SEVERAL},
 }

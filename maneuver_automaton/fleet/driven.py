@@ -18,7 +18,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
-from maneuver_automaton.audit import audit_plan, closest_to
+from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.carried import carried
@@ -26,12 +26,10 @@ from maneuver_automaton.automaton.cutting import begin_state, end_state
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape
-from maneuver_automaton.fleet.levels import Levels
-from maneuver_automaton.fleet.log import FleetLog
-from maneuver_automaton.fleet.result import Closest
-from maneuver_automaton.fleet.verdict import CONTACT, IN_SPACE, NEAR, plan_of_motion
+from maneuver_automaton.fleet.courses import Levels
+from maneuver_automaton.fleet.result import Closest, FleetLog
+from maneuver_automaton.fleet.verdict import CONTACT, NEAR, least_of, plan_of_motion
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Omnidirectional
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
@@ -95,12 +93,18 @@ def verify_driven(log: FleetLog) -> DrivenVerdict:
     fleet, edges = log.problem, log.times
     clearances, jumps, defects = dict[str, float](), dict[str, float](), dict[str, str]()
     collisions: list[str] = []
-    bodies: list[_Body] = []
+    bodies: list[_DrivenBody] = []
     for name, problem, leaves in zip(fleet.names, fleet.problems, fleet.leaves, strict=True):
         way = whole_pieces(log, name)
         gone = log.arrived_s.get(name, math.inf) if leaves else math.inf
-        bodies += _bodies(name, problem, way, gone)
-        jumps[name] = _greatest_jump([*way.values()])
+        for shapes, parts in _parts(problem, way):
+            motions = {step: Motion.of_plan(piece) for step, piece in parts.items()}
+            bodies += [
+                _DrivenBody(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
+                for ring, grown in _rings(shapes)
+            ]
+        gaps = [np.delete(b.start - a.end, 2) for a, b in pairwise(way.values())]
+        jumps[name] = max((float(np.linalg.norm(gap)) for gap in gaps), default=0.0)
         clearances[name], when = _clearance(problem, way, edges, gone)
         if clearances[name] <= CONTACT:
             collisions.append(f"{name} touches an obstacle at {when:.6g} s")
@@ -151,12 +155,6 @@ def _at_first(problem: Problem) -> Trim:
 # -- one vehicle
 
 
-def _greatest_jump(way: Sequence[Plan]) -> float:
-    """How far it was from the end of one piece when the next began, at most [m]."""
-    gaps = [np.delete(after.start - before.end, 2) for before, after in pairwise(way)]
-    return max((float(np.linalg.norm(gap)) for gap in gaps), default=0.0)
-
-
 def _stretches(
     way: Mapping[int, Plan], edges: Array, gone: float, body_height: Heights
 ) -> Iterator[tuple[Plan, Heights]]:
@@ -203,15 +201,7 @@ def _clearance(
         return best
     for shapes, pieces in _parts(problem, way):
         for stretch, reach in _stretches(pieces, edges, gone, problem.body_height):
-            in_space = stretch.start.size > 3
-            least = closest_to(
-                stretch,
-                IN_SPACE if in_space else Omnidirectional(),
-                problem.obstacles,
-                footprint=shapes,
-                body_height=reach if in_space else (0.0, 0.0),
-                enough=CONTACT,
-            )
+            least = least_of(stretch, shapes, problem.obstacles, reach=reach, enough=CONTACT)
             best = min(best, (least.distance, least.time))
     return best
 
@@ -251,7 +241,7 @@ def _is_nominal(piece: Plan, automaton: Automaton) -> bool:
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class _Body:
+class _DrivenBody:
     """One shape of a vehicle: a ring and by how much it is larger, and its motion in each step."""
 
     name: str
@@ -281,13 +271,6 @@ class _Body:
         return shapely.points(corners[:, 0]) if len(self.ring) == 1 else shapely.polygons(corners)
 
 
-def _bodies(name: str, problem: Problem, way: Mapping[int, Plan], gone: float) -> Iterator[_Body]:
-    for shapes, pieces in _parts(problem, way):
-        motions = {step: Motion.of_plan(piece) for step, piece in pieces.items()}
-        for ring, grown in _rings(shapes):
-            yield _Body(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
-
-
 def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:
     """Outer corners (n, 2) of each shape, and by how much it is larger [m]; holes are filled."""
     import shapely
@@ -302,7 +285,7 @@ def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:
                 yield shapely.get_coordinates(shapely.get_exterior_ring(solid))[:-1], 0.0
 
 
-def _closest(bodies: Sequence[_Body], edges: Array, most: float) -> tuple[Closest, ...]:
+def _closest(bodies: Sequence[_DrivenBody], edges: Array, most: float) -> tuple[Closest, ...]:
     """Pairs of vehicles that come nearer than `most` [m], the nearest first."""
     found: dict[tuple[str, str], Closest] = {}
     for one, other in combinations(bodies, 2):
@@ -316,7 +299,7 @@ def _closest(bodies: Sequence[_Body], edges: Array, most: float) -> tuple[Closes
     return tuple(sorted(found.values(), key=lambda row: row.distance_m))
 
 
-def _least(one: _Body, other: _Body, edges: Array, most: float) -> Closest | None:
+def _least(one: _DrivenBody, other: _DrivenBody, edges: Array, most: float) -> Closest | None:
     """Least distance of two bodies and when; None if it is not below `most` [m]."""
     steps = np.array(sorted(one.motions.keys() & other.motions.keys()), dtype=np.int64)
     steps = steps[edges[steps] <= min(one.gone, other.gone)]
@@ -354,7 +337,9 @@ def _least(one: _Body, other: _Body, edges: Array, most: float) -> Closest | Non
     return Closest((one.name, other.name), at, max(best - FINE, 0.0))
 
 
-def _apart(one: _Body, other: _Body, times: Array, steps: Array, enough: float) -> Array:
+def _apart(
+    one: _DrivenBody, other: _DrivenBody, times: Array, steps: Array, enough: float
+) -> Array:
     """Distance (n,) of two bodies at times (n,) [s]; where it is more than enough, a lower bound.
 
     Overlapping discs have a distance below 0.

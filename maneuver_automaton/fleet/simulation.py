@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,15 +14,21 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.agreement import Lost
-from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
-from maneuver_automaton.fleet.asking import Workers
+from maneuver_automaton.fleet.held import fleet_with_room, tube_of
 from maneuver_automaton.fleet.horizon import FleetHorizon
-from maneuver_automaton.fleet.log import FleetGuarantee, FleetLog, FleetStep, FleetViolation
 from maneuver_automaton.fleet.planning import plan_fleet
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import Closest, FleetResult
-from maneuver_automaton.fleet.vehicle import Vehicle
+from maneuver_automaton.fleet.result import (
+    Closest,
+    FleetGuarantee,
+    FleetLog,
+    FleetResult,
+    FleetStep,
+    FleetViolation,
+)
+from maneuver_automaton.fleet.vehicle import FleetMember
 from maneuver_automaton.fleet.verdict import measured
+from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.disturbance import (
@@ -58,6 +65,7 @@ def simulate_fleet(
     workers: Workers | None = None,
     joins_s: Mapping[str, float] = NEVER,
     breaks_s: Mapping[str, float] = NEVER,
+    log: FleetLog | None = None,
     progress: Callable[[FleetStep], None] | None = None,
 ) -> FleetLog:
     """Close the loop of a fleet until all that can have arrived, or `steps` steps are spent.
@@ -82,6 +90,9 @@ def simulate_fleet(
         When vehicles appear at their starts [s]; each joins as soon as there is room.
     breaks_s : mapping of str to float
         When vehicles break down [s]: they stop as soon as they can, and stay there.
+    log : FleetLog, optional
+        To go on after the last step of a loop that was broken off, with disturbances of the same
+        seed: `steps` more at most. What comes back is the log of both.
     progress : callable, optional
         Called with every step.
 
@@ -93,7 +104,8 @@ def simulate_fleet(
     Raises
     ------
     ValueError
-        If a number is out of its range, or a name is none of the fleet's.
+        If a number is out of its range, a name is none of the fleet's, or the log is one of other
+        vehicles or steps.
 
     Examples
     --------
@@ -114,7 +126,9 @@ def simulate_fleet(
         for name in times:
             if name not in fleet.names:
                 raise ValueError(f"{what}: no vehicle is named {name!r}")
-    if first is None:
+    if log is not None and log.step != step:
+        raise ValueError(f"step is {step:g} s, need that of the log to go on from, {log.step:g} s")
+    if first is None and not (log and log.steps):
         tube = tube_of(fleet, tube_m)
         first = _first_plans(fleet, set(joins_s), tube, first_time_limit, seed)
     loop = FleetHorizon(
@@ -130,11 +144,17 @@ def simulate_fleet(
         delay_steps=delay_steps,
         lost=lost,
         workers=workers,
+        log=log,
     )
-    drives = [_Drive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)]
-    world = _World(loop, drives, step, dict(joins_s), dict(breaks_s))
+    drives = [
+        _VehicleDrive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)
+    ]
+    world = _FleetWorld(loop, drives, step, dict(joins_s), dict(breaks_s))
+    if log is not None:
+        world.go_on_from(log)
+    begin = world.steps[-1].number + 1 if world.steps else 0
     with patient():
-        for number in range(steps):
+        for number in range(begin, begin + steps):
             if stopped() or world.is_over:
                 break
             now = world.advance(number)
@@ -154,8 +174,10 @@ def _first_plans(
 
 
 def _upsets(
-    vehicles: list[Vehicle], disturbance: Disturbance | Mapping[str, Disturbance] | None, seed: int
-) -> Iterator[tuple[Vehicle, Disturbance]]:
+    vehicles: list[FleetMember],
+    disturbance: Disturbance | Mapping[str, Disturbance] | None,
+    seed: int,
+) -> Iterator[tuple[FleetMember, Disturbance]]:
     """Every vehicle with its disturbance, whose numbers are its own."""
     calm = Disturbance()
     seeds = np.random.SeedSequence(seed).generate_state(len(vehicles)).tolist()
@@ -174,10 +196,10 @@ def _upsets(
 
 
 @dataclass(slots=True, eq=False)
-class _Drive:
+class _VehicleDrive:
     """A vehicle along the loop."""
 
-    vehicle: Vehicle
+    vehicle: FleetMember
     upset: Disturbance
     pose: Array = field(init=False)
     random: Iterator[Draw] = field(init=False)
@@ -197,6 +219,12 @@ class _Drive:
             self.cost += problem.cost_of(piece)
         piece = as_driven(piece, self.upset)
         self.pieces.append(piece)
+        self.end(number, noise)
+        return piece
+
+    def end(self, number: int, noise: Array) -> None:
+        """Be where the last piece led, and where that step's disturbance led from there."""
+        piece = self.pieces[-1]
         self.pose = np.array(piece.end)
         if moves_on(piece):
             self.pose = self.pose + noise
@@ -204,7 +232,6 @@ class _Drive:
             group = group_of(self.pose.size)
             push = np.array(self.upset.pushes[number], dtype=np.float64)
             self.pose = np.array((group(self.pose) @ group(push)).pose)
-        return piece
 
     def leaves_at(self, plan: Plan) -> float:
         """When [s] it leaves at the end of the plan that it holds; inf if it does not."""
@@ -214,11 +241,11 @@ class _Drive:
 
 
 @dataclass(slots=True, eq=False)
-class _World:
+class _FleetWorld:
     """All vehicles, the loop that drives them, and what happens to them."""
 
     loop: FleetHorizon
-    drives: list[_Drive]
+    drives: list[_VehicleDrive]
     step: float
     joins_s: dict[str, float]
     breaks_s: dict[str, float]
@@ -227,6 +254,23 @@ class _World:
     gone: set[str] = field(default_factory=set)
     broken: set[str] = field(default_factory=set)
     closest: Closest | None = None
+
+    def go_on_from(self, log: FleetLog) -> None:
+        """All of a log's steps are over, with the random numbers that they used."""
+        if not log.steps:
+            return
+        self.steps, self.arrived_s = list(log.steps), dict(log.arrived_s)
+        self.broken, self.closest = set(log.broken_down), log.closest
+        self.loop.state.agreement.sent += log.counts.get("messages", 0)
+        number = log.steps[-1].number
+        for one in self.drives:
+            name = one.vehicle.name
+            one.pieces, one.cost = [*log.driven[name]], math.fsum(log.costs_of(name).values())
+            *_, draw = itertools.islice(one.random, number + 1)
+            if one.pieces:
+                one.end(number, draw.noise)
+            if one.vehicle.leaves and name in self.arrived_s:
+                self.gone.add(name)
 
     @property
     def time(self) -> float:
@@ -305,7 +349,7 @@ class _World:
         names = {one.vehicle.name for one in self.drives}
         left = names - set(self.arrived_s) - self.broken
         status, reason = "reached", ""
-        of_loop = self.loop.state.workers
+        of_loop = self.loop.state.settings.workers
         workers = {} if of_loop is None else of_loop.counts
         if left:
             status = "steps_spent"

@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Least, closest_to, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.fleet.conflicts import Course, meetings
-from maneuver_automaton.fleet.levels import Levels
+from maneuver_automaton.fleet.courses import FleetCourse, Levels
+from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest, FleetResult, FleetStatus
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, vehicles_of
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import Omnidirectional, UserModel
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import SearchSettings
 
@@ -37,14 +39,14 @@ IN_SPACE = UserModel(
 
 def verified(
     fleet: FleetProblem,
-    vehicles: Sequence[Vehicle],
-    held: Mapping[int, Found],
+    vehicles: Sequence[FleetMember],
+    held: Mapping[int, OwnPlan],
     reasons: Mapping[int, str],
 ) -> FleetResult:
     """The answer for these plans; a plan that does not pass is left out, with its reason."""
     results: dict[str, PlanResult] = {}
     why = {vehicles[k].name: said for k, said in reasons.items()}
-    passed: dict[int, Course] = {}
+    passed: dict[int, FleetCourse] = {}
     for one in vehicles:
         result, said = _checked(one, held.get(one.number), fleet.problems[one.number].search)
         if said:
@@ -75,6 +77,7 @@ def verified(
             problem=results[name].problem, status=PlanStatus.NO_PLAN, reason=why[name]
         )
         del passed[names.index(name)]
+    far = math.inf if len(fleet) < 2 else fleet.margin + NEAR
     n = sum(result.plan is not None for result in results.values())
     status = FleetStatus.FOUND if n == len(vehicles) else FleetStatus.PARTIAL
     return FleetResult(
@@ -82,7 +85,8 @@ def verified(
         status=status if n else FleetStatus.NO_PLAN,
         results=results,
         closest=closest,
-        clearance_m=least_apart(closest, fleet),
+        # pairs that are not measured keep a metre more
+        clearance_m=min(far, *(row.distance_m for row in closest)) if closest else far,
         reasons=why,
     )
 
@@ -92,14 +96,9 @@ def enough_for(keep: float) -> float:
     return max(keep - CONTACT, CONTACT)
 
 
-def least_apart(closest: Sequence[Closest], fleet: FleetProblem) -> float:
-    """What any two vehicles keep at least [m]: pairs that are not measured keep `NEAR` more."""
-    if len(fleet) < 2:
-        return math.inf
-    return min([fleet.margin + NEAR, *(row.distance_m for row in closest)])
-
-
-def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tuple[PlanResult, str]:
+def _checked(
+    one: FleetMember, found: OwnPlan | None, settings: SearchSettings
+) -> tuple[PlanResult, str]:
     """The answer for one vehicle, and why its plan was refused."""
     problem = replace(one.problem, search=settings)
     if found is None:
@@ -134,7 +133,7 @@ def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tup
 
 
 def measured(
-    courses: Mapping[int, Course], names: Sequence[str], *, keep: float
+    courses: Mapping[int, FleetCourse], names: Sequence[str], *, keep: float
 ) -> tuple[Closest, ...]:
     """Pairs of vehicles that come near each other, the nearest first, by the audit's bounds.
 
@@ -148,33 +147,29 @@ def measured(
     return tuple(sorted(rows, key=lambda row: row.distance_m))
 
 
-def nearest(one: Course, other: Course, *, enough: float = 0.0) -> Least:
+def nearest(one: FleetCourse, other: FleetCourse, *, enough: float = 0.0) -> Least:
     """Least distance of two vehicles at all times [m], and when, by the audit's bounds.
 
     From the first begin of the two on, as who begins later stands at its start until then, until
     both have come to rest. `enough` decides: the bound is sharp enough to tell its side. Of two
-    that climb, each is taken once as it is, past the other in stages: the better bound counts.
+    that climb, each is taken once as it is, past the other in bands: the better bound counts.
     """
-    if len(other.stages) > len(one.stages):
+    if len(other.bands) > len(one.bands):
         one, other = other, one
-    pairs = [(one, other), (other, one)] if len(other.stages) > 1 else [(one, other)]
+    pairs = [(one, other), (other, one)] if len(other.bands) > 1 else [(one, other)]
     found = [_nearest(*pair, enough=enough) for pair in pairs]
     return max(found, key=lambda least: least.distance)
 
 
-def _nearest(one: Course, other: Course, *, enough: float) -> Least:
+def _nearest(one: FleetCourse, other: FleetCourse, *, enough: float) -> Least:
     """The same, the first driven as it is past the other's bodies."""
     begin = min(float(way.time[0]) for way in (*one.motions, *other.motions))
     quiet = min(max(one.quiet_after, other.quiet_after), one.until)
-    levels = one.levels if _heights_matter(one, other) else None
+    above = (mine.above(its.low, its.high) > 0.0 for mine in one.bands for its in other.bands)
+    levels = one.levels if any(above) else None
     found = [
-        closest_to(
-            plan_of_motion(motion, quiet, since=begin, levels=levels),
-            Omnidirectional() if levels is None else IN_SPACE,
-            other.bodies,
-            footprint=shapes,
-            body_height=(0.0, 0.0) if levels is None else levels.reach,
-            enough=enough,
+        nearest_obstacle(
+            shapes, motion, other.bodies, until=quiet, since=begin, levels=levels, enough=enough
         )
         for shapes, motion in zip(one.shapes, one.motions, strict=True)
     ]
@@ -187,6 +182,7 @@ def nearest_obstacle(
     obstacles: tuple[AnyObstacle, ...],
     *,
     until: float,
+    since: float = math.inf,
     levels: Levels | None = None,
     enough: float = 0.0,
 ) -> Least:
@@ -194,19 +190,29 @@ def nearest_obstacle(
 
     A lower bound, made sharp enough to tell on which side of `enough` [m] it is.
     """
+    plan = plan_of_motion(motion, until, since=since, levels=levels)
+    reach = (0.0, 0.0) if levels is None else levels.reach
+    return least_of(plan, shapes, obstacles, reach=reach, enough=enough)
+
+
+def least_of(
+    plan: Plan,
+    shapes: tuple[Shape, ...],
+    obstacles: tuple[AnyObstacle, ...],
+    *,
+    reach: tuple[float, float],
+    enough: float,
+) -> Least:
+    """The same of a plan of something that moves at will; `reach` is its height about the plan."""
+    in_space = plan.start.size > 3
     return closest_to(
-        plan_of_motion(motion, until, levels=levels),
-        Omnidirectional() if levels is None else IN_SPACE,
+        plan,
+        IN_SPACE if in_space else Omnidirectional(),
         obstacles,
         footprint=shapes,
-        body_height=(0.0, 0.0) if levels is None else levels.reach,
+        body_height=reach if in_space else (0.0, 0.0),
         enough=enough,
     )
-
-
-def _heights_matter(one: Course, other: Course) -> bool:
-    """Whether one may be above the other at some time."""
-    return any(mine.above(its.low, its.high) > 0.0 for mine in one.stages for its in other.stages)
 
 
 def plan_of_motion(
@@ -241,3 +247,68 @@ def plan_of_motion(
         Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)
     )
     return Plan(start, trims, durations=durations, start_time=begin)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetVerdict:
+    """What the checks say of the plans of a fleet, each alone and every pair."""
+
+    passed: bool
+    verdicts: dict[str, Verdict]  # of each that has a plan
+    closest: tuple[Closest, ...]  # pairs that come near each other, the nearest first
+    too_near: tuple[Closest, ...]  # those of them that do not keep the fleet's margin
+
+    __repr__ = brief
+
+
+def verify_fleet(fleet: FleetProblem, plans: Mapping[str, Plan]) -> FleetVerdict:
+    """Check plans of a fleet, say from a file, as `plan_fleet` checks its own.
+
+    Each plan is verified past static obstacles, and every pair of vehicles is proven apart at all
+    times, also after all have arrived. Who has no plan stands at its start.
+
+    Parameters
+    ----------
+    fleet : FleetProblem
+    plans : mapping of str to Plan
+        By the names of the vehicles.
+
+    Returns
+    -------
+    FleetVerdict
+        ``passed`` if every vehicle has a plan that passes, and every pair keeps the margin.
+
+    Raises
+    ------
+    ValueError
+        If a plan is of no vehicle of the fleet, or does not live in its group.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Plan, Problem, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0)})
+    >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
+    >>> back = Problem(robot, [4, 0.5, 3.0], [0, 0.5, 3.0], footprint=Disc(0.3))
+    >>> fleet = FleetProblem([there, back], names=["a", "b"])
+    >>> verdict = verify_fleet(fleet, {"a": Plan([0, 0, 0], robot.trims, durations=[4.0])})
+    >>> verdict.passed, verdict.verdicts["a"].passed, verdict.too_near[0].pair
+    (False, True, ('a', 'b'))
+    """
+    unknown = [name for name in plans if name not in fleet.names]
+    if unknown:
+        raise ValueError(
+            f"plans: there is no vehicle {unknown[0]!r}, need some of {', '.join(fleet.names)}"
+        )
+    vehicles = vehicles_of(fleet)
+    problems = {one.name: one.problem for one in vehicles}
+    verdicts = {name: verify(problems[name], plan) for name, plan in plans.items()}
+    courses = {
+        one.number: one.course_of(plans[one.name]) if one.name in plans else one.standing
+        for one in vehicles
+    }
+    closest = measured(courses, fleet.names, keep=fleet.margin)
+    too_near = tuple(row for row in closest if row.distance_m <= enough_for(fleet.margin))
+    complete = len(plans) == len(fleet) and all(one.passed for one in verdicts.values())
+    return FleetVerdict(
+        passed=complete and not too_near, verdicts=verdicts, closest=closest, too_near=too_near
+    )

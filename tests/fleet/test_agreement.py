@@ -11,17 +11,19 @@ from maneuver_automaton.collision.shapes import (
     Disc,
 )
 from maneuver_automaton.fleet import Message
-from maneuver_automaton.fleet.agreement import Agreement
-from maneuver_automaton.fleet.conflicts import Course
-from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.agreement import _Agreement
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.vehicle import OwnPlan
 from tests.fleet.robots import at_rest, crossing, least_distance
 
 MOST = 200  # messages of the small example, more than it sends
 
 
-def found(cost: float) -> Found:
+def found(cost: float) -> OwnPlan:
     motion = Motion([0.0], [[0.0, 0.0, 0.0]])
-    return Found(Plan([0, 0, 0], (), durations=[]), cost, 0, Course(((Disc(0.1),),), (motion,)))
+    return OwnPlan(
+        Plan([0, 0, 0], (), durations=[]), cost, 0, FleetCourse(((Disc(0.1),),), (motion,))
+    )
 
 
 class Drops:
@@ -40,7 +42,7 @@ def three(*dropped: int):
     """Three vehicles that hold plans, and what they say to each other."""
     drops = Drops(*dropped)
     held = {k: found(float(k)) for k in range(3)}
-    agreement = Agreement("abc", drops, tries=1)
+    agreement = _Agreement("abc", drops, tries=1)
     agreement.start(held)
     return agreement, held, drops
 

@@ -21,6 +21,8 @@ from maneuver_automaton import (
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
+from maneuver_automaton.formats.fleet_loop_json import save_fleet_loop
+from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
 from tests.fleet.robots import (
     at_rest,
     crossing,
@@ -336,3 +338,46 @@ def test_who_has_inertia_drives_maneuvers_that_can_be_left():
     known = {one.name for one in fleet.problems[0].automaton.maneuvers}
     for step in log.steps:
         assert all(one is None or one.name in known for one in step.plans["a"].maneuvers)
+
+
+# -- going on after a break
+
+
+@pytest.mark.parametrize("after", [1, 6])
+def test_a_loop_that_was_broken_off_goes_on_where_it_was(after, tmp_path):
+    """With the noise that it would have had, pushes included, also from a file."""
+    upset = Disturbance(position_m=0.003, heading_rad=0.003, pushes={5: (0.05, 0.05, 0.1)})
+    fleet = crossing(tolerance=0.1, leaves=(True, False))
+    first = plan_fleet(fleet, time_limit=60.0, max_rounds=0)
+    more = {"step": 0.5, "time_limit": 60.0, "disturbance": upset, "seed": 3}
+    whole = simulate_fleet(fleet, first=first, **more)
+    half = simulate_fleet(fleet, first=first, steps=after, **more)
+    save_fleet_loop(half, tmp_path / "closed_loop.json", driven=verify_driven(half))
+    read = load_fleet_loop(tmp_path / "closed_loop.json", fleet)
+    for log in (simulate_fleet(fleet, log=half, **more), simulate_fleet(fleet, log=read, **more)):
+        assert [step.number for step in log.steps] == [*range(len(log.steps))]
+        for name, pose in whole.steps[after].poses.items():
+            assert log.steps[after].poses[name] == pytest.approx(pose, abs=1e-12)
+        assert log.reached
+        assert [*log.violations] == []
+        assert log.cost == pytest.approx(whole.cost)
+        assert least_distance(log) > 0.0
+
+
+def test_who_broke_down_before_the_break_stays_there():
+    fleet = crossing(tolerance=0.1)
+    more = {"step": 0.5, "first": at_rest(fleet), "time_limit": 60.0}
+    half = simulate_fleet(fleet, steps=6, breaks_s={"a": 1.0}, **more)
+    log = simulate_fleet(fleet, log=half, **more)
+    assert half.broken_down == log.broken_down == ("a",)
+    assert set(log.arrived_s) == {"b"}
+    assert np.array_equal(log.steps[-1].poses["a"], half.driven["a"][-1].end)
+
+
+def test_a_log_of_another_loop_is_refused():
+    fleet = crossing()
+    log = simulate_fleet(fleet, step=0.5, steps=1, first=at_rest(fleet), time_limit=60.0)
+    with pytest.raises(ValueError, match=r"step is 0.25 s, need that of the log to go on from"):
+        simulate_fleet(fleet, step=0.25, log=log)
+    with pytest.raises(ValueError, match="fleet horizon: log is one of a, b, need one of a"):
+        FleetHorizon(fleet.only(["a"]), step=0.5, log=log)
