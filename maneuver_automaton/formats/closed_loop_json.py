@@ -26,7 +26,7 @@ from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     SCHEMA,
-    Document,
+    DocumentHead,
     Flag,
     Known,
     ModelEntry,
@@ -77,7 +77,7 @@ class PlaceEntry(TypedDict):
 
     time_s: Number
     pose: Numbers
-    value: Number
+    value: Annotated[Known, says("cost of what is left; null if the plan does not arrive")]
     accumulated_cost: Annotated[Number, says("of all steps before")]
     vehicle_pose: Annotated[Numbers, says("where it was, if pose is where it will be")]
 
@@ -128,18 +128,16 @@ class PiecesEntry(TypedDict):
     max_dynamics_defect: Known
 
 
-StepEntry = Annotated[
-    Annotated[AppliedEntry, Tag("<AppliedEntry>")] | Annotated[EndedEntry, Tag("<EndedEntry>")],
-    Discriminator(lambda row: tag_of(row, "<AppliedEntry>", "<EndedEntry>")),
-]
+def has_ended(row: Any) -> str:
+    """Which of two kinds a row of `steps` is of: the last one says where the vehicle ended."""
+    return "<ended>" if isinstance(row, dict) and row.get("word", "") is None else "<applied>"
 
 
-def tag_of(row: Any, applied: str, ended: str) -> str:
-    """Which of two kinds a row of `steps` is of."""
-    return ended if isinstance(row, dict) and row.get("word", "") is None else applied
+Ended = Annotated[EndedEntry, Tag("<ended>")]
+StepEntry = Annotated[Annotated[AppliedEntry, Tag("<applied>")] | Ended, Discriminator(has_ended)]
 
 
-class LoopDocument(Document):
+class LoopDocument(DocumentHead):
     """What a closed loop of one vehicle did."""
 
     vehicle: NotRequired[ModelEntry | None]
@@ -507,7 +505,7 @@ class OutcomeEntry(TypedDict):
     solve_s: Numbers
 
 
-class StatisticsDocument(Document):
+class StatisticsDocument(DocumentHead):
     """Many closed loops in a few numbers each."""
 
     loops_run: Whole

@@ -83,7 +83,7 @@ SourceEntry = TypedDict(  # what a result was made from, as seen from its file
 )
 
 
-class Document(TypedDict):
+class DocumentHead(TypedDict):
     """What every result file has."""
 
     schema: Annotated[Whole, says("1")]

@@ -14,7 +14,7 @@ from maneuver_automaton.formats.documents import (
     SCHEMA,
     ClearanceEntry,
     ClosestEntry,
-    Document,
+    DocumentHead,
     Known,
     Number,
     Pairs,
@@ -35,7 +35,7 @@ COUNTS = ("expansions", "queries", "rounds")
 MOST_SAID = 3  # vehicles whose reasons stand in the reason of the fleet
 
 
-class FleetDocument(Document):
+class FleetDocument(DocumentHead):
     """The plans of several vehicles, and what holds of them together."""
 
     kind: Literal["fleet"]

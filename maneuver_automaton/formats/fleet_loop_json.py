@@ -31,15 +31,18 @@ from maneuver_automaton.fleet import (
 )
 from maneuver_automaton.fleet.driven import DrivenVerdict
 from maneuver_automaton.formats.closed_loop_json import (
+    Ended,
+    EndedEntry,
     Numbers,
-    tag_of,
+    PlaceEntry,
+    has_ended,
 )
 from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
     ClearanceEntry,
     ClosestEntry,
-    Document,
+    DocumentHead,
     Flag,
     Known,
     ModelEntry,
@@ -108,19 +111,14 @@ class HeldEntry(TypedDict):
     plan: list[Piece]
 
 
-class DroveEntry(TypedDict):
+class DroveEntry(PlaceEntry):
     """A step of one vehicle."""
 
-    time_s: Number
-    pose: Numbers
-    value: Known
-    accumulated_cost: Number
     control: Numbers | None
     word: list[str]
     plan: list[Piece]
     replanned: Flag
     number: Whole
-    vehicle_pose: Numbers
     measured_pose: Numbers
     arrival_s: Annotated[Known, says("when its plan arrives; null if it does not")]
     off_plan_m: Number
@@ -129,25 +127,7 @@ class DroveEntry(TypedDict):
     driven: Annotated[list[Piece] | None, says("if it was not the begin of the plan")]
 
 
-class StoodEntry(TypedDict):
-    """Where a vehicle ended, or left."""
-
-    time_s: Number
-    pose: Numbers
-    value: Known
-    accumulated_cost: Number
-    control: None
-    word: None
-    plan: None
-    replanned: None
-    solve_s: None
-    vehicle_pose: Numbers
-
-
-VehicleStep = Annotated[
-    Annotated[DroveEntry, Tag("<DroveEntry>")] | Annotated[StoodEntry, Tag("<StoodEntry>")],
-    Discriminator(lambda row: tag_of(row, "<DroveEntry>", "<StoodEntry>")),
-]
+VehicleStep = Annotated[Annotated[DroveEntry, Tag("<applied>")] | Ended, Discriminator(has_ended)]
 
 
 class VehicleLoopEntry(TypedDict):
@@ -162,7 +142,7 @@ class VehicleLoopEntry(TypedDict):
     steps: Annotated[list[VehicleStep], Field(min_length=1)]
 
 
-class FleetLoopDocument(Document):
+class FleetLoopDocument(DocumentHead):
     """What a closed loop of several vehicles did."""
 
     kind: Literal["fleet"]
@@ -418,7 +398,7 @@ def _is_other(piece: Plan, plan: Plan) -> bool:
     )
 
 
-def _last_row(log: FleetLog, name: str, problem: Problem, cost: float) -> StoodEntry:
+def _last_row(log: FleetLog, name: str, problem: Problem, cost: float) -> EndedEntry:
     """Where a vehicle ended: at the end of the loop, or where it left."""
     when, pose, value = _end_of(log, name, problem)
     return {

@@ -21,7 +21,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
-    Document,
+    DocumentHead,
     Flag,
     Known,
     ModelEntry,
@@ -114,7 +114,7 @@ class AlternativeEntry(TypedDict):
     terminal_error: TerminalErrorEntry
 
 
-class PlanDocument(Document):
+class PlanDocument(DocumentHead):
     """The answer to a problem."""
 
     vehicle: NotRequired[ModelEntry | None]

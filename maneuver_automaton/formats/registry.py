@@ -1,7 +1,7 @@
 """Formats of files that state a problem: the one place that knows which format a file is in.
 
 Scenarios are no other format, they are read by `maneuver_automaton.scenario`. A package may bring a
-format of its own: its entry point in the group `maneuver_automaton.formats` names a `Format`.
+format of its own: its entry point in the group `maneuver_automaton.formats` names a `FileFormat`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ NOT_READ: Mapping[str, str] = {
 Reader: TypeAlias = Callable[[Path], tuple[Statement, ...]]
 
 
-class Format(Protocol):
+class FileFormat(Protocol):
     """A format of files that state a problem, or a part of one: obstacles, start, goal."""
 
     @property
@@ -60,7 +60,7 @@ class Format(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class BuiltIn:
-    """A format of this package, whose module is loaded when it is asked; see `Format`."""
+    """A format of this package, whose module is loaded when it is asked; see `FileFormat`."""
 
     name: str
     endings: str
@@ -117,7 +117,7 @@ BUILT_IN = (  # of one ending: the last is read where none recognises the file, 
 
 
 @functools.cache
-def from_outside() -> tuple[Format, ...]:
+def from_outside() -> tuple[FileFormat, ...]:
     """The formats that other packages bring, by the names of their entry points.
 
     Raises
@@ -136,7 +136,7 @@ def from_outside() -> tuple[Format, ...]:
     return tuple(found)
 
 
-def format_of(path: Path, document: Document | None = None) -> Format | None:
+def format_of(path: Path, document: Document | None = None) -> FileFormat | None:
     """The format of a file; None of a scenario, and of what nothing recognises.
 
     Those of other packages are asked first, and all only of files that are no scenario.
@@ -202,7 +202,7 @@ def belongs_to(document: Document) -> str:
     return ""
 
 
-def map_writer_of(path: Path) -> Format | None:
+def map_writer_of(path: Path) -> FileFormat | None:
     """The format in which a map of this name is written; None if there is none."""
     return next((one for one in (*BUILT_IN, *from_outside()) if one.writes(path)), None)
 

@@ -20,7 +20,7 @@ from maneuver_automaton.formats.documents import (
     SCHEMA,
     ClearanceEntry,
     ClosestEntry,
-    Document,
+    DocumentHead,
     Flag,
     Known,
     ModelEntry,
@@ -99,7 +99,7 @@ class DriveStepEntry(TypedDict):
     stops: NotRequired[Annotated[Flag, says("the plan stops on the way")]]
 
 
-class DriveDocument(Document):
+class DriveDocument(DocumentHead):
     """A drive on a road."""
 
     vehicle: NotRequired[ModelEntry | None]
@@ -118,7 +118,7 @@ class DriveDocument(Document):
     steps: Annotated[list[DriveStepEntry], Field(min_length=1)]
 
 
-class SeveralEntry(Document):
+class SeveralEntry(DocumentHead):
     """What files of several vehicles on one road have."""
 
     kind: Literal["fleet"]

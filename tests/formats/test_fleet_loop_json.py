@@ -158,7 +158,7 @@ def test_interrupted_and_sources(tmp_path):
             "vehicles.a: steps: pose: got shape (1,), need 3 components last",
         ),
         (
-            lambda d: d["steps"][0]["swaps"].append({}),
+            lambda d: d["steps"][0].update(swaps=[{}]),
             "steps[0].swaps[0].vehicles: is missing, need a list",
         ),
         (lambda d: d.pop("closest"), "closest: is missing, need a list"),
