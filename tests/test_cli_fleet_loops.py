@@ -177,11 +177,28 @@ class TestMpc:
         assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--steps", "4"]) == 1
         assert not Path("out/closed_loop.gif").exists()  # of an earlier loop
 
-    @pytest.mark.parametrize("option", [["--seeds", "3"], ["--gap", "0.1"], ["--resume", "l.json"]])
+    @pytest.mark.parametrize("option", [["--seeds", "3"], ["--gap", "0.1"]])
     def test_options_of_one_vehicle(self, folder, capsys, option):
         assert run(["mpc", "x.yaml", *option]) == 2
         said = f"{option[0]}: is for one vehicle, but x.yaml states several; leave it out\n"
         assert capsys.readouterr().err == said
+
+    def test_it_goes_on_from_its_file(self, folder, capsys):
+        quietly = ["--quiet", "--no-plot"]
+        assert run(["mpc", "x.yaml", *quietly, "--out", "half", "--steps", "4"]) == 1
+        resume = ["--resume", "half/closed_loop.json", "--out", "rest"]
+        assert run(["mpc", "x.yaml", *quietly, *resume]) == 0
+        half, rest = document("half"), document("rest")
+        assert rest["reached"]
+        assert len(rest["steps"]) > len(half["steps"]) == 5
+        for name, one in half["vehicles"].items():
+            whole = rest["vehicles"][name]["steps"]
+            poses = [step["pose"] for step in one["steps"][:4]]  # before its last noise
+            assert [step["pose"] for step in whole[:4]] == poses
+        assert run(["check", "rest/closed_loop.json"]) == 0
+        capsys.readouterr()
+        assert run(["mpc", "x.yaml", "--resume", "nowhere.json"]) == 2
+        assert capsys.readouterr().err == "nowhere.json: no such file\n"
 
     def test_a_file_without_a_loop(self, folder, capsys):
         Path("x.yaml").write_text(FLEET)

@@ -140,18 +140,24 @@ class TestPlan:
 
     def test_interrupted_before_there_was_a_plan(self, folder, capsys, monkeypatch):
         from maneuver_automaton import _interrupts
-        from maneuver_automaton.cli import answers, fleets
+        from maneuver_automaton.cli import fleets
+        from maneuver_automaton.cli.inputs import Parts
+        from maneuver_automaton.cli.jobs import Job
+        from maneuver_automaton.cli.options import Options
 
-        task = fleets.FleetTask(
-            scenario=load_scenario("x.yaml"),
-            settings=answers.Settings(),
-            path=Path("x.yaml"),
-            parts=fleets.Parts(),
-        )
-        answer = task.given_up()
+        def at_once(*_, **__):
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(fleets, "plan_fleet", at_once)
+        job = Job(command="plan", path=Path("x.yaml"), parts=Parts(), options=Options())
+        with pytest.raises(KeyboardInterrupt):  # in somebody else's program
+            job.done(folder)
+        with monkeypatch.context() as meanwhile:
+            meanwhile.setattr(fleets, "stopped", lambda: True)
+            outcome = job.done(folder)
         said = "interrupted before there was a plan"
-        assert answer.why_not == f"no_plan: east: {said}; north: {said}"
-        answer.save(folder / "plan.json")
+        why = f"interrupted before all had a plan: east: {said}; north: {said}"
+        assert outcome.complaints == (f"no_plan: {why}",)
         assert document(".")["vehicles"]["north"]["status"] == "out_of_budget"
         assert not _interrupts.stopped()
 

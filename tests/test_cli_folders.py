@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from maneuver_automaton.cli import folder_runs, mpc_command, plan_command, run
+from maneuver_automaton.cli import folder_runs, jobs, run
 from tests.scenario.files import SCENARIO, but
 
 LOOP = SCENARIO + "receding_horizon: {step_s: 1.0, steps: 12}\n"
@@ -26,9 +26,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def killed_after(count, monkeypatch, module):
+def killed_after(count, monkeypatch):
     """Make the program die, as by a kill, after so many files."""
-    one, done = module._row, []
+    one, done = jobs._row, []
 
     def row(problem, **settings):
         if len(done) == count:
@@ -36,24 +36,22 @@ def killed_after(count, monkeypatch, module):
         done.append(problem[0].name)
         return one(problem, **settings)
 
-    monkeypatch.setattr(module, "_row", row)
+    monkeypatch.setattr(jobs, "_row", row)
     return done
 
 
 @pytest.mark.parametrize(
-    ("command", "module", "names"),
-    [("plan", plan_command, ["a.yaml", "b.yaml", "c.yaml"]),
-     ("mpc", mpc_command, ["a.yaml", "c.yaml"])],
-)  # fmt: skip
-def test_what_is_finished_is_not_done_again(folder, monkeypatch, capsys, command, module, names):
+    ("command", "names"), [("plan", ["a.yaml", "b.yaml", "c.yaml"]), ("mpc", ["a.yaml", "c.yaml"])]
+)
+def test_what_is_finished_is_not_done_again(folder, monkeypatch, capsys, command, names):
     with monkeypatch.context() as first:
-        done = killed_after(1, first, module)
+        done = killed_after(1, first)
         assert run([command, "many", *QUICK]) == 130
         assert done == ["a.yaml"]
     assert len((folder / "out" / folder_runs.JOURNAL).read_text().splitlines()) == 1
     capsys.readouterr()
     with monkeypatch.context() as second:
-        done = killed_after(9, second, module)
+        done = killed_after(9, second)
         run([command, "many", *QUICK])
         assert done == names[1:]
     printed = capsys.readouterr().out
@@ -61,7 +59,7 @@ def test_what_is_finished_is_not_done_again(folder, monkeypatch, capsys, command
     assert all(name in printed.split("were done")[1] for name in names)  # in the table
     assert not (folder / "out" / folder_runs.JOURNAL).exists()
     with monkeypatch.context() as third:  # all were done: a new run begins anew
-        done = killed_after(9, third, module)
+        done = killed_after(9, third)
         run([command, "many", *QUICK])
         assert done == names
 
@@ -69,7 +67,7 @@ def test_what_is_finished_is_not_done_again(folder, monkeypatch, capsys, command
 @pytest.mark.parametrize("change", ["file", "options", "result"])
 def test_what_has_changed_is_done_again(folder, monkeypatch, change):
     with monkeypatch.context() as first:
-        killed_after(1, first, plan_command)
+        killed_after(1, first)
         assert run(["plan", "many", *QUICK]) == 130
     options = QUICK
     if change == "file":
@@ -78,7 +76,7 @@ def test_what_has_changed_is_done_again(folder, monkeypatch, change):
         options = ("--no-plot", "--time-limit", "6")
     else:
         Path("out/a/plan.json").unlink()
-    done = killed_after(9, monkeypatch, plan_command)
+    done = killed_after(9, monkeypatch)
     run(["plan", "many", *options])
     assert done == ["a.yaml", "b.yaml", "c.yaml"]
 
@@ -86,7 +84,7 @@ def test_what_has_changed_is_done_again(folder, monkeypatch, change):
 def test_a_line_that_was_cut_off_does_not_count(folder, monkeypatch):
     Path("out").mkdir()
     Path("out/.journal").write_text('{"key": "abc", "na')
-    done = killed_after(9, monkeypatch, plan_command)
+    done = killed_after(9, monkeypatch)
     assert run(["plan", "many", *QUICK, "--quiet"]) == 1
     assert len(done) == 3
 

@@ -112,7 +112,7 @@ def test_check_looks_at_the_same_problem(folder, asked, capsys):
 
 
 def test_mpc_takes_its_loop_from_beside(folder, capsys, monkeypatch):
-    from maneuver_automaton import receding_horizon
+    from maneuver_automaton.cli import single
 
     seen = []
 
@@ -120,7 +120,7 @@ def test_mpc_takes_its_loop_from_beside(folder, capsys, monkeypatch):
         seen.append((problem, options["step"]))
         raise ValueError("not tried")
 
-    monkeypatch.setattr(receding_horizon, "simulate", simulate)
+    monkeypatch.setattr(single, "simulate", simulate)
     assert quietly("mpc", "many/Case0.csv", "--with", "beside.yaml") == 2
     ((problem, step),) = seen
     assert step == 0.5

@@ -11,9 +11,9 @@ from typing import Annotated
 
 import typer
 
+from maneuver_automaton.cli.entry import safe_streams
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
 from maneuver_automaton.cli.help_texts import ending
-from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
 PRINTED = (["schema"],)  # commands that do nothing but print
@@ -226,30 +226,24 @@ def plan(
 
     A folder that was interrupted goes on where it was when the same command is called again.
     """
-    from maneuver_automaton.cli import plan_command
     from maneuver_automaton.cli.inputs import Parts
-    from maneuver_automaton.cli.plan_settings import LookOptions, Settings
+    from maneuver_automaton.cli.jobs import run_jobs
+    from maneuver_automaton.cli.options import Budgets, LookOptions, Options
 
-    settings = Settings(
-        time_limit=time_limit,
-        alternatives=alternatives,
+    options = Options(
+        budgets=Budgets(time_limit=time_limit, gap=gap, alternatives=alternatives),
         plot=plot,
         animate=animate,
         html=html,
-        quiet=quiet,
-        gap=gap,
-        leave=leave,
-        jobs=1 if file.is_dir() else jobs,
-        scheduler=None if file.is_dir() else dask,
         look=LookOptions(title=title, size=size, style=style),
+        quiet=quiet,
+        leave=leave,
+        jobs=jobs,
+        scheduler=dask,
     )
     parts = Parts(beside=with_file, case=case, model=model)
     with _document(out / "plan.json", file, asked=as_json):
-        if file.is_dir():
-            return plan_command.plan_folder(
-                file, out, settings=settings, parts=parts, jobs=jobs, scheduler=dask
-            )
-        return plan_command.plan_file(file, out, settings=settings, parts=parts)
+        return run_jobs("plan", file, out, options, parts)
 
 
 @app.command(epilog=ending("mpc"))
@@ -298,37 +292,33 @@ def mpc(
 
     A folder that was interrupted goes on where it was when the same command is called again.
     """
-    from maneuver_automaton.cli import mpc_command
     from maneuver_automaton.cli.inputs import Parts
-    from maneuver_automaton.cli.plan_settings import LookOptions, Settings
+    from maneuver_automaton.cli.jobs import run_jobs
+    from maneuver_automaton.cli.options import Budgets, LookOptions, Options
 
-    Settings(time_limit=time_limit, gap=gap)  # checked alike
+    budgets = Budgets(time_limit=time_limit, gap=gap, steps=steps)
     if alternatives:
         raise InvalidScenario(
             f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
             "leave it out, or ask plan for them"
         )
-    settings = mpc_command.Settings(
-        steps=steps,
-        seed=seed,
-        seeds=seeds,
-        jobs=jobs,
-        scheduler=dask,
-        resume=resume,
-        time_limit=time_limit,
-        gap=gap,
+    options = Options(
+        budgets=budgets,
         plot=plot,
         animate=animate,
         html=html,
-        quiet=quiet,
         look=LookOptions(title=title, size=size, style=style),
+        quiet=quiet,
+        seed=seed,
+        seeds=seeds,
+        resume=resume,
+        jobs=jobs,
+        scheduler=dask,
     )
     parts = Parts(beside=with_file, case=case, model=model)
     written = out / ("closed_loop.json" if seeds is None else "statistics.json")
     with _document(written, file, asked=as_json):
-        if file.is_dir():
-            return mpc_command.drive_folder(file, out, settings=settings, parts=parts)
-        return mpc_command.drive_file(file, out, settings=settings, parts=parts)
+        return run_jobs("mpc", file, out, options, parts)
 
 
 @app.command(epilog=ending("check"))
@@ -376,8 +366,7 @@ def automaton_build(
     """
     from maneuver_automaton.cli import automaton_command
 
-    settings = automaton_command.Settings(jobs=jobs, scheduler=dask, quiet=quiet)
-    return automaton_command.build(file, out, settings=settings)
+    return automaton_command.build(file, out, jobs=jobs, scheduler=dask, quiet=quiet)
 
 
 @automaton_app.command("design", epilog=ending("automaton design"))
@@ -410,11 +399,11 @@ def automaton_design(
     It is DIR/library.json, or DIR itself if it ends in .json. The options hold instead of what the
     file says. Of a library with maneuvers, the --most are kept whose ends are spread best.
     """
-    from maneuver_automaton.cli import design_command
+    from maneuver_automaton.cli import automaton_command
 
     given = {"within": within, "most": most, "max_trims": max_trims, "radius_m": radius}
     instead = {key: value for key, value in given.items() if value is not None}
-    return design_command.design(file, out, instead=instead, quiet=quiet, plot=plot)
+    return automaton_command.design(file, out, instead=instead, quiet=quiet, plot=plot)
 
 
 @automaton_app.command("show", epilog=ending("automaton show"))
@@ -449,7 +438,7 @@ def automaton_draw(
     maneuvers stands beside it, its name ending in _maneuvers.
     """
     from maneuver_automaton.cli import automaton_command
-    from maneuver_automaton.cli.plan_settings import LookOptions
+    from maneuver_automaton.cli.options import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
     return automaton_command.draw(file, out, look=look, model_text=model)
@@ -519,11 +508,11 @@ def plot(
     files state neither body nor obstacles: --with its scenario, all is drawn as plan and mpc do. A
     closed loop alone is drawn as an arc from step to step.
     """
-    from maneuver_automaton.cli import convert_command
-    from maneuver_automaton.cli.plan_settings import LookOptions
+    from maneuver_automaton.cli import plot_command
+    from maneuver_automaton.cli.options import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
-    return convert_command.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
+    return plot_command.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
 
 
 @app.command(epilog=ending("export"))

@@ -1,10 +1,11 @@
-"""`automaton build`, `show`, `draw`."""
+"""`automaton build`, `show`, `draw`, `design`."""
 
 from __future__ import annotations
 
 import contextlib
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.table import Table
 
@@ -20,69 +21,63 @@ from maneuver_automaton.cli.inputs import (
     not_written,
     target,
 )
-from maneuver_automaton.cli.plan_settings import LookOptions
-from maneuver_automaton.cli.progress import Advance, progress_bar, waiting
+from maneuver_automaton.cli.options import LookOptions
+from maneuver_automaton.cli.pictures import ready_to_draw
+from maneuver_automaton.cli.progress import Advance, counted, progress_bar, waiting
 from maneuver_automaton.cli.tables import console, table
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
-    """The options of `automaton build`."""
-
-    jobs: int = 1
-    scheduler: str | None = None
-    quiet: bool = False
+if TYPE_CHECKING:
+    from maneuver_automaton.design import DesignedLibrary
 
 
 MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
 EVERY_POSE = "every pose can be reached in free space, by words of any length"
 
 
-def build(file: Path, out: Path, *, settings: Settings) -> int:
+def build(
+    file: Path, out: Path, *, jobs: int = 1, scheduler: str | None = None, quiet: bool = False
+) -> int:
     """Write the library of a scenario, or of a build file."""
     from maneuver_automaton.scenario.build_file import is_build_file
 
     path = target(out, "library.json")
     if is_build_file(file):
-        return _build_maneuvers(file, path, settings)
-    with waiting("making the library", quiet=settings.quiet):
+        return _build_maneuvers(file, path, jobs=jobs, scheduler=scheduler, quiet=quiet)
+    with waiting("making the library", quiet=quiet):
         automaton = automaton_of(file)
     make_folder(path.parent)
+    _save(automaton, path)
+    _print_library(path, automaton, quiet=quiet)
+    return FOUND
+
+
+def _save(automaton: Automaton, path: Path) -> None:
     try:
         save_library(automaton, path)
     except OSError as error:
         raise not_written(path, error) from error
-    _print_library(path, automaton, settings)
-    return FOUND
 
 
-def _build_maneuvers(file: Path, path: Path, settings: Settings) -> int:
+def _build_maneuvers(
+    file: Path, path: Path, *, jobs: int, scheduler: str | None, quiet: bool
+) -> int:
     """Trims of a build file and their maneuvers, with a bar; trims and pairs without are listed."""
     from maneuver_automaton.scenario import build_file
 
-    with waiting("finding the trims", quiet=settings.quiet):
+    with waiting("finding the trims", quiet=quiet):
         asked = build_file.load_build_file(file)
         pairs = asked.pairs()
     make_folder(path.parent)
-    done = 0
     shown: contextlib.AbstractContextManager[Advance | None] = (
-        progress_bar("maneuvers", len(pairs), quiet=settings.quiet)
+        progress_bar("maneuvers", len(pairs), quiet=quiet)
         if pairs
-        else waiting("joining the trims", quiet=settings.quiet)
+        else waiting("joining the trims", quiet=quiet)
     )
     with shown as advance:
-
-        def count(n: int, _total: int) -> None:
-            nonlocal done
-            if advance is not None:
-                advance(n - done)
-            done = n
-
+        count = None if advance is None else counted(advance)
         try:
-            built = build_file.build(
-                asked, path, jobs=settings.jobs, scheduler=settings.scheduler, progress=count
-            )
+            built = build_file.build(asked, path, jobs=jobs, scheduler=scheduler, progress=count)
         except KeyboardInterrupt:
             complain(f"{file}: interrupted: called again, the build goes on after what is done")
             raise
@@ -96,8 +91,8 @@ def _build_maneuvers(file: Path, path: Path, settings: Settings) -> int:
         complain(f"{file}: no trim at {missing.name}: {missing.reason}")
     for failure in built.failures:
         complain(f"{file}: no maneuver from {failure.source} to {failure.target}: {failure.reason}")
-    _print_library(path, built.automaton, settings)
-    if built.build is not None and not settings.quiet:
+    _print_library(path, built.automaton, quiet=quiet)
+    if built.build is not None and not quiet:
         one = built.build
         console().print(
             f"  {one.solved} solved, {one.resumed} from the journal of a build before, "
@@ -108,8 +103,8 @@ def _build_maneuvers(file: Path, path: Path, settings: Settings) -> int:
     return NO_PLAN if built.failures else FOUND
 
 
-def _print_library(path: Path, automaton: Automaton, settings: Settings) -> None:
-    if not settings.quiet:
+def _print_library(path: Path, automaton: Automaton, *, quiet: bool) -> None:
+    if not quiet:
         said = f"{path}: {_count(automaton)}, hash {automaton_hash(automaton)}"
         console().print(said, soft_wrap=True)
 
@@ -171,11 +166,7 @@ def draw(file: Path, out: Path, *, look: LookOptions, model_text: str | None = N
     automaton, name = named_automaton(file, model_text)
     path = target(out, "automaton.png")
     make_folder(path.parent)
-    from maneuver_automaton import plotting
-    from maneuver_automaton.cli.pictures import skip_documentation
-
-    skip_documentation()
-
+    plotting = ready_to_draw()
     try:
         plotting.save_automaton_figure(automaton, path, look=look.look(name))
         console().print(str(path), soft_wrap=True)
@@ -230,3 +221,114 @@ def few(names: tuple[str, ...]) -> str:
 def _count(automaton: Automaton) -> str:
     counts = {"trim": len(automaton), "maneuver": len(automaton.maneuvers)}
     return ", ".join(f"{n} {what}{'' if n == 1 else 's'}" for what, n in counts.items())
+
+
+def design(
+    file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool, plot: bool = False
+) -> int:
+    """Write the smallest library that a design file asks for, and say what is proven of it.
+
+    Of a library with maneuvers, those are kept whose ends spread best.
+    """
+    path = target(out, "library.json")
+    if file.suffix == ".json":
+        return _disperse(file, path, instead=instead, quiet=quiet)
+    from maneuver_automaton.scenario.build_file import design_of_file
+
+    make_folder(path.parent)
+    with waiting("choosing trims, and proving their factor", quiet=quiet):
+        designed = design_of_file(file, instead=instead)
+    _save(designed.automaton, path)
+    if not quiet:
+        _print_designed(path, designed)
+    if plot:
+        _draw_factor(designed, path.with_suffix(".png"), quiet=quiet)
+    if not designed.holds:
+        remedy = "allow longer words (max_trims)"
+        if designed.any_length > designed.within:
+            remedy = "allow more trims (most), or more candidates"
+        complain(
+            f"{file}: asked for a factor within {designed.within:g}, proven is "
+            f"{designed.factor:.4g}: {remedy}"
+        )
+    return FOUND if designed.holds else NO_PLAN
+
+
+def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bool) -> int:
+    """The library of a library file, with fewer maneuvers."""
+    from maneuver_automaton.design import disperse_library
+
+    others = [key for key in instead if key != "most"]
+    if others or "most" not in instead:
+        raise InvalidScenario(
+            f"{file}: of a library with maneuvers --most says how many are kept, and nothing else; "
+            "a factor is proven for the trims of a build file with the key design"
+        )
+    library = automaton_of(file)
+    make_folder(path.parent)
+    try:
+        with waiting("choosing maneuvers", quiet=quiet):
+            done = disperse_library(library, most=int(instead["most"]))
+    except ValueError as error:
+        raise InvalidScenario(f"{file}: {error}") from error
+    _save(done.automaton, path)
+    if not quiet:
+        console().print(
+            f"{path}: {len(done.automaton.maneuvers)} of {done.maneuvers} maneuvers, hash "
+            f"{automaton_hash(done.automaton)}\n  dispersion {done.dispersion:.4g} m, at "
+            f"{done.farthest}; no choice of as many has less than {done.at_least:.4g} m",
+            soft_wrap=True,
+        )
+    return FOUND
+
+
+def _draw_factor(designed: DesignedLibrary, path: Path, *, quiet: bool) -> None:
+    """The factor over the goals; without short words it is the same everywhere, and not drawn."""
+    if designed.words is None:
+        complain(f"{path}: not drawn: the factor of words of any length is one for all goals")
+        return
+    plotting = ready_to_draw()
+    try:
+        plotting.save_factor_figure(designed.words, path)
+    except OSError as error:
+        raise not_written(path, error) from error
+    if not quiet:
+        console().print(str(path), soft_wrap=True)
+
+
+def _print_designed(path: Path, designed: DesignedLibrary) -> None:
+    out, size = console(), len(designed.automaton)
+    rows = [
+        [str(trims), f"{factor:.6g}", "this one" if trims == size else ""]
+        for trims, factor in designed.by_size
+    ]
+    columns = ["trims", "factor, words of any length", ""]
+    out.print(table(designed.automaton.name, columns, rows, numbers=(0, 1)))
+    chosen = [
+        [str(k + 1), trim.name, vector_text(trim.body_velocity)]
+        for k, trim in enumerate(designed.automaton.trims)
+    ]
+    out.print(table("", ["", "trim", "twist [m/s, m/s, rad/s]"], chosen, numbers=(0,)))
+    for line in _proven(designed):
+        out.print(f"  {line}", soft_wrap=True)
+    out.print(
+        f"{path}: {size} of {designed.candidates} candidates, "
+        f"hash {automaton_hash(designed.automaton)}",
+        soft_wrap=True,
+    )
+
+
+def _proven(designed: DesignedLibrary) -> list[str]:
+    """What is proven, in words."""
+    everywhere = f"words of any length: factor {designed.any_length:.6g}, every start and goal"
+    if designed.any_length > 1.0:
+        everywhere += f"; {designed.hardest} loses most"
+    if (proof := designed.words) is None:
+        return [everywhere]
+    return [
+        everywhere,
+        f"words of at most {proof.max_trims} trims: factor {proof.factor:.6g} proven "
+        f"on {proof.boxes} boxes of goals, {proof.sampled:.6g} met at {vector_text(proof.worst)}",
+        f"goals within {proof.radius:.6g} m, at all headings, to which the shortest path is at "
+        f"least {proof.least:.6g} m long",
+    ]

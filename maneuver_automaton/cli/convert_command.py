@@ -1,14 +1,12 @@
-"""`convert`, `plot`, `schema`: from one file to another, without planning."""
+"""`convert` and `schema`: from one file to another, without planning."""
 
 from __future__ import annotations
 
-import functools
 import json
 import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
@@ -19,11 +17,7 @@ from maneuver_automaton.cli.inputs import (
     make_folder,
     not_written,
     problem_of,
-    scenario_of,
 )
-from maneuver_automaton.cli.pictures import skip_documentation
-from maneuver_automaton.cli.plan_settings import LookOptions
-from maneuver_automaton.cli.planned import road_fleet
 from maneuver_automaton.cli.tables import console, print_written
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
@@ -40,18 +34,7 @@ from maneuver_automaton.formats.registry import YAML_ENDINGS, map_writer_of
 from maneuver_automaton.formats.statement import MapFile
 from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
 
-if TYPE_CHECKING:
-    from maneuver_automaton.planning import PlanResult
-    from maneuver_automaton.problem import Problem
-    from maneuver_automaton.receding_horizon import ClosedLoop
-
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
-
-DRAWN = {  # by their endings
-    "picture": (".png", ".pdf", ".svg"),
-    "animation": (".gif",),
-    "page": (".html",),
-}
 
 
 def convert(source: Path, target: Path, *, parts: Parts) -> int:
@@ -154,153 +137,6 @@ def _write_scenario(scenario: Scenario | FleetScenario, source: Path, target: Pa
     for file in new:
         save_nav2_map(file.map, file.path)
     write_text_atomically(target, text)
-
-
-def plot(
-    file: Path,
-    out: Path | None,
-    *,
-    animate: bool,
-    look: LookOptions,
-    html: bool = False,
-    beside: Path | None = None,
-) -> int:
-    """Draw a plan.json or closed_loop.json again, still, in motion, or as a page that plays it."""
-    if animate and html:
-        raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
-    what = "animation" if animate else "page" if html else "picture"
-    path = _picture(file, out, what)
-    if (roads := road_fleet(file, Parts(beside=beside), alone=True)) is not None:
-        draw = functools.partial(_draw, roads, path, what, look, roads.name)
-    elif (driven := _loop_of_fleet(file)) is not None:
-        from maneuver_automaton.cli.planned import fleet_planned
-        from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
-
-        fleet = fleet_planned(file, driven, Parts(beside=beside))
-        log = load_fleet_loop(file, fleet.fleet)
-        draw = functools.partial(_draw, log, path, what, look, fleet.name)
-    elif (plans := _plans_of_fleet(file)) is not None:
-        from maneuver_automaton.cli.planned import fleet_planned
-        from maneuver_automaton.formats.fleet_json import load_fleet
-
-        fleet = fleet_planned(file, plans, Parts(beside=beside))
-        result = load_fleet(file, fleet.fleet)
-        draw = functools.partial(_draw, result, path, what, look, fleet.name)
-    elif beside is None:
-        document = _drawn(file)
-        draw = functools.partial(_draw_file, document, path, what, look)
-    else:
-        scenario = scenario_of(beside)
-        value = _value_of(file, scenario.problem)
-        draw = functools.partial(_draw, value, path, what, look, scenario.name)
-    make_folder(path.parent)
-    skip_documentation()
-    try:
-        draw()
-    except OSError as error:
-        raise not_written(path, error) from error
-    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{file}: {said}") from error
-    print_written(path)
-    return FOUND
-
-
-def _plans_of_fleet(file: Path) -> dict[str, Any] | None:
-    """The content of a plan.json of several vehicles; None of anything else."""
-    from maneuver_automaton.formats.plan_json import read_fleet_document
-
-    try:
-        return read_fleet_document(file)
-    except InvalidScenario:  # told by who reads the plan of one vehicle
-        return None
-
-
-def _loop_of_fleet(file: Path) -> dict[str, Any] | None:
-    """The content of a closed_loop.json of several vehicles; None of anything else."""
-    from maneuver_automaton.formats.fleet_loop_json import read_fleet_loop_document
-
-    return read_fleet_loop_document(file)
-
-
-def _draw(value: Any, path: Path, what: str, look: LookOptions, name: str) -> None:
-    """Draw any result as the command does that made it."""
-    from maneuver_automaton import plotting
-    from maneuver_automaton.recording import recording_of
-
-    recording = recording_of(value)
-    if what == "page":
-        value.player(title=look.title or name).save(path)
-    elif what == "picture":
-        plotting.save_picture(recording, path, look=look.look(name))
-    elif not any(one.has_plan for one in recording.movers):
-        raise ValueError(f"holds no plan, its status is {recording.status!r}")
-    else:
-        plotting.save_film(recording, path)
-
-
-def _draw_file(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:
-    """Draw what a file states: the motion, without body and obstacles."""
-    from maneuver_automaton import plotting
-    from maneuver_automaton.formats.plan_json import plan_of_document
-    from maneuver_automaton.recording.plans import stated
-
-    name = str(document.get("name") or "")
-    found = document["status"] == "found" and bool(document["trajectory"])
-    if not found and what != "picture":
-        raise ValueError(f"holds no plan, its status is {document['status']!r}")
-    plan = plan_of_document(document) if found else None
-    if what == "picture":
-        plotting.save_picture(stated(document, plan), path, look=look.look(name))
-    elif what == "animation":
-        plotting.save_film(plan, path)
-    elif plan is not None:
-        title = look.title or name or path.stem
-        plotting.player_of_file(document, plan, title=title).save(path)
-
-
-def _picture(file: Path, out: Path | None, what: str) -> Path:
-    """Where the picture goes: beside the file, into a folder, or to the file given."""
-    endings = DRAWN[what]
-    path = file.with_suffix(endings[0]) if out is None else out
-    if path.is_dir():
-        path = path / file.with_suffix(endings[0]).name
-    if path.suffix.lower() not in endings:
-        raise InvalidScenario(
-            f"{path}: is no {what} that this version draws, need an ending of {', '.join(endings)}"
-        )
-    return path
-
-
-def _value_of(file: Path, problem: Problem) -> PlanResult | ClosedLoop:
-    """The plan or closed loop of a file, in the world that it was made for."""
-    from maneuver_automaton.formats.closed_loop_json import (
-        load_closed_loop,
-        read_closed_loop_document,
-    )
-    from maneuver_automaton.formats.plan_json import load_result
-
-    if read_closed_loop_document(file) is None:
-        return load_result(file, problem)
-    return load_closed_loop(file, problem)
-
-
-def _drawn(file: Path) -> dict[str, Any]:
-    """What to draw of a plan.json, or of a closed_loop.json, whose drive is drawn as a plan."""
-    from maneuver_automaton.formats.closed_loop_json import (
-        driven_document,
-        read_closed_loop_document,
-    )
-    from maneuver_automaton.formats.plan_json import read_plan_document
-
-    loop = read_closed_loop_document(file)
-    if loop is None:
-        return read_plan_document(file)
-    try:
-        return driven_document(loop)
-    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{file}: {said}") from error
 
 
 def print_schema(document: str | None = None) -> int:

@@ -1,171 +1,195 @@
-"""What `plan` does with a file of several vehicles: plan, write, draw and tell."""
+"""`plan` and `mpc` of a file of several vehicles: plans of them all, and their closed loop."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import math
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from maneuver_automaton._interrupts import stopped
-from maneuver_automaton.cli.answers import INTERRUPTED
-from maneuver_automaton.cli.folder_runs import Row
-from maneuver_automaton.cli.guard import FOUND, NO_PLAN
-from maneuver_automaton.cli.inputs import Parts
-from maneuver_automaton.cli.plan_settings import Settings
-from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
+from maneuver_automaton.cli.progress import progress_bar, waiting
+from maneuver_automaton.cli.single import STEPS
+from maneuver_automaton.fleet import (
+    DrivenVerdict,
+    FleetLog,
+    FleetResult,
+    FleetStatus,
+    plan_fleet,
+    simulate_fleet,
+    verify_driven,
+)
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.scenario import FleetScenario
 
-if TYPE_CHECKING:
-    from maneuver_automaton.fleet import FleetResult
-    from maneuver_automaton.scenario import FleetScenario
 
+def planned(job: Job, scenario: FleetScenario) -> JobResult:
+    """Plan them all."""
+    from maneuver_automaton.formats.fleet_json import reason_of, save_fleet
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FleetAnswer:
-    """The plans of several vehicles, or of some of them."""
+    options, said = job.options, scenario.settings
+    limit, best = options.budgets.time_limit or scenario.time_limit_s, [""]
 
-    name: str
-    result: FleetResult
-    path: Path  # of the file
-    parts: Parts
+    def better(seconds: float, value: float) -> None:
+        best[0] = f"{said.objective} {value:.6g}, found after {seconds:.3g} s"
 
-    @property
-    def why_not(self) -> str:
-        """Status and reasons, if a vehicle has no plan."""
-        from maneuver_automaton.fleet import FleetStatus
-        from maneuver_automaton.formats.fleet_json import reason_of
+    try:
+        with waiting(f"planning, at most {limit:g} s", quiet=options.quiet, more=lambda: best[0]):
+            result = plan_fleet(
+                scenario.fleet,
+                time_limit=limit,
+                objective=said.objective,
+                orders=said.orders,
+                on_better=better,
+                jobs=options.jobs,
+                scheduler=options.scheduler,
+            )
+    except KeyboardInterrupt:
+        if not stopped():
+            raise  # in somebody else's program
+        result = given_up(scenario)
+    result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
+    name, whole = scenario.name, result.status is FleetStatus.FOUND
+    why = "interrupted before all had a plan: " if stopped() else ""
+    known = [one.clearance_m for one in result.results.values() if one.clearance_m is not None]
+    least = min([result.clearance_m, *known])
 
-        result = self.result
-        if result.status is FleetStatus.FOUND:
-            return ""
-        said = "interrupted before all had a plan: " if stopped() else ""
-        return f"{result.status.value}: {said}{reason_of(result)}"
-
-    def save(self, path: Path) -> None:
-        """Write plan.json."""
-        from maneuver_automaton.formats.fleet_json import save_fleet
-
-        source = {"file": self.path, "with": self.parts.beside, "case": self.parts.case}
-        save_fleet(self.result, path, name=self.name, source=source, interrupted=stopped())
-
-    def draw(self, out: Path, settings: Settings) -> None:
-        """Write the pictures that were asked for."""
-        from maneuver_automaton import plotting
-
-        if settings.plot:
-            look = settings.look.look(self.name)
-            plotting.save_picture(self.result, out / "plan.png", look=look)
-        if settings.animate and self.result.plans:
-            plotting.save_film(self.result, out / "plan.gif")
-        if settings.html:
-            self.result.player(title=settings.look.title or self.name).save(out / "plan.html")
-
-    def tell(self, folder: str) -> None:
-        """Print it."""
+    def tell(folder: str) -> None:
         from maneuver_automaton.cli.fleet_tables import print_fleet
 
-        print_fleet(self.name, self.result, folder=folder)
+        print_fleet(name, result, folder=folder)
 
-    def row(self, path: Path) -> Row:
-        """For the table of a folder."""
-        from maneuver_automaton.cli.fleet_tables import least_clearance
-
-        result, whole = self.result, not self.why_not
-        return Row(
-            name=path.name,
-            code=FOUND if whole else NO_PLAN,
-            status=result.status.value,
-            reason="" if whole else f"{path}: {self.why_not}",
-            cost=result.cost if whole else None,
-            duration=result.last_s if whole else None,
-            clearance=least_clearance(result),
-            first_plan=result.timing_s.get("first_plan"),
-        )
-
-
-@dataclass(slots=True, kw_only=True)
-class BestSoFar:
-    """The objective of the best plans of all while they are improved."""
-
-    objective: str
-    text: str = ""
-
-    def better(self, seconds: float, value: float) -> None:
-        """Take what plans were found after so many seconds."""
-        self.text = f"{self.objective} {value:.6g}, found after {seconds:.3g} s"
+    return JobResult(
+        name=name,
+        result=result,
+        save=lambda path: save_fleet(
+            result, path, name=name, source=_source(job), interrupted=stopped()
+        ),
+        tell=tell,
+        done=whole,
+        status=result.status.value,
+        complaints=() if whole else (f"{result.status.value}: {why}{reason_of(result)}",),
+        cost=result.cost if whole else None,
+        duration=result.last_s if whole else None,
+        clearance=least if math.isfinite(least) else None,
+        first_plan=result.timing_s.get("first_plan"),
+    )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FleetTask:
-    """The problem of several vehicles."""
+def _source(job: Job) -> dict[str, Any]:
+    return {"file": job.path, "with": job.parts.beside, "case": job.parts.case}
 
-    scenario: FleetScenario
-    settings: Settings
-    path: Path
-    parts: Parts
-    shown: BestSoFar = field(init=False)
 
-    def __post_init__(self) -> None:
-        settings, shown = self.settings, BestSoFar(objective=self.scenario.settings.objective)
-        object.__setattr__(self, "shown", shown)
-        for option, given in (
-            ("--alternatives", settings.alternatives > 0),
-            ("--gap", settings.gap is not None),
-        ):
-            if given:
-                raise InvalidScenario(
-                    f"{option}: is for one vehicle, but {self.path} states several; leave it out"
-                )
-
-    @property
-    def limit_s(self) -> float:
-        """Upper bound for it [s]."""
-        return self.settings.time_limit or self.scenario.time_limit_s
-
-    def so_far(self) -> str:
-        """The objective so far."""
-        return self.shown.text
-
-    def answer(self) -> FleetAnswer:
-        """Plan them all."""
-        from maneuver_automaton.fleet import plan_fleet
-
-        said = self.scenario.settings
-        result = plan_fleet(
-            self.scenario.fleet,
-            time_limit=self.limit_s,
-            objective=said.objective,
-            orders=said.orders,
-            on_better=self.shown.better,
-            jobs=self.settings.jobs,
-            scheduler=self.settings.scheduler,
-        )
-        return self._answered(result)
-
-    def given_up(self) -> FleetAnswer:
-        """The answer if a signal came before there was a plan."""
-        from maneuver_automaton.fleet import FleetResult, FleetStatus
-        from maneuver_automaton.planning import PlanResult, PlanStatus
-
-        fleet, status = self.scenario.fleet, PlanStatus.OUT_OF_BUDGET
-        results = {
+def given_up(scenario: FleetScenario) -> FleetResult:
+    """The result if a signal came before there was a plan."""
+    fleet, status = scenario.fleet, PlanStatus.OUT_OF_BUDGET
+    return FleetResult(
+        problem=fleet,
+        status=FleetStatus.NO_PLAN,
+        results={
             name: PlanResult(problem=problem, status=status, reason=INTERRUPTED)
             for name, problem in zip(fleet.names, fleet.problems, strict=True)
-        }
-        return self._answered(
-            FleetResult(
-                problem=fleet,
-                status=FleetStatus.NO_PLAN,
-                results=results,
-                objective=self.scenario.settings.objective,
-                reasons=dict.fromkeys(fleet.names, INTERRUPTED),
-            )
+        },
+        objective=scenario.settings.objective,
+        reasons=dict.fromkeys(fleet.names, INTERRUPTED),
+    )
+
+
+def driven(job: Job, scenario: FleetScenario) -> JobResult:
+    """Close the loop of them all."""
+    log = _loop(job, scenario)
+    verdict, name = verify_driven(log), scenario.name
+    broken = list(log.violations)
+    complaints = [f"step {number} broke a guarantee: {one}" for number, one in broken]
+    complaints += list(verdict.collisions)
+    complaints += [
+        f"{name} did not drive as its model says: {said}" for name, said in verdict.defects.items()
+    ]
+    if not log.reached:
+        when = ", when the loop was interrupted" if stopped() else ""
+        complaints.append(f"{log.status}: {log.reason}{when}")
+
+    def save(path: Path) -> None:
+        from maneuver_automaton.formats.fleet_loop_json import save_fleet_loop
+
+        save_fleet_loop(
+            log, path, driven=verdict, name=name, source=_source(job), interrupted=stopped()
         )
 
-    def _answered(self, result: FleetResult) -> FleetAnswer:
-        timing = {**self.scenario.timing_s, **result.timing_s}
-        return FleetAnswer(
-            name=self.scenario.name,
-            result=replace(result, timing_s=timing),
-            path=self.path,
-            parts=self.parts,
+    def tell(folder: str) -> None:
+        from maneuver_automaton.cli.fleet_tables import print_fleet_loop
+
+        print_fleet_loop(name, log, verdict, folder=folder)
+
+    return JobResult(
+        name=name,
+        result=log,
+        save=save,
+        tell=tell,
+        done=log.reached and verdict.passed and not broken,
+        status=log.status,
+        complaints=tuple(complaints),
+        cost=float(log.cost),
+        duration=float(log.times[-1] - log.times[0]),
+        clearance=_least(verdict),
+    )
+
+
+def _least(verdict: DrivenVerdict) -> float | None:
+    """The least distance to an obstacle or another vehicle [m]; None if there is none."""
+    least = min([verdict.distance_m, *verdict.clearances_m.values()])
+    return least if math.isfinite(least) else None
+
+
+def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
+    """The closed loop, from plans with room for noise."""
+    part, options = scenario.receding_horizon, job.options
+    assert part is not None
+    steps, seed = options.budgets.steps or part.steps or STEPS, options.seed
+    if seed is None:
+        seed = 0 if part.disturbance is None else part.disturbance.seed
+    log = None if options.resume is None else load_fleet_loop(options.resume, scenario.fleet)
+    first = _first_plans(job, scenario) if log is None else None
+    with progress_bar("steps", steps, quiet=options.quiet) as advance:
+        try:
+            return simulate_fleet(
+                scenario.fleet,
+                step=part.step_s,
+                steps=steps,
+                disturbance=scenario.disturbances,
+                seed=seed,
+                first=first,
+                log=log,
+                margin=part.margin,
+                tube_m=part.tube_m,
+                time_limit=options.budgets.time_limit or part.time_limit_s,
+                swaps_per_step=part.swaps_per_step,
+                group_size=part.group_size,
+                delay_steps=part.delay_steps,
+                joins_s=scenario.joins_s,
+                breaks_s=scenario.breaks_s,
+                progress=lambda _: advance(),
+            )
+        except ValueError as error:
+            raise job.wrong(error, "receding_horizon: ") from error
+
+
+def _first_plans(job: Job, scenario: FleetScenario) -> FleetResult | None:
+    """Plans of those that are there from the begin on, if there are any, as a loop needs them."""
+    from maneuver_automaton.fleet.held import fleet_with_room, tube_of
+
+    part, fleet = scenario.receding_horizon, scenario.fleet
+    assert part is not None
+    there = [name for name in fleet.names if name not in scenario.joins_s]
+    if not there:
+        return None
+    limit = scenario.time_limit_s
+    with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet):
+        return plan_fleet(
+            fleet_with_room(fleet.only(there), tube_of(fleet, part.tube_m)),
+            time_limit=limit,
+            objective=scenario.settings.objective,
+            orders=scenario.settings.orders,
         )

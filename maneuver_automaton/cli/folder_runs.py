@@ -48,7 +48,7 @@ class Row:
 
 
 def run_folder(
-    one: Callable[[Problem], Row],
+    one: Callable[[Problem], tuple[Path, Row]],
     problems: Sequence[Problem],
     out: Path,
     *,
@@ -72,7 +72,10 @@ def run_folder(
     }
     left = [problem for problem in problems if problem[0] not in rows]
     jobs = min(jobs, max(len(left), 1))
-    results = _results(one, left, jobs=jobs, scheduler=scheduler)
+    with _as_option():
+        results = in_parallel(
+            one, left, jobs=jobs, scheduler=scheduler, order="as done", ends_early=True
+        )
     if jobs > 1 and scheduler is None:
         ready()
     if rows and not quiet:
@@ -83,7 +86,8 @@ def run_folder(
             if row.code <= NO_PLAN and not stopped():
                 write({"key": keys[path], **asdict(row)})
             if not quiet and len(problems) > 1:
-                _say(_line(row))
+                cost = "" if row.cost is None else f", cost {row.cost:.6g}"
+                _say(f"{row.name}: {row.status}{cost}")
             advance()
     if not stopped():
         (out / JOURNAL).unlink(missing_ok=True)
@@ -109,25 +113,6 @@ def _as_option() -> Iterator[None]:
         yield
     except ValueError as error:
         raise InvalidScenario(f"--dask: {str(error).removeprefix('scheduler: ')}") from error
-
-
-@dataclass(frozen=True, slots=True)
-class _Named:
-    """A function whose result comes with the file that it is of."""
-
-    one: Callable[[Problem], Row]
-
-    def __call__(self, problem: Problem) -> tuple[Path, Row]:
-        return problem[0], self.one(problem)
-
-
-def _results(
-    one: Callable[[Problem], Row], left: Sequence[Problem], *, jobs: int, scheduler: str | None
-) -> Iterator[tuple[Path, Row]]:
-    with _as_option():
-        return in_parallel(
-            _Named(one), left, jobs=jobs, scheduler=scheduler, order="as done", ends_early=True
-        )
 
 
 def _key(path: Path, parts: Parts, options: str) -> str:
@@ -177,11 +162,6 @@ def _say(line: str) -> None:
     from maneuver_automaton.cli.tables import console
 
     console().print(line, soft_wrap=True, markup=False)
-
-
-def _line(row: Row) -> str:
-    cost = "" if row.cost is None else f", cost {row.cost:.6g}"
-    return f"{row.name}: {row.status}{cost}"
 
 
 def _print_rows(rows: Sequence[Row]) -> None:

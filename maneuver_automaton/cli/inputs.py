@@ -24,6 +24,21 @@ class Parts:
     model: str | None = None  # MODULE:OBJECT
 
 
+def is_road(path: Path) -> bool:
+    """Whether a file is one of CommonRoad, by its ending."""
+    return path.suffix.lower() == ".xml"
+
+
+def states_several(path: Path, parts: Parts) -> bool:
+    """Whether a file of CommonRoad states several problems, and --case picks none of them."""
+    from maneuver_automaton.formats.commonroad import n_problems
+
+    try:
+        return parts.case is None and n_problems(path) > 1
+    except OSError:
+        return False  # told by who reads it
+
+
 def problem_of(
     path: Path, parts: Parts | None = None, *, remark: bool = True
 ) -> Scenario | FleetScenario:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import collections
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from rich.text import Text
@@ -55,11 +55,16 @@ def print_loop(name: str, loop: ClosedLoop, *, folder: str) -> None:
         facts["left out"] = "; ".join(missing)
     facts["written to"] = folder
     if rows:
-        milliseconds = 1e3 * loop.solve_s
-        facts["time per step"] = (
-            f"{np.median(milliseconds):.2f} ms median, {milliseconds.max():.2f} ms at most"
-        )
+        facts["time per step"] = times_of(loop.solve_s)
     print_facts(facts)
+
+
+def times_of(solve_s: Iterable[float]) -> str:
+    """What steps took [s], in words; empty if there is none."""
+    milliseconds = [1e3 * one for one in solve_s]
+    if not milliseconds:
+        return ""
+    return f"{np.median(milliseconds):.2f} ms median, {max(milliseconds):.2f} ms at most"
 
 
 def shortened(rows: list[list[str]]) -> list[list[str]]:

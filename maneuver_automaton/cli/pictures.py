@@ -1,4 +1,4 @@
-"""Pictures of the command line: what draws is loaded beside the planning, and reads no docs."""
+"""Pictures, films and pages of results; what draws them is loaded beside the planning."""
 
 from __future__ import annotations
 
@@ -8,16 +8,66 @@ import pickle
 import signal
 import sys
 from collections.abc import Callable, Iterator
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton._interrupts import is_main_program
+from maneuver_automaton.cli.options import Options
+from maneuver_automaton.recording import Recording, recording_of
+
+if TYPE_CHECKING:  # Matplotlib takes half a second
+    from maneuver_automaton.plotting import Look
 
 
-def skip_documentation() -> None:
-    """Have Matplotlib write none for its classes, which is a fifth of its import."""
+def draw(result: Any, name: str, file: Path, options: Options) -> None:
+    """Write the pictures of a result that were asked for: `file` with their endings."""
+    recording, plotting = recording_of(result), ready_to_draw()
+    moves, on_roads = not why_no_film(recording), bool(recording.world.lanes)
+    if options.plot and (moves or not on_roads):
+        look = options.look.look(name)
+        plotting.save_picture(recording, file.with_suffix(".png"), look=look)
+        _draw_more(recording, result, file, options, look)
+    if options.animate and moves:
+        save_film(recording, file.with_suffix(".gif"), options.look.look(name))
+    page = options.html or (options.animate and file.name == "closed_loop")
+    if page and (moves or not on_roads or len(recording.movers) == 1):
+        result.player(title=options.look.title or name).save(file.with_suffix(".html"))
+
+
+def _draw_more(recording: Recording, result: Any, file: Path, options: Options, look: Look) -> None:
+    """Further pictures of a plan, where there is something to see in them."""
+    plotting, is_plan = ready_to_draw(), recording.kind == "plan"
+    if is_plan and plotting.flies_among_heights(recording):
+        plotting.save_picture(recording, file.with_name("plan_3d.png"), look=look, view="space")
+    if is_plan and options.budgets.gap is not None and recording.movers[0].has_plan:
+        plotting.save_progress_figure(result, file.with_name("progress.png"), title=look.title)
+    if recording.alternatives:
+        path = file.with_name("alternatives.png")
+        plotting.save_picture(recording, path, look=look, view="alternatives")
+
+
+def save_film(recording: Recording, path: Path, look: Look) -> None:
+    """Animate a result; the title stands above those on roads alone."""
+    plotting = ready_to_draw()
+    titled = plotting.Look(title=look.title) if recording.world.lanes else None
+    plotting.save_film(recording, path, look=titled)
+
+
+def why_no_film(recording: Recording) -> str:
+    """Why nothing moves in a result: it holds no plan; empty if something does."""
+    if any(one.has_plan for one in recording.movers):
+        return ""
+    return f"holds no plan, its status is {recording.status!r}"
+
+
+def ready_to_draw() -> Any:
+    """What draws; Matplotlib writes no documentation of its classes, a fifth of its import."""
     from matplotlib import artist
 
     artist.kwdoc = _nothing  # type: ignore[assignment]
+    from maneuver_automaton import plotting
+
+    return plotting
 
 
 def _nothing(_: object) -> str:
@@ -92,8 +142,8 @@ def _serve(read: int) -> None:
         nowhere = os.open(os.devnull, os.O_RDWR)
         for stream in (0, 1, 2):
             os.dup2(nowhere, stream)
-        skip_documentation()
-        from maneuver_automaton.plotting import plan_figures  # noqa: F401
+        ready_to_draw()
+        from maneuver_automaton.plotting import pictures  # noqa: F401
 
         with os.fdopen(read, "rb") as pipe:
             order = pipe.read()

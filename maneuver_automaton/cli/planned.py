@@ -8,8 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from maneuver_automaton.cli.inputs import Parts, problem_of
-from maneuver_automaton.cli.road_command import is_road
+from maneuver_automaton.cli.inputs import Parts, is_road, problem_of
 from maneuver_automaton.errors import InvalidScenario
 
 if TYPE_CHECKING:

@@ -72,6 +72,18 @@ def progress_bar(what: str, total: int, *, quiet: bool) -> Iterator[Advance]:
         yield advance
 
 
+def counted(advance: Advance) -> Callable[[int, int], None]:
+    """Moves a bar on, told how many pieces are done in all."""
+    done = 0
+
+    def count(n: int, _total: int) -> None:
+        nonlocal done
+        advance(n - done)
+        done = n
+
+    return count
+
+
 @contextlib.contextmanager
 def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> Iterator[None]:
     """A clock that runs while something is computed of which no one knows how long it takes.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,15 @@ from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.primitives import Trim, trims_of
 from maneuver_automaton.primitives.bang_bang import has_limited_rates
 from maneuver_automaton.primitives.quickest import quickest_maneuvers
-from maneuver_automaton.scenario.places import at
+from maneuver_automaton.scenario.parts import at
 from maneuver_automaton.scenario.presets import preset_automaton
-from maneuver_automaton.scenario.schema import AutomatonPart, Axis, Grid, ManeuversPart, NamedTrim
+from maneuver_automaton.scenario.schema import (
+    AutomatonPart,
+    Axis,
+    GridPart,
+    ManeuversPart,
+    NamedTrim,
+)
 from maneuver_automaton.scenario.vehicles import described, is_known
 
 MAX_GRID_TRIMS = 100_000
@@ -38,13 +45,7 @@ WHERE: Where = ("automaton",)
 def automaton_of(
     document: Document, part: AutomatonPart, model: Model, *, folder: Path
 ) -> Automaton:
-    """The automaton that a file asks for; the paths in it are relative to `folder`.
-
-    Raises
-    ------
-    InvalidScenario
-        If what it asks for is none of this vehicle.
-    """
+    """The automaton that a file asks for; the paths in it are relative to `folder`."""
     if part.maneuvers is not None and not has_limited_rates(model):
         raise document.error(
             (*WHERE, "maneuvers"),
@@ -58,22 +59,35 @@ def automaton_of(
             if part.preset in stock_libraries():
                 return _fitting(load_stock_library(part.preset), model)
             return preset_automaton(part.preset, model)
-    if not model.reduced_names:
-        if part.trims is not None:
-            return _listed(document, part.trims, model)
-        assert part.grid is not None
-        return _grid_of_controls(document, part.grid, model)
     if part.trims is not None:
-        trims = tuple(_steady(document, k, one, model) for k, one in enumerate(part.trims))
         _check_names(document, part.trims)
-        return _with_maneuvers(document, model, trims, part.maneuvers)
+        if not model.reduced_names:
+            return _of_controls(document, part.trims, model)
+        trims = tuple(_steady(document, k, one, model) for k, one in enumerate(part.trims))
+        if not has_limited_rates(model):
+            return Automaton(model, trims)
+        with at(document, (*WHERE, "maneuvers")):
+            joined = quickest_maneuvers(model, trims, **_joining(part.maneuvers))
+        return Automaton(model, trims, joined)
     assert part.grid is not None
-    return _grid(document, part.grid, model, part.maneuvers or ManeuversPart())
+    if model.reduced_names:
+        return _grid(document, part.grid, model, part.maneuvers)
+    return _grid_of_controls(document, part.grid, model)
 
 
-def _listed(document: Document, trims: tuple[NamedTrim, ...], model: Model) -> Automaton:
+def _joining(part: ManeuversPart | None) -> dict[str, Any]:
+    """How trims are joined, as `quickest_maneuvers` and `Automaton.of_model` take it."""
+    part = part or ManeuversPart()
+    return {
+        "pairs": part.pairs,
+        "late": part.late,
+        "strokes": part.strokes_m,
+        "turns": part.turns_rad,
+    }
+
+
+def _of_controls(document: Document, trims: tuple[NamedTrim, ...], model: Model) -> Automaton:
     """Trims of a kinematic vehicle, by their controls."""
-    _check_names(document, trims)
     controls: dict[str, Any] = {}
     for k, trim in enumerate(trims):
         where = (*WHERE, "trims", k)
@@ -119,34 +133,12 @@ def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
         reason = found.missing[0].reason
         raise document.error((*where, key), f"is no trim of the {model.name}: {reason}")
     (trim,) = found.trims
-    return Trim(
-        name=part.name,
-        body_velocity=trim.body_velocity,
-        control=trim.control,
-        reduced_state=trim.reduced_state,
-    )
+    return replace(trim, name=part.name)
 
 
-def _with_maneuvers(
-    document: Document, model: Model, trims: tuple[Trim, ...], part: ManeuversPart | None
+def _grid(
+    document: Document, grid: GridPart, model: Model, part: ManeuversPart | None
 ) -> Automaton:
-    """The trims, with the maneuvers that need no solver."""
-    if not has_limited_rates(model):
-        return Automaton(model, trims)
-    part = ManeuversPart() if part is None else part
-    with at(document, (*WHERE, "maneuvers")):
-        maneuvers = quickest_maneuvers(
-            model,
-            trims,
-            pairs=part.pairs,
-            late=part.late,
-            strokes=part.strokes_m,
-            turns=part.turns_rad,
-        )
-    return Automaton(model, trims, maneuvers)
-
-
-def _grid(document: Document, grid: Grid, model: Model, part: ManeuversPart) -> Automaton:
     """Steady trims of a vehicle with a reduced state."""
     where: Where = (*WHERE, "grid")
     if grid.control is not None:
@@ -167,16 +159,13 @@ def _grid(document: Document, grid: Grid, model: Model, part: ManeuversPart) -> 
         return Automaton.of_model(
             model,
             points,
-            pairs=part.pairs,
-            late=part.late,
-            strokes=part.strokes_m,
-            turns=part.turns_rad,
+            **_joining(part),
             max_lateral_acceleration=grid.max_lateral_acceleration_m_s2,
             leave_out=grid.leave_out,
         )
 
 
-def _grid_of_controls(document: Document, grid: Grid, model: Model) -> Automaton:
+def _grid_of_controls(document: Document, grid: GridPart, model: Model) -> Automaton:
     where: Where = (*WHERE, "grid", "control")
     for key in grid.model_fields_set - {"control"}:
         raise document.error(

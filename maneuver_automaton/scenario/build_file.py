@@ -24,6 +24,7 @@ from maneuver_automaton.automaton.building import (
     neighbour_pairs,
 )
 from maneuver_automaton.automaton.library import save_library
+from maneuver_automaton.design import DesignedLibrary, design_library
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
 from maneuver_automaton.models import Model
@@ -32,23 +33,25 @@ from maneuver_automaton.primitives.bang_bang import has_limited_rates
 from maneuver_automaton.primitives.equilibrium import MissingTrim, trims_of
 from maneuver_automaton.primitives.trim import Trim
 from maneuver_automaton.scenario.automata import MAX_STEADY_TRIMS
-from maneuver_automaton.scenario.checks import (
+from maneuver_automaton.scenario.parts import (
     Count,
+    FilePart,
     Name,
     Need,
     NotNegative,
     Number,
-    Part,
     Positive,
     Several,
     Text,
+    at,
+    checked,
+    made,
     need,
+    optional,
 )
-from maneuver_automaton.scenario.design_part import DesignPart
-from maneuver_automaton.scenario.places import at
-from maneuver_automaton.scenario.reading import checked
-from maneuver_automaton.scenario.vehicle_parts import VehiclePart
-from maneuver_automaton.scenario.vehicles import model_of
+from maneuver_automaton.scenario.scenario import cost_of
+from maneuver_automaton.scenario.schema import CostPart
+from maneuver_automaton.scenario.vehicles import VehiclePart, model_of
 
 BUILD_KEY = "library"  # what only a build file has
 PAIRS = "all, neighbours, or a whole number of the nearest trims"
@@ -79,10 +82,10 @@ Grid = Annotated[
     dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1), _Once]],
     BeforeValidator(_grid),
 ]
-Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0), _Once]
+Numbers = Annotated[tuple[Number, ...], Several("a list of numbers"), _Once]
 
 
-class ManeuversPart(Part):
+class JoiningPart(FilePart):
     """How trims are joined: at once where rates are limited, else by optimal control."""
 
     pairs: Annotated[
@@ -101,28 +104,52 @@ class ManeuversPart(Part):
     max_duration_s: Annotated[float, Strict(), AllowInfNan(False), Ge(0.1)] = Field(
         60.0, description="optimal control: longest maneuver"
     )
-    keep_sign: Annotated[tuple[Name, ...], Several("a list of controls", at_least=0)] = Field(
+    keep_sign: Annotated[tuple[Name, ...], Several("a list of controls")] = Field(
         (), description="optimal control: controls that stay on one side of zero"
     )
 
 
-class LibraryFile(Part):
+Factor = Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a factor of at least 1")]
+_THREE = Several("a pose [x, y, heading], three numbers", at_least=3, at_most=3)
+_TaskPose = Annotated[tuple[Number, Number, Number], _THREE]
+_TWO = Several("a task [start, goal], two poses", at_least=2, at_most=2)
+_Task = Annotated[tuple[_TaskPose, _TaskPose], _TWO]
+
+
+class DesignPart(FilePart):
+    """How the trims of a library are chosen from the candidates; see `design_library`."""
+
+    cost: CostPart = Field(
+        default_factory=lambda: CostPart(length=1.0), description="as in a scenario; its length"
+    )
+    within: Factor = Field(1.05, description="how much costlier words may be than all candidates'")
+    most: Count = Field(24, description="trims that the library may have")
+    max_trims: Count | None = optional("of a word, at least 3; left out: any number")
+    radius_m: Positive | None = optional("of the disc of goals; with max_trims")
+    tasks: (
+        Annotated[tuple[_Task, ...], Several("a list of tasks [start, goal]", at_least=1)] | None
+    ) = optional("starts and goals that are to be among them")
+    least_m: Positive | None = optional("goals whose shortest path is shorter do not count")
+    tolerance: Positive = Field(0.01, description="between what is proven and what is met")
+
+
+class LibraryFile(FilePart):
     """A library to be built: vehicle, trims, maneuvers."""
 
     one_of: ClassVar = ("vehicle", "model")
 
     schema_version: Literal[1] = Field(alias="schema", description="1")
     library: Text = Field(description="what the library is called")
-    vehicle: VehiclePart | None = Field(None, description="as in a scenario: {model, ...}")
-    model: Mapped | None = Field(None, description="as in a library file: {kind, ...}, SI units")
+    vehicle: VehiclePart | None = optional("as in a scenario: {model, ...}")
+    model: Mapped | None = optional("as in a library file: {kind, ...}, SI units")
     trims: Grid = Field(description="a grid of trims, a mapping of names to lists of values")
-    max_lateral_acceleration_m_s2: Positive | None = Field(
-        None, description="what the tyres hold; left out: no limit"
+    max_lateral_acceleration_m_s2: Positive | None = optional(
+        "what the tyres hold; left out: no limit"
     )
-    maneuvers: ManeuversPart = Field(
-        default_factory=lambda: ManeuversPart(), description="how trims are joined"
+    maneuvers: JoiningPart = Field(
+        default_factory=lambda: JoiningPart(), description="how trims are joined"
     )
-    design: DesignPart | None = Field(None, description="how trims are chosen by automaton design")
+    design: DesignPart | None = optional("how trims are chosen by automaton design")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -135,7 +162,7 @@ class BuildFile:
     max_lateral_acceleration: float | None  # [m/s^2]
     trims: tuple[Trim, ...]
     missing: tuple[MissingTrim, ...]
-    maneuvers: ManeuversPart
+    maneuvers: JoiningPart
     design: DesignPart | None = None
 
     __repr__ = brief
@@ -201,7 +228,12 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     """
     document = parse(text, name=name, what="a build file")
     file = checked(document, LibraryFile)
-    model = _model(document, file)
+    if file.vehicle is not None:
+        with at(document, ("vehicle",)):
+            model = model_of(file.vehicle)
+    else:
+        with at(document, ("model",)):
+            model = model_of_entry(file.model, own=None)
     count = math.prod(len(values) for values in file.trims.values())
     if count > MAX_STEADY_TRIMS:
         raise document.error(("trims",), f"got {count:g} trims, need at most {MAX_STEADY_TRIMS}")
@@ -226,14 +258,6 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
     return asked
 
 
-def _model(document: Document, file: LibraryFile) -> Model:
-    if file.vehicle is not None:
-        with at(document, ("vehicle",)):
-            return model_of(file.vehicle)
-    with at(document, ("model",)):
-        return model_of_entry(file.model, own=None)
-
-
 def build(
     asked: BuildFile,
     path: Path,
@@ -253,14 +277,24 @@ def build(
     """
     part = asked.maneuvers
     if asked.at_once or not asked.model.reduced_names:
-        automaton = _made_at_once(asked)
+        automaton = Automaton.of_model(
+            asked.model,
+            asked.grid,
+            pairs="neighbours" if part.pairs == "neighbours" else "all",
+            late=part.late,
+            strokes=part.strokes_m,
+            turns=part.turns_rad,
+            max_lateral_acceleration=asked.max_lateral_acceleration,
+            leave_out=True,
+        )
+        automaton = replace(automaton, name=asked.name)
         save_library(automaton, path)
         return Built(automaton=automaton, failures=(), build=None)
     done = build_library(
         asked.model,
         asked.trims,
         pairs=asked.pairs(),
-        objective=ManeuverObjective(time=part.time, effort=part.effort, smoothness=part.smoothness),
+        objective=made(ManeuverObjective, part),
         settings=TransferSettings(
             intervals=part.intervals, steps=part.steps, duration=(0.02, part.max_duration_s)
         ),
@@ -272,21 +306,6 @@ def build(
         progress=progress,
     )
     return Built(automaton=done.automaton, failures=done.failures, build=done)
-
-
-def _made_at_once(asked: BuildFile) -> Automaton:
-    part = asked.maneuvers
-    made = Automaton.of_model(
-        asked.model,
-        asked.grid,
-        pairs="neighbours" if part.pairs == "neighbours" else "all",
-        late=part.late,
-        strokes=part.strokes_m,
-        turns=part.turns_rad,
-        max_lateral_acceleration=asked.max_lateral_acceleration,
-        leave_out=True,
-    )
-    return replace(made, name=asked.name)
 
 
 def _check_maneuvers(document: Document, asked: BuildFile) -> None:
@@ -301,7 +320,7 @@ def _check_maneuvers(document: Document, asked: BuildFile) -> None:
                     f"of effort, not for this {asked.model.name}",
                 )
         with at(document, ("maneuvers",)):
-            ManeuverObjective(time=part.time, effort=part.effort, smoothness=part.smoothness)
+            made(ManeuverObjective, part)
     for control in part.keep_sign:
         if control not in asked.model.control_names:
             raise document.error(
@@ -309,3 +328,58 @@ def _check_maneuvers(document: Document, asked: BuildFile) -> None:
                 f"the {asked.model.name} has no control {control!r}, need some of "
                 f"{', '.join(asked.model.control_names)}",
             )
+
+
+def design_of_file(
+    path: Path | str, *, instead: Mapping[str, float] | None = None
+) -> DesignedLibrary:
+    """The library that a design file asks for: a build file with the key `design`.
+
+    Values of `within`, `most`, `max_trims` and `radius_m` in `instead` hold instead of those
+    stated.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read or used: one line with file, line, field, the value met, and
+        what would be right.
+    """
+    return design_of_text(read_text(Path(path)), name=str(path), instead=instead)
+
+
+def design_of_text(
+    text: str, *, name: str, instead: Mapping[str, float] | None = None
+) -> DesignedLibrary:
+    """The library that the text of a design file asks for; see `design_of_file`.
+
+    Examples
+    --------
+    >>> designed = design_of_text(
+    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, "
+    ...     "trims: {speed: [-1, 1], turn_rate: [-1, -0.5, 0, 0.5, 1]}, design: {within: 1.2}}",
+    ...     name="robots.yaml")
+    >>> len(designed.automaton), designed.factor
+    (6, 1.0)
+    """
+    asked = build_file_of_text(text, name=name)
+    document = parse(text, name=name, what="a design file")
+    if asked.design is None:
+        raise document.error(
+            (), "misses the key design: how the trims are chosen, such as {within: 1.05}"
+        )
+    part = asked.design.model_copy(update=dict(instead or {}))
+    with at(document, ("trims",)):
+        candidates = Automaton(asked.model, asked.trims, name=asked.name)
+    cost = cost_of(document, part.cost, candidates, within=("design",))
+    with at(document, ("design",)):
+        return design_library(
+            candidates,
+            cost=cost,
+            within=part.within,
+            most=part.most,
+            max_trims=part.max_trims,
+            radius=part.radius_m,
+            tasks=part.tasks,
+            least=part.least_m,
+            tolerance=part.tolerance,
+        )

@@ -19,11 +19,10 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import Shape
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.statement import StatedVehicle, Statement
-from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.scenario.scenario import Scenario, scenario_of_text
 
 STATE_TOLERANCE = 1e-9  # between a reduced state that a file states and a trim's, in its units
@@ -64,16 +63,13 @@ cost: {time: 1.0}
 
 
 def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Scenario:
-    """The problem that a file `path` states, completed by the scenario `beside` it.
-
-    Raises
-    ------
-    InvalidScenario
-        If something is missing still, or the scenario's trims are not for the file's vehicle.
-    """
+    """The problem that a file `path` states, completed by the scenario `beside` it."""
     rest = own_scenario(statement, path) if beside is None else beside
     problem = rest.problem
-    start_trim, goals = problem.start_trim, _goals(statement, problem)
+    start_trim, goals = problem.start_trim, problem.goals
+    if statement.goal is not None:
+        free = goals[0].free_heading and not statement.headings
+        goals = (replace(goals[0], pose=statement.goal, free_heading=free),)
     if (vehicle := statement.vehicle) is not None:
         automaton = _automaton_of(vehicle, rest, path)
         if not automaton.is_kinematic:
@@ -94,9 +90,13 @@ def combined(statement: Statement, beside: Scenario | None, *, path: Path) -> Sc
             problem,
             start=problem.start if statement.start is None else statement.start,
             goals=goals,
-            bounds=_bounds(statement.bounds, problem.bounds),
+            bounds=Bounds(
+                x=statement.bounds.x or problem.bounds.x,
+                y=statement.bounds.y or problem.bounds.y,
+                z=statement.bounds.z or problem.bounds.z,
+            ),
             obstacles=statement.obstacles,
-            footprint=_footprint(statement, problem),
+            footprint=problem.footprint if statement.footprint is None else statement.footprint,
         ),
         maps=statement.maps,
         path=path,
@@ -118,22 +118,6 @@ def own_scenario(statement: Statement, path: Path) -> Scenario:
     raise InvalidScenario(
         f"{path}: states no {missing} ({statement.format}); need --with and a scenario that does"
     )
-
-
-def _goals(statement: Statement, rest: Problem) -> tuple[Goal, ...]:
-    if statement.goal is None:
-        return rest.goals
-    like = rest.goals[0]
-    free = like.free_heading and not statement.headings
-    return (replace(like, pose=statement.goal, free_heading=free),)
-
-
-def _bounds(stated: Bounds, rest: Bounds) -> Bounds:
-    return Bounds(x=stated.x or rest.x, y=stated.y or rest.y, z=stated.z or rest.z)
-
-
-def _footprint(statement: Statement, rest: Problem) -> tuple[Shape, ...]:
-    return rest.footprint if statement.footprint is None else statement.footprint
 
 
 def _trim_at(automaton: Automaton, state: Array | None, *, path: Path) -> str | None:

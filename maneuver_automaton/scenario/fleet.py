@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
@@ -16,9 +16,8 @@ from maneuver_automaton.formats.statement import MapFile, Statement
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.scenario.checks import Part
+from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.scenario.combining import combined, own_scenario
-from maneuver_automaton.scenario.disturbances import check_disturbance, disturbances_of
 from maneuver_automaton.scenario.fleet_schema import (
     OWN,
     SHARED,
@@ -28,16 +27,18 @@ from maneuver_automaton.scenario.fleet_schema import (
     VehicleEntry,
     VehicleLoopPart,
 )
-from maneuver_automaton.scenario.places import at
-from maneuver_automaton.scenario.reading import check_schema, checked
-from maneuver_automaton.scenario.scenario import Made, Scenario, scenario_of_document
+from maneuver_automaton.scenario.parts import FilePart, at, checked
+from maneuver_automaton.scenario.scenario import (
+    Made,
+    Scenario,
+    check_schema,
+    disturbance_of,
+    scenario_of_document,
+)
 from maneuver_automaton.scenario.schema import ScenarioFile
 
-if TYPE_CHECKING:
-    from maneuver_automaton.receding_horizon import Disturbance
-
 LOOP = "receding_horizon"
-Kind = TypeVar("Kind", bound=Part)
+Kind = TypeVar("Kind", bound=FilePart)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -82,7 +83,15 @@ class FleetScenario:
 
         The seed of the top is that of the loop: each vehicle has numbers of its own.
         """
-        return disturbances_of(self.fleet.names, self.receding_horizon, self.loops)
+        top = self.receding_horizon and self.receding_horizon.disturbance
+        found = {}
+        for name in self.fleet.names:
+            its = self.loops[name].disturbance if name in self.loops else None
+            if its is not None:
+                found[name] = disturbance_of(its)
+            elif top:
+                found[name] = disturbance_of(top, seed=0)
+        return found
 
 
 def states_several(document: Document) -> bool:
@@ -94,27 +103,20 @@ def states_several(document: Document) -> bool:
 def fleet_of_document(
     document: Document, *, path: Path | None, begin: float, own: Model | None = None
 ) -> FleetScenario:
-    """The scenario of a YAML file of several vehicles that was read since `begin` [s].
-
-    Raises
-    ------
-    InvalidScenario
-        If it cannot be used: one line with file, line, field, the value met, and what would be
-        right.
-    """
+    """The scenario of a YAML file of several vehicles that was read since `begin` [s]."""
     check_schema(document)
     for key in ("start", "goal"):
         if key in document.value:
             raise document.error((key,), "stands beside vehicles, need it in each of them instead")
-    file = checked(document, FleetFile, own=own, several=True)
-    made: Made = {}
+    file = checked(document, FleetFile, {"one_is": own and own.name})
+    shared: Made = {}
     alone = [
         scenario_of_document(
             _entry(document, k, one),
             path=path,
             begin=begin,
             own=_if_named(own, one, file),
-            made=made,
+            shared=shared,
         )
         for k, one in enumerate(file.vehicles)
     ]
@@ -162,13 +164,7 @@ def fleet_of_statement(
     settings: FleetPart | None = None,
     loop: FleetLoopPart | None = None,
 ) -> FleetScenario:
-    """The fleet that a file `path` of another format states, with the scenario `beside` it.
-
-    Raises
-    ------
-    InvalidScenario
-        If something is missing still, or a vehicle has a fixed time.
-    """
+    """The fleet that a file `path` of another format states, with the scenario `beside` it."""
     settings = settings or FleetPart()
     kinds: dict[int, tuple[Scenario, Automaton]] = {}  # by the vehicle that the file names
     alone = []
@@ -202,13 +198,7 @@ def fleet_of_statement(
 
 
 def without_fleet(document: Document) -> tuple[Document, FleetPart, FleetLoopPart | None]:
-    """A scenario beside a fleet, and what it says of how to plan one and to close its loop.
-
-    Raises
-    ------
-    InvalidScenario
-        If one of these parts cannot be used.
-    """
+    """A scenario beside a fleet, and what it says of how to plan one and to close its loop."""
     whole = document.value
     if not isinstance(whole, dict):
         return document, FleetPart(), None
@@ -226,6 +216,9 @@ def without_fleet(document: Document) -> tuple[Document, FleetPart, FleetLoopPar
 
 def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> None:
     """Raise where the loop of a file does not suit its vehicles."""
+    from maneuver_automaton.receding_horizon.disturbance import checked as matched
+    from maneuver_automaton.receding_horizon.settings import switches_at_will
+
     loop = file.receding_horizon
     for k, one in enumerate(file.vehicles):
         if one.receding_horizon is not None and loop is None:
@@ -255,7 +248,12 @@ def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> Non
             where: Where = (LOOP, "disturbance")
             where = where if own is None else ("vehicles", k, *where)
             with at(document, where):
-                check_disturbance(noise, problem)
+                matched(disturbance_of(noise), problem.start.size)
+                if noise.twist_scale is not None and not switches_at_will(problem):
+                    raise ValueError(
+                        f"twist_scale: got {list(noise.twist_scale)}, need no such key for a "
+                        "vehicle with inertia: a maneuver is driven as its model says"
+                    )
 
 
 def _maps(alone: Sequence[Scenario]) -> tuple[MapFile, ...]:

@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-from annotated_types import Ge
 from pydantic import Field, Strict
 
-from maneuver_automaton.scenario.checks import (
+from maneuver_automaton.scenario.parts import (
     Count,
+    FilePart,
     Name,
     Need,
     NotNegative,
     Number,
-    Part,
     Positive,
     Several,
     Text,
+    Whole,
+    optional,
 )
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
@@ -28,44 +29,39 @@ from maneuver_automaton.scenario.schema import (
     CostPart,
     Goals,
     HorizonPart,
-    Noise,
-    Obstacle,
+    NoisePart,
+    Obstacles,
     SearchPart,
-    Seed,
-    Start,
-    ZonePart,
+    StartPart,
+    Zones,
 )
-from maneuver_automaton.scenario.vehicle_parts import VehiclePart
+from maneuver_automaton.scenario.vehicles import VehiclePart
 
 AT_TOP = "left out: that of the top"
-Obstacles = Annotated[tuple[Obstacle, ...], Several("a list of obstacles", at_least=0)]
-Zones = Annotated[tuple[ZonePart, ...], Several("a list of zones", at_least=0)]
 
 
-class FleetPart(Part):
+class FleetPart(FilePart):
     """How several vehicles are planned."""
 
     objective: Annotated[Literal["sum", "last"], Need("sum or last")] = Field(
         "sum", description="sum of the costs, or the last arrival"
     )
-    between_m: NotNegative | None = Field(
-        None, description="distance of any two; left out: the greatest margin_m"
-    )
+    between_m: NotNegative | None = optional("distance of any two; left out: the greatest margin_m")
     orders: Count = Field(8, description="orders of the vehicles that are tried")
     time_limit_s: Positive = Field(10.0, description="upper bound for planning them all")
 
 
-class FleetNoise(Noise):
+class FleetNoisePart(NoisePart, title="FleetNoise"):
     """What vehicles of a fleet do beside their plans; random numbers come from the seed."""
 
     instead: ClassVar = {
         "delay_steps": "no such key: answers of a fleet are late by delay_steps of receding_horizon"
     }
 
-    seed: Seed = Field(0, description="seed of the random numbers")
+    seed: Whole = Field(0, description="seed of the random numbers")
 
 
-class FleetLoopPart(Part):
+class FleetLoopPart(FilePart):
     """Closed loop of several vehicles, for mpc."""
 
     instead: ClassVar = {
@@ -74,80 +70,78 @@ class FleetLoopPart(Part):
     }
 
     step_s: Positive = Field(description="time between two steps")
-    steps: Count | None = Field(None, description="largest number of steps; left out: 100")
+    steps: Count | None = optional("largest number of steps; left out: 100")
     time_limit_s: Positive = Field(1.0, description="upper bound for all searches of a step")
     margin: NotNegative = Field(0.0, description="another plan must cost less by more than this")
-    tube_m: NotNegative | None = Field(
-        None, description="how far a body may be beside its plan; left out: half of between_m"
+    tube_m: NotNegative | None = optional(
+        "how far a body may be beside its plan; left out: half of between_m"
     )
-    swaps_per_step: Count | None = Field(
-        None, description="vehicles that look for another plan in a step; left out: all"
+    swaps_per_step: Count | None = optional(
+        "vehicles that look for another plan in a step; left out: all"
     )
     group_size: Count = Field(1, description="so many exchange their plans at once, at most")
-    delay_steps: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
-        0, description="how many steps late an answer comes"
-    )
-    disturbance: FleetNoise | None = Field(
-        None, description="of every vehicle that states none: {position_m, heading_rad, seed, ...}"
+    delay_steps: Whole = Field(0, description="how many steps late an answer comes")
+    disturbance: FleetNoisePart | None = optional(
+        "of every vehicle that states none: {position_m, heading_rad, seed, ...}"
     )
 
 
-class VehicleLoopPart(Part):
+class VehicleLoopPart(FilePart):
     """What happens to one of several vehicles in closed loop, for mpc."""
 
-    joins_s: Number | None = Field(
-        None, description="when it appears at its start, and joins as soon as there is room"
+    joins_s: Number | None = optional(
+        "when it appears at its start, and joins as soon as there is room"
     )
-    breaks_s: Number | None = Field(
-        None, description="when it breaks down: it stops as soon as it can, and stays there"
+    breaks_s: Number | None = optional(
+        "when it breaks down: it stops as soon as it can, and stays there"
     )
-    disturbance: FleetNoise | None = Field(None, description=AT_TOP)
+    disturbance: FleetNoisePart | None = optional(AT_TOP)
 
 
-class VehicleEntry(Part):
+class VehicleEntry(FilePart):
     """One of several vehicles: what it has of its own, and what differs from the top."""
 
-    name: Name | None = Field(None, description="a name of its own; left out: its number, from 1")
+    name: Name | None = optional("a name of its own; left out: its number, from 1")
     priority: Number = Field(0.0, description="the greater, the sooner it is planned")
     leaves: Annotated[bool, Strict(), Need("true or false")] = Field(
         False, description="true: it is gone once it has arrived"
     )
-    start_time_s: Number | None = Field(None, description="time at the start; until then it waits")
-    vehicle: VehiclePart | None = Field(None, description=AT_TOP)
-    automaton: AutomatonPart | None = Field(None, description=AT_TOP)
-    start: Start = Field(description="a mapping {pose, ...}")
+    start_time_s: Number | None = optional("time at the start; until then it waits")
+    vehicle: VehiclePart | None = optional(AT_TOP)
+    automaton: AutomatonPart | None = optional(AT_TOP)
+    start: StartPart = Field(description="a mapping {pose, ...}")
     goal: Goals = Field(description="a mapping {pose, ...}, or a list of these")
-    cost: CostPart | None = Field(None, description=AT_TOP)
-    horizon: HorizonPart | None = Field(None, description=AT_TOP)
-    bounds_m: BoundsPart | None = Field(None, description=AT_TOP)
-    margin_m: NotNegative | None = Field(None, description=AT_TOP)
-    obstacles: Obstacles | None = Field(None, description=AT_TOP)
-    zones: Zones | None = Field(None, description=AT_TOP)
-    search: SearchPart | None = Field(None, description=AT_TOP)
-    receding_horizon: VehicleLoopPart | None = Field(
-        None, description="only for mpc: {joins_s, breaks_s, disturbance}"
+    cost: CostPart | None = optional(AT_TOP)
+    horizon: HorizonPart | None = optional(AT_TOP)
+    bounds_m: BoundsPart | None = optional(AT_TOP)
+    margin_m: NotNegative | None = optional(AT_TOP)
+    obstacles: Obstacles | None = optional(AT_TOP)
+    zones: Zones | None = optional(AT_TOP)
+    search: SearchPart | None = optional(AT_TOP)
+    receding_horizon: VehicleLoopPart | None = optional(
+        "only for mpc: {joins_s, breaks_s, disturbance}"
     )
 
 
-class FleetFile(Part):
+class FleetFile(FilePart):
     """Several vehicles that keep apart."""
 
     schema_version: Literal[1] = Field(alias="schema", description="1")
-    name: Text | None = Field(None, description="what the situation is called")
-    vehicle: VehiclePart | None = Field(None, description="of all that name none")
-    automaton: AutomatonPart | None = Field(None, description="of all that name none")
-    cost: CostPart | None = Field(None, description="left out: {time: 1}")
-    horizon: HorizonPart | None = Field(None, description="left out: any number of trims")
-    bounds_m: BoundsPart | None = Field(None, description="left out: none")
+    name: Text | None = optional("what the situation is called")
+    vehicle: VehiclePart | None = optional("of all that name none")
+    automaton: AutomatonPart | None = optional("of all that name none")
+    cost: CostPart | None = optional("left out: {time: 1}")
+    horizon: HorizonPart | None = optional("left out: any number of trims")
+    bounds_m: BoundsPart | None = optional("left out: none")
     margin_m: NotNegative = Field(0.0, description="distance kept from everything")
     obstacles: Obstacles = Field((), description="what no vehicle must touch")
     zones: Zones = Field((), description="where not every motion is admitted")
-    search: SearchPart | None = Field(None, description="how to search")
+    search: SearchPart | None = optional("how to search")
     vehicles: Annotated[
         tuple[VehicleEntry, ...], Several("a list of at least one vehicle", at_least=1)
     ] = Field(description="a list of {name, start, goal, ...}")
     fleet: FleetPart = Field(default_factory=FleetPart, description="how they are planned")
-    receding_horizon: FleetLoopPart | None = Field(None, description="only for mpc")
+    receding_horizon: FleetLoopPart | None = optional("only for mpc")
 
 
 SHARED = ("name", "vehicles", "fleet", "receding_horizon")  # keys of the top that no entry has

@@ -153,17 +153,14 @@ def _road_vehicle(beside: Path) -> RoadVehicle:
         raise InvalidScenario(
             f"--with: {beside}: vehicle: got the model {model.name}, need second_order_car on roads"
         )
-    if len(footprint) != 1 or not isinstance(footprint[0], Box) or not _is_along(footprint[0]):
+    body = footprint[0] if len(footprint) == 1 else None
+    if not isinstance(body, Box) or body.heading != 0.0 or float(body.center[1]) != 0.0:
         raise InvalidScenario(
             f"--with: {beside}: vehicle: footprint: need one rectangle along the axis of the car"
         )
-    length, width = footprint[0].size.tolist()
-    ahead = float(footprint[0].center[0])
+    length, width = body.size.tolist()
+    ahead = float(body.center[0])
     return RoadVehicle(model=model, length=length, width=width, ahead=ahead)
-
-
-def _is_along(body: Box) -> bool:
-    return body.heading == 0.0 and float(body.center[1]) == 0.0
 
 
 def statements_of(path: Path) -> tuple[Statement, ...] | None:

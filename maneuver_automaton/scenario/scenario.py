@@ -7,26 +7,25 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple, TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import AnyObstacle, Shape
+from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.statement import MapFile
-from maneuver_automaton.formats.yaml_source import Document, Where, parse
+from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Model
-from maneuver_automaton.problem import UNSTATED, Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.models.kinds import KINDS
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
-from maneuver_automaton.scenario.places import at
-from maneuver_automaton.scenario.prices import cost_of
-from maneuver_automaton.scenario.reading import values_of
+from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
-    GoalPart,
-    HorizonPart,
+    CostPart,
+    NoisePart,
     RecedingHorizonPart,
     ScenarioFile,
-    SearchPart,
 )
 from maneuver_automaton.scenario.shapes import (
     footprint_of,
@@ -37,7 +36,14 @@ from maneuver_automaton.scenario.shapes import (
 from maneuver_automaton.scenario.vehicles import carried_of, model_of
 
 T = TypeVar("T")
-Footprint = tuple[Mapping[str, Any], ...]  # shapes, each {rectangle_m, reference_m} and so on
+Made: TypeAlias = dict[tuple[object, ...], Any]  # of parts of a file, which several vehicles share
+OTHER_KINDS: Mapping[str, set[str]] = {  # of files, and what only they have
+    "a library of trims": {"format", "trims"},
+    "a plan": {"status", "primitives"},
+    "a closed loop": {"status", "step_s", "steps"},
+    "plans of a fleet": {"status", "kind", "vehicles"},
+    "a build file": {"library", "trims"},
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -61,7 +67,7 @@ class Scenario:
         return (self.problem,)
 
     @property
-    def footprint(self) -> Footprint:
+    def footprint(self) -> tuple[Mapping[str, Any], ...]:
         """The body of the vehicle in the words of a scenario file, for pictures."""
         return stated_footprint(self.problem.footprint)
 
@@ -91,8 +97,19 @@ def scenario_of_text(text: str, *, name: str) -> Scenario:
     return scenario_of_document(parse(text, name=name), path=None, begin=begin)
 
 
-Made: TypeAlias = dict[tuple[object, ...], Any]
-"""What was made of parts of a file: several vehicles of one file share it."""
+def check_schema(document: Document) -> None:
+    """A file of another kind or schema is told before its keys are; raises InvalidScenario."""
+    if not isinstance(document.value, dict):
+        return
+    for kind, keys in OTHER_KINDS.items():
+        if keys <= document.value.keys():
+            raise document.error((), f"is {kind}, need a scenario")
+    if "schema" not in document.value:
+        raise document.error((), "the key 'schema' is missing: no scenario, need schema: 1")
+    schema = document.value["schema"]
+    if schema != 1 or not isinstance(schema, int) or isinstance(schema, bool):
+        what = "need 1, the schema that this version reads"
+        raise document.error(("schema",), f"got {shown(schema)}, {what}")
 
 
 def scenario_of_document(
@@ -101,43 +118,67 @@ def scenario_of_document(
     path: Path | None,
     begin: float,
     own: Model | None = None,
-    made: Made | None = None,
+    shared: Made | None = None,
 ) -> Scenario:
     """The scenario of a YAML file that was read since `begin` [s]; its vehicle is `own` if given.
 
-    What is in `made` is taken from there, and what is made is kept in it.
+    What is in `shared` is taken from there, and what is made is kept in it.
 
     Raises
     ------
     InvalidScenario
         As `scenario_of_text`.
     """
-    file = values_of(document, own=own)
+    check_schema(document)
+    file = checked(document, ScenarioFile, _names_of(document.value, own))
     if file.search.method == "words":
         _refuse_long_words(document, file)
     folder = path.parent if path else Path()
-    once = _Once(document.value, {} if made is None else made)
-    model, bodies = once.of(("vehicle",), lambda: _vehicle(document, file, own))
-    obstacles, maps = once.of(
-        ("obstacles",), lambda: obstacles_of(document, file.obstacles, folder)
-    )
+    kept: Made = {} if shared is None else shared
+
+    def once(keys: tuple[str, ...], make: Callable[[], T]) -> T:
+        """What `make` returns of the parts at some keys; the same, of the same parts."""
+        key = (*keys, *(id(document.value.get(key)) for key in keys))
+        if key not in kept:
+            kept[key] = make()
+        found: T = kept[key]
+        return found
+
+    model, bodies = once(("vehicle",), lambda: _vehicle(document, file, own))
+    obstacles, maps = once(("obstacles",), lambda: obstacles_of(document, file.obstacles, folder))
     read = time.perf_counter()
-    automaton = once.of(
+    automaton = once(
         ("vehicle", "automaton"),
         lambda: automaton_of(document, file.automaton, model, folder=folder),
     )
     built = time.perf_counter()
+    _check_ends(document, file, automaton)
+    cost = once(("vehicle", "automaton", "cost"), lambda: cost_of(document, file.cost, automaton))
+    fastest = max(math.hypot(*trim.body_velocity[:2]) for trim in automaton.trims)
+    zones = once(
+        ("vehicle", "automaton", "zones"),
+        lambda: zones_of(document, file.zones, folder, fastest=fastest),
+    )
+    horizon = _horizon(document, file)
+    with at(document, ()):
+        problem = Problem(
+            automaton,
+            file.start.pose,
+            tuple(made(Goal, one, free_heading=one.heading == "free") for one in file.goals),
+            cost=cost,
+            horizon=horizon,
+            start_trim=file.start.trim,
+            start_time=file.start.time_s,
+            bounds=made(Bounds, file.bounds_m),
+            search=made(SearchSettings, file.search),
+            obstacles=obstacles,
+            margin=file.margin_m,
+            zones=zones,
+            **bodies,
+        )
     return Scenario(
         name=(path.stem if path else document.name) if file.name is None else file.name,
-        problem=_problem(
-            document,
-            file,
-            automaton,
-            bodies=bodies,
-            obstacles=obstacles,
-            folder=folder,
-            once=once,
-        ),
+        problem=problem,
         time_limit_s=file.search.time_limit_s,
         receding_horizon=file.receding_horizon,
         maps=maps,
@@ -147,49 +188,41 @@ def scenario_of_document(
     )
 
 
-class _Once(NamedTuple):
-    """What is made of a document, once of the same parts."""
-
-    value: Mapping[str, Any]  # of the document
-    made: Made
-
-    def of(self, keys: tuple[str, ...], make: Callable[[], T]) -> T:
-        """What `make` returns, of the parts at some keys of the document."""
-        key = (*keys, *(id(self.value.get(key)) for key in keys))
-        if key not in self.made:
-            self.made[key] = make()
-        found: T = self.made[key]
-        return found
-
-
-def _vehicle(document: Document, file: ScenarioFile, own: Model | None) -> tuple[Model, _Bodies]:
-    """The model of a file, and the bodies that it moves."""
+def _vehicle(
+    document: Document, file: ScenarioFile, own: Model | None
+) -> tuple[Model, dict[str, Any]]:
+    """The model of a file, and the bodies that it moves, as `Problem` takes them."""
     with at(document, ("vehicle",)):
         model = model_of(file.vehicle, own=own)
-    return model, _Bodies(
-        vehicle=footprint_of(document, file.vehicle.footprint, key="footprint"),
-        parts={
-            name: footprint_of(document, body, key=name)
-            for name, body in carried_of(file.vehicle).items()
-        },
-        height=getattr(file.vehicle, "footprint_height_m", None) or (0.0, 0.0),
-    )
+    carried = {
+        name: footprint_of(document, body, key=name)
+        for name, body in carried_of(file.vehicle).items()
+    }
+    return model, {
+        "footprint": footprint_of(document, file.vehicle.footprint, key="footprint"),
+        "parts": carried,
+        "body_height": file.vehicle.footprint_height_m or (0.0, 0.0),
+    }
 
 
-class _Bodies(NamedTuple):
-    """The bodies of a vehicle and its parts, which must stay collision-free."""
-
-    vehicle: tuple[Shape, ...]
-    parts: Mapping[str, tuple[Shape, ...]]  # what it carries, by name
-    height: tuple[float, float]  # [m] lowest and highest point about the altitude of the pose
+def _names_of(value: Any, own: Model | None) -> dict[str, Any]:
+    """How many numbers a control and a state have, and what they are called."""
+    kind: Any = own
+    if own is None:
+        vehicle = value.get("vehicle") if isinstance(value, dict) else None
+        model = vehicle.get("model") if isinstance(vehicle, dict) else None
+        kind = KINDS.get(model) if isinstance(model, str) else None
+    names = {} if own is None else {"own": own.name}
+    if kind is None:
+        return names
+    return {**names, "control_names": kind.control_names, "state_names": kind.reduced_names}
 
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
     """Exhaustive search is for short words."""
     from maneuver_automaton.search.word_scan import MOST_TRIMS
 
-    goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
-    most = MOST_TRIMS - any(goal.heading == "free" for goal in goals)
+    most = MOST_TRIMS - any(goal.heading == "free" for goal in file.goals)
     if file.horizon.max_trims is not None and file.horizon.max_trims > most:
         free = " where a heading is free" if most < MOST_TRIMS else ""
         raise document.error(
@@ -199,63 +232,22 @@ def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
         )
 
 
-def _problem(
-    document: Document,
-    file: ScenarioFile,
-    automaton: Automaton,
-    *,
-    bodies: _Bodies,
-    obstacles: tuple[AnyObstacle, ...],
-    folder: Path,
-    once: _Once,
-) -> Problem:
-    goals = file.goal if isinstance(file.goal, tuple) else (file.goal,)
-    many = isinstance(file.goal, tuple)
+def _check_ends(document: Document, file: ScenarioFile, automaton: Automaton) -> None:
+    """Raise where poses have not as many numbers as the vehicle's, or a trim is none of its own."""
     dof = automaton.model.group.dof
-    _check_pose(document, ("start", "pose"), file.start.pose, dof)
-    _check_trim(document, ("start", "trim"), file.start.trim, automaton)
-    for k, goal in enumerate(goals):
-        where: Where = ("goal", k) if many else ("goal",)
-        _check_pose(document, (*where, "pose"), goal.pose, dof)
-        _check_trim(document, (*where, "trim"), goal.trim, automaton)
+    many = isinstance(file.goal, tuple)
+    goals = {("goal", k) if many else ("goal",): goal for k, goal in enumerate(file.goals)}
+    for where, end in ({("start",): file.start} | goals).items():
+        if len(end.pose) != dof:
+            names = "[x, y, heading]" if dof == 3 else "[x, y, heading, z]"
+            said = f"got {len(end.pose)} numbers, need {dof}: {names}"
+            raise document.error((*where, "pose"), said)
+        _check_trim(document, (*where, "trim"), end.trim, automaton)
     if file.bounds_m.z is not None and dof == 3:
         raise document.error(("bounds_m", "z"), f"the {automaton.model.name} has no height")
     for k, zone in enumerate(file.zones):
         for n, name in enumerate(zone.trims or ()):
             _check_trim(document, ("zones", k, "trims", n), name, automaton)
-    cost = once.of(
-        ("vehicle", "automaton", "cost"), lambda: cost_of(document, file.cost, automaton)
-    )
-    speeds = [math.hypot(*trim.body_velocity[:2]) for trim in automaton.trims]
-    zones = once.of(
-        ("vehicle", "automaton", "zones"),
-        lambda: zones_of(document, file.zones, folder, fastest=max(speeds)),
-    )
-    horizon = _horizon(document, file.horizon)
-    with at(document, ()):
-        return Problem(
-            automaton,
-            file.start.pose,
-            tuple(_goal(goal) for goal in goals),
-            cost=cost,
-            horizon=horizon,
-            start_trim=file.start.trim,
-            start_time=file.start.time_s,
-            bounds=Bounds(x=file.bounds_m.x, y=file.bounds_m.y, z=file.bounds_m.z),
-            search=_search(file.search),
-            obstacles=obstacles,
-            footprint=bodies.vehicle,
-            parts=bodies.parts,
-            body_height=bodies.height,
-            margin=file.margin_m,
-            zones=zones,
-        )
-
-
-def _check_pose(document: Document, where: Where, pose: tuple[float, ...], dof: int) -> None:
-    if len(pose) != dof:
-        names = "[x, y, heading]" if dof == 3 else "[x, y, heading, z]"
-        raise document.error(where, f"got {len(pose)} numbers, need {dof}: {names}")
 
 
 def _check_trim(document: Document, where: Where, trim: str | None, automaton: Automaton) -> None:
@@ -264,38 +256,31 @@ def _check_trim(document: Document, where: Where, trim: str | None, automaton: A
             automaton.index_of(trim)
 
 
-def _goal(part: GoalPart) -> Goal:
-    return Goal(
-        pose=part.pose,
-        trim=part.trim,
-        free_heading=part.heading == "free",
-        tolerance_m=part.tolerance_m,
-        tolerance_rad=part.tolerance_rad,
-    )
-
-
-def _search(part: SearchPart) -> SearchSettings:
-    return SearchSettings(
-        method=part.method,
-        max_expansions=part.max_expansions,
-        cell=part.cell_m,
-        headings=part.headings,
-        weight=part.weight,
-        backwards=part.backwards,
-        show_nodes=part.show_nodes,
-        improve=part.improve,
-        polish=part.polish,
-    )
-
-
-def _horizon(document: Document, part: HorizonPart) -> Horizon:
-    fixed = part.time_s != "free"
-    wrong = "max_time_s" if part.max_time_s is not None else "stay"
-    with at(document, ("horizon", wrong) if fixed else ("horizon",)):
-        return Horizon(
-            time=None if part.time_s == "free" else part.time_s,
-            max_trims=part.max_trims,
-            min_coast=UNSTATED if part.min_coast_s is None else part.min_coast_s,
-            max_time=part.max_time_s,
-            stay=part.stay,
+def cost_of(
+    document: Document, part: CostPart, automaton: Automaton, *, within: Where = ()
+) -> Cost:
+    """The cost that a part of a document states, `within` another part of it."""
+    matrix = part.effort_matrix
+    where = (*within, "cost") if matrix is None else (*within, "cost", "effort_matrix")
+    if matrix is not None and len({len(row) for row in matrix} | {len(matrix)}) > 1:
+        rows = ", ".join(str(len(row)) for row in matrix)
+        raise document.error(
+            where, f"got {len(matrix)} rows of {rows} numbers, need a square matrix"
         )
+    with at(document, where):
+        cost = made(Cost, part, norm_order=float(part.norm_order))  # inf is a number, too
+        cost.rates(automaton.controls[:1], automaton.body_velocities[:1])
+    return cost
+
+
+def disturbance_of(part: NoisePart, *, seed: int | None = None) -> Disturbance:
+    """What a file says of disturbances, with another seed if one is given."""
+    pushes = {push.after_step: push.by for push in part.pushes}
+    return made(Disturbance, part, pushes=pushes, **({} if seed is None else {"seed": seed}))
+
+
+def _horizon(document: Document, file: ScenarioFile) -> Horizon:
+    part, time_s = file.horizon, file.horizon.time_s
+    wrong = "max_time_s" if part.max_time_s is not None else "stay"
+    with at(document, ("horizon",) if time_s == "free" else ("horizon", wrong)):
+        return made(Horizon, part, time=None if time_s == "free" else time_s)

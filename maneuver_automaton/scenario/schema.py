@@ -23,23 +23,27 @@ from pydantic import (
     field_validator,
 )
 
-from maneuver_automaton.scenario.checks import (
+from maneuver_automaton.scenario.parts import (
     Count,
+    FilePart,
     Interval,
     Name,
     Need,
     NotNegative,
     Number,
-    Part,
     Point,
     Polygon,
+    Polygons,
     Positive,
     Several,
+    Size,
     Text,
+    Whole,
     need,
     one_or_many,
+    optional,
 )
-from maneuver_automaton.scenario.vehicle_parts import VehiclePart
+from maneuver_automaton.scenario.vehicles import VehiclePart
 
 Pose = Annotated[
     tuple[Number, ...],
@@ -48,78 +52,65 @@ Pose = Annotated[
 Seconds = Annotated[Positive | Literal["free"], Need("a positive number of seconds, or free")]
 
 
-def _names(info: ValidationInfo, kind: str) -> tuple[str, ...]:
-    names: tuple[str, ...] = (info.context or {}).get(kind, ())
-    return names
-
-
-def _listed(value: Any, names: tuple[str, ...]) -> Any:
+def _listed(value: Any, info: ValidationInfo) -> Any:
+    """A list of numbers, as many as the model of the file has of them."""
+    names = (info.context or {}).get(f"{info.field_name}_names", ())
     if not isinstance(value, list) or (names and len(value) != len(names)):
         count = f"{len(names)} numbers ({', '.join(names)})" if names else "numbers"
         raise need(f"a list of {count}")
     return value
 
 
-def _controls(value: Any, info: ValidationInfo) -> Any:
-    return _listed(value, _names(info, "control_names"))
+Vector = Annotated[tuple[Number, ...], BeforeValidator(_listed)]
+Numbers = Annotated[tuple[Number, ...], Several("a list of numbers")]
 
 
-def _states(value: Any, info: ValidationInfo) -> Any:
-    return _listed(value, _names(info, "reduced_names"))
-
-
-Control = Annotated[tuple[Number, ...], BeforeValidator(_controls)]
-State = Annotated[tuple[Number, ...], BeforeValidator(_states)]
-Numbers = Annotated[tuple[Number, ...], Several("a list of numbers", at_least=0)]
-
-
-class NamedTrim(Part):
+class NamedTrim(FilePart):
     """One trim: a name, and what holds it; what is left out follows from the rest being steady."""
 
     name: Name = Field(description="a name that no other trim has")
-    control: Control | None = Field(
-        None, description="constant control; unicycle: [v, omega]; car: [v, steering]"
-    )
-    state: State | None = Field(
-        None, description="reduced state of a vehicle that has one; second_order_car: [v, steering]"
+    control: Vector | None = optional("constant control; unicycle: [v, omega]; car: [v, steering]")
+    state: Vector | None = optional(
+        "reduced state of a vehicle that has one; second_order_car: [v, steering]"
     )
 
 
-class Axis(Part):
+class Axis(FilePart):
     """Equally spaced values of one control, both ends included."""
 
     one_of: ClassVar = ("step", "count")
 
     min: Number = Field(description="smallest value")
     max: Number = Field(description="largest value")
-    step: Positive | None = Field(None, description="distance of neighbours")
-    count: Count | None = Field(None, description="number of values")
+    step: Positive | None = optional("distance of neighbours")
+    count: Count | None = optional("number of values")
 
 
-class Grid(Part):
+Axes = Annotated[tuple[Axis, ...], Several("a list with one axis per control", at_least=1)]
+
+
+class GridPart(FilePart, title="Grid"):
     """One trim for every combination of values: of controls, or of speeds and what else is steady.
 
     The axes of a kinematic vehicle are those of its control. Any other vehicle has axes by name:
     of its body velocity, its reduced state or its control; the rest is solved for.
     """
 
-    control: (
-        Annotated[tuple[Axis, ...], Several("a list with one axis per control", at_least=1)] | None
-    ) = Field(None, description="one axis {min, max, step or count} per control")
-    speed_m_s: Axis | None = Field(None, description="axis of the speed ahead")
-    lateral_speed_m_s: Axis | None = Field(None, description="axis of the speed to the left")
-    turn_rate_rad_s: Axis | None = Field(None, description="axis of the turn rate")
-    climb_m_s: Axis | None = Field(None, description="axis of the speed upwards")
-    steering_rad: Axis | None = Field(None, description="axis of the steering angle")
-    max_lateral_acceleration_m_s2: Positive | None = Field(
-        None, description="greatest speed times turn rate of a trim; left out: no limit"
+    control: Axes | None = optional("one axis {min, max, step or count} per control")
+    speed_m_s: Axis | None = optional("axis of the speed ahead")
+    lateral_speed_m_s: Axis | None = optional("axis of the speed to the left")
+    turn_rate_rad_s: Axis | None = optional("axis of the turn rate")
+    climb_m_s: Axis | None = optional("axis of the speed upwards")
+    steering_rad: Axis | None = optional("axis of the steering angle")
+    max_lateral_acceleration_m_s2: Positive | None = optional(
+        "greatest speed times turn rate of a trim; left out: no limit"
     )
     leave_out: bool = Field(
         False, description="true: points without a trim are left out, not refused"
     )
 
 
-class ManeuversPart(Part):
+class ManeuversPart(FilePart):
     """How trims of a grid are joined, where that needs no solver."""
 
     pairs: Annotated[Literal["all", "neighbours"], Need("all or neighbours")] = Field(
@@ -130,36 +121,37 @@ class ManeuversPart(Part):
     turns_rad: Numbers = Field((), description="turns on the spot, from rest to rest")
 
 
-class AutomatonPart(Part):
+NamedTrims = Annotated[tuple[NamedTrim, ...], Several("a list of at least one trim", at_least=1)]
+
+
+class AutomatonPart(FilePart):
     """The library of trims: listed, a grid, a file, or a named one."""
 
     one_of: ClassVar = ("trims", "grid", "file", "preset")
     goes_with: ClassVar = {"maneuvers": ("trims", "grid")}
 
-    trims: (
-        Annotated[tuple[NamedTrim, ...], Several("a list of at least one trim", at_least=1)] | None
-    ) = Field(None, description="trims, each {name, control or state}")
-    grid: Grid | None = Field(None, description="all combinations of values")
-    file: Name | None = Field(None, description="library file, relative to this file")
-    preset: Name | None = Field(None, description="name of a built-in library")
-    maneuvers: ManeuversPart | None = Field(None, description="how trims are joined")
+    trims: NamedTrims | None = optional("trims, each {name, control or state}")
+    grid: GridPart | None = optional("all combinations of values")
+    file: Name | None = optional("library file, relative to this file")
+    preset: Name | None = optional("name of a built-in library")
+    maneuvers: ManeuversPart | None = optional("how trims are joined")
 
 
-class Start(Part):
+class StartPart(FilePart, title="Start"):
     """Where the plan begins."""
 
     pose: Pose = Field(description="[x, y, heading]")
-    trim: Name | None = Field(None, description="the first trim")
+    trim: Name | None = optional("the first trim")
     time_s: Number = Field(0.0, description="time at the start")
 
 
-class GoalPart(Part):
+class GoalPart(FilePart):
     """Where the plan ends."""
 
     pose: Pose = Field(description="[x, y, heading]")
-    trim: Name | None = Field(None, description="the last trim")
-    heading: Annotated[Literal["free"], Need("free, or no such key")] | None = Field(
-        None, description="free: the third number of the pose does not matter"
+    trim: Name | None = optional("the last trim")
+    heading: Annotated[Literal["free"], Need("free, or no such key")] | None = optional(
+        "free: the third number of the pose does not matter"
     )
     tolerance_m: NotNegative = Field(0.0, description="distance that is near enough; 0: exact")
     tolerance_rad: NotNegative = Field(0.0, description="heading that is near enough; 0: exact")
@@ -182,25 +174,17 @@ def _norm_order(value: Any) -> Any:
     return "inf" if value == math.inf else value
 
 
-class CostPart(Part):
+Row = Annotated[tuple[Number, ...], Several("a row of the matrix, a list of numbers", at_least=1)]
+Matrix = Annotated[tuple[Row, ...], Several("a square matrix, a list of rows", at_least=1)]
+
+
+class CostPart(FilePart):
     """Weights of the stage cost, 0 unless stated."""
 
     effort: NotNegative = Field(0.0, description="c1, of the squared control per second")
     norm: NotNegative = Field(0.0, description="c2, of the norm of the control per second")
     time: NotNegative = Field(0.0, description="c3, per second")
-    effort_matrix: (
-        Annotated[
-            tuple[
-                Annotated[
-                    tuple[Number, ...],
-                    Several("a row of the matrix, a list of numbers", at_least=1),
-                ],
-                ...,
-            ],
-            Several("a square matrix, a list of rows", at_least=1),
-        ]
-        | None
-    ) = Field(None, description="R of the effort; left out: the identity")
+    effort_matrix: Matrix | None = optional("R of the effort; left out: the identity")
     norm_order: Annotated[
         Literal[1, 2, "inf"], BeforeValidator(_norm_order), Need("1, 2 or inf")
     ] = Field(2, description="1, 2 or inf")
@@ -209,43 +193,40 @@ class CostPart(Part):
     direction_change: NotNegative = Field(0.0, description="per change between forward and reverse")
 
 
-class HorizonPart(Part):
+class HorizonPart(FilePart):
     """How long a plan lasts, and of how many trims it may consist."""
 
     time_s: Seconds = Field("free", description="exactly this long, or free")
-    max_trims: Count | None = Field(None, description="largest number of trims, rest included")
-    min_coast_s: NotNegative | None = Field(
-        None, description="shortest time in a trim; omitted: 0.02, unless the plan gets costlier"
+    max_trims: Count | None = optional("largest number of trims, rest included")
+    min_coast_s: NotNegative | None = optional(
+        "shortest time in a trim; omitted: 0.02, unless the plan gets costlier"
     )
-    max_time_s: Positive | None = Field(None, description="longest time, when time_s is free")
+    max_time_s: Positive | None = optional("longest time, when time_s is free")
     stay: bool = Field(
         False, description="it stays at the goal, when time_s is free: nothing may pass there later"
     )
 
 
-class BoundsPart(Part):
+class BoundsPart(FilePart):
     """Where the pose may be."""
 
-    x: Interval | None = Field(None, description="[low, high]")
-    y: Interval | None = Field(None, description="[low, high]")
-    z: Interval | None = Field(None, description="[low, high]")
+    x: Interval | None = optional("[low, high]")
+    y: Interval | None = optional("[low, high]")
+    z: Interval | None = optional("[low, high]")
 
 
-class Disc(Part):
+class DiscPart(FilePart, title="Disc"):
     """A disc in the world."""
 
     center: Point = Field(description="[x, y]")
     radius: Positive = Field(description="radius")
 
 
-class Box(Part):
+class BoxPart(FilePart, title="Box"):
     """A rectangle in the world."""
 
     center: Point = Field(description="[x, y]")
-    size: Annotated[
-        tuple[Positive, Positive],
-        Several("[length, width], two positive numbers", at_least=2, at_most=2),
-    ] = Field(description="[length, width]")
+    size: Size = Field(description="[length, width]")
     heading_rad: Number = Field(0.0, description="direction of its length")
 
 
@@ -261,7 +242,18 @@ def _in_time(motion: tuple[TimedPose, ...]) -> tuple[TimedPose, ...]:
     return motion
 
 
-class Obstacle(Part):
+TimedPoses = Annotated[
+    tuple[TimedPose, ...],
+    Several("a list of at least one [time, x, y, heading]", at_least=1),
+    AfterValidator(_in_time),
+]
+Twists = Annotated[
+    tuple[Pose, ...],
+    Several("a list of [v_x, v_y, turn rate], one for every pose but the last"),
+]
+
+
+class ObstaclePart(FilePart, title="Obstacle"):
     """What the vehicle must not touch."""
 
     one_of: ClassVar = ("polygon_m", "disc_m", "box_m", "map")
@@ -274,36 +266,23 @@ class Obstacle(Part):
         "present_s": ("polygon_m", "disc_m", "box_m"),
     }
 
-    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
-    holes_m: Annotated[tuple[Polygon, ...], Several("a list of polygons", at_least=0)] = Field(
-        (), description="polygons that are free inside polygon_m"
-    )
-    disc_m: Disc | None = Field(None, description="{center, radius}")
-    box_m: Box | None = Field(None, description="{center, size, heading_rad}")
-    map: Name | None = Field(None, description="occupancy map (YAML), relative to this file")
+    polygon_m: Polygon | None = optional("corners [x, y]")
+    holes_m: Polygons = Field((), description="polygons that are free inside polygon_m")
+    disc_m: DiscPart | None = optional("{center, radius}")
+    box_m: BoxPart | None = optional("{center, size, heading_rad}")
+    map: Name | None = optional("occupancy map (YAML), relative to this file")
     unknown: Annotated[Literal["blocked", "free"], Need("blocked or free")] = Field(
         "blocked", description="what unknown cells of the map are"
     )
-    height_m: Interval | None = Field(None, description="[low, high] of a body in space")
-    motion: (
-        Annotated[
-            tuple[TimedPose, ...],
-            Several("a list of at least one [time, x, y, heading]", at_least=1),
-            AfterValidator(_in_time),
-        ]
-        | None
-    ) = Field(None, description="poses in time, linear between")
-    twists: (
-        Annotated[
-            tuple[Pose, ...],
-            Several("a list of [v_x, v_y, turn rate], one for every pose but the last", at_least=0),
-        ]
-        | None
-    ) = Field(None, description="velocities in its own frame after each pose: it moves on arcs")
-    present_s: Interval | None = Field(None, description="[from, to]: it is there then alone")
+    height_m: Interval | None = optional("[low, high] of a body in space")
+    motion: TimedPoses | None = optional("poses in time, linear between")
+    twists: Twists | None = optional(
+        "velocities in its own frame after each pose: it moves on arcs"
+    )
+    present_s: Interval | None = optional("[from, to]: it is there then alone")
 
 
-class SearchPart(Part):
+class SearchPart(FilePart):
     """How to search, and for how long."""
 
     method: Annotated[
@@ -311,13 +290,13 @@ class SearchPart(Part):
         Need("auto, words, insertion or lattice"),
     ] = Field("auto", description="auto, words, insertion or lattice")
     time_limit_s: Positive = Field(5.0, description="upper bound for search and refinement")
-    max_expansions: Count | None = Field(None, description="upper bound for the nodes expanded")
-    cell_m: Positive | None = Field(None, description="lattice: size of a cell")
-    headings: Count | None = Field(None, description="lattice: number of headings")
+    max_expansions: Count | None = optional("upper bound for the nodes expanded")
+    cell_m: Positive | None = optional("lattice: size of a cell")
+    headings: Count | None = optional("lattice: number of headings")
     weight: (
         Annotated[float, Strict(), AllowInfNan(False), Ge(1), Need("a finite number of at least 1")]
         | None
-    ) = Field(None, description="lattice: weight of the cost to go")
+    ) = optional("lattice: weight of the cost to go")
     backwards: bool = Field(
         False, description="lattice_body: search from the goals; false: from the start"
     )
@@ -330,29 +309,22 @@ class SearchPart(Part):
     )
 
 
-class PushPart(Part):
+class PushPart(FilePart):
     """A displacement in the vehicle's own frame, as by a hand."""
 
-    after_step: Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")] = Field(
-        description="number of the step, the first is 0"
-    )
+    after_step: Whole = Field(description="number of the step, the first is 0")
     by: Pose = Field(description="[x, y, heading] seen from the vehicle")
 
 
-Seed = Annotated[int, Strict(), Ge(0), Need("a whole number of at least 0")]
-
-
-class Noise(Part):
+class NoisePart(FilePart):
     """What a vehicle does beside its plan."""
 
     position_m: NotNegative = Field(0.0, description="standard deviation per axis and step")
     heading_rad: NotNegative = Field(0.0, description="standard deviation per step")
     measured_position_m: NotNegative = Field(0.0, description="standard deviation, seen alone")
     measured_heading_rad: NotNegative = Field(0.0, description="standard deviation, seen alone")
-    twist_scale: Pose | None = Field(
-        None, description="true over nominal body velocity, per component"
-    )
-    pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes", at_least=0)] = Field(
+    twist_scale: Pose | None = optional("true over nominal body velocity, per component")
+    pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes")] = Field(
         (), description="a list of {after_step, by}"
     )
 
@@ -364,34 +336,32 @@ class Noise(Part):
         return pushes
 
 
-class Disturbance(Noise):
+class LateNoisePart(NoisePart, title="Disturbance"):
     """What the vehicle does beside its plan; random numbers come from the seed."""
 
     delay_steps: Annotated[Literal[0, 1], Need("0 or 1")] = Field(
         0, description="how late the controller sees the pose"
     )
-    seed: Seed = Field(0, description="seed of the random numbers")
+    seed: Whole = Field(0, description="seed of the random numbers")
 
 
-class RecedingHorizonPart(Part):
+class RecedingHorizonPart(FilePart):
     """Closed loop, for mpc."""
 
     step_s: Positive = Field(description="time between two plans")
-    steps: Count | None = Field(None, description="largest number of steps; left out: 100")
+    steps: Count | None = optional("largest number of steps; left out: 100")
     margin: NotNegative = Field(
         0.0, description="a new word must be cheaper by more than this; 0: the optimum"
     )
     retimed: bool = Field(False, description="drive plans at the pace of uniform effort")
-    pieces: Count | None = Field(
-        None, description="parts of a plan with controls between those of the library; left out: 0"
+    pieces: Count | None = optional(
+        "parts of a plan with controls between those of the library; left out: 0"
     )
     stay: bool = Field(False, description="go on within the goal's tolerance for all steps")
-    disturbance: Disturbance | None = Field(
-        None, description="{position_m, heading_rad, seed, ...}"
-    )
+    disturbance: LateNoisePart | None = optional("{position_m, heading_rad, seed, ...}")
 
 
-class MaskLimit(Part):
+class MaskLimitPart(FilePart, title="MaskLimit"):
     """The greatest speed where a mask has a value v from 1 to 100: base + multiplier * v."""
 
     base: Number = Field(description="of the speed")
@@ -401,7 +371,10 @@ class MaskLimit(Part):
     )
 
 
-class ZonePart(Part):
+TrimNames = Annotated[tuple[Name, ...], Several("a list of at least one trim", at_least=1)]
+
+
+class ZonePart(FilePart):
     """A part of the plane in which not every motion is admitted."""
 
     one_of: ClassVar = ("polygon_m", "map")
@@ -414,32 +387,30 @@ class ZonePart(Part):
         "trims": ("polygon_m",),
     }
 
-    polygon_m: Polygon | None = Field(None, description="corners [x, y]")
-    holes_m: Annotated[tuple[Polygon, ...], Several("a list of polygons", at_least=0)] = Field(
-        (), description="polygons inside polygon_m that are not in the zone"
-    )
-    map: Name | None = Field(
-        None, description="mask of a speed filter (YAML), relative to this file"
-    )
-    speed_limit: MaskLimit | None = Field(None, description="{base, multiplier, unit} of the mask")
-    max_speed_m_s: NotNegative | None = Field(None, description="greatest speed in it")
+    polygon_m: Polygon | None = optional("corners [x, y]")
+    holes_m: Polygons = Field((), description="polygons inside polygon_m that are not in the zone")
+    map: Name | None = optional("mask of a speed filter (YAML), relative to this file")
+    speed_limit: MaskLimitPart | None = optional("{base, multiplier, unit} of the mask")
+    max_speed_m_s: NotNegative | None = optional("greatest speed in it")
     reverse: bool = Field(True, description="false: forwards only")
-    max_lateral_acceleration_m_s2: NotNegative | None = Field(
-        None, description="greatest speed times turn rate in it"
+    max_lateral_acceleration_m_s2: NotNegative | None = optional(
+        "greatest speed times turn rate in it"
     )
-    trims: (
-        Annotated[tuple[Name, ...], Several("a list of at least one trim", at_least=1)] | None
-    ) = Field(None, description="only these trims, and maneuvers between them")
+    trims: TrimNames | None = optional("only these trims, and maneuvers between them")
 
 
-class ScenarioFile(Part):
+Obstacles = Annotated[tuple[ObstaclePart, ...], Several("a list of obstacles")]
+Zones = Annotated[tuple[ZonePart, ...], Several("a list of zones")]
+
+
+class ScenarioFile(FilePart):
     """A motion planning problem: vehicle, automaton, start, goal, cost."""
 
     schema_version: Literal[1] = Field(alias="schema", description="1")
-    name: Text | None = Field(None, description="what the situation is called")
+    name: Text | None = optional("what the situation is called")
     vehicle: VehiclePart = Field(description="a mapping {model, ...}")
     automaton: AutomatonPart = Field(description="a mapping with trims, grid, file or preset")
-    start: Start = Field(description="a mapping {pose, ...}")
+    start: StartPart = Field(description="a mapping {pose, ...}")
     goal: Goals = Field(description="a mapping {pose, ...}, or a list of these")
     cost: CostPart = Field(
         default_factory=lambda: CostPart(time=1.0), description="left out: {time: 1}"
@@ -449,11 +420,12 @@ class ScenarioFile(Part):
     )
     bounds_m: BoundsPart = Field(default_factory=BoundsPart, description="left out: none")
     margin_m: NotNegative = Field(0.0, description="distance kept from everything")
-    obstacles: Annotated[tuple[Obstacle, ...], Several("a list of obstacles", at_least=0)] = Field(
-        (), description="what the vehicle must not touch"
-    )
-    zones: Annotated[tuple[ZonePart, ...], Several("a list of zones", at_least=0)] = Field(
-        (), description="where not every motion is admitted"
-    )
+    obstacles: Obstacles = Field((), description="what the vehicle must not touch")
+    zones: Zones = Field((), description="where not every motion is admitted")
     search: SearchPart = Field(default_factory=SearchPart, description="how to search")
-    receding_horizon: RecedingHorizonPart | None = Field(None, description="only for mpc")
+    receding_horizon: RecedingHorizonPart | None = optional("only for mpc")
+
+    @property
+    def goals(self) -> tuple[GoalPart, ...]:
+        """One or several."""
+        return self.goal if isinstance(self.goal, tuple) else (self.goal,)

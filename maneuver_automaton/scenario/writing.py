@@ -12,14 +12,21 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton._files import relative
-from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.costs import WEIGHTS, Cost, StageCost
+from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings, Unstated
+from maneuver_automaton.problem import Horizon, Unstated
 from maneuver_automaton.scenario.fleet import FleetScenario
 from maneuver_automaton.scenario.fleet_schema import FleetFile
+from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario
-from maneuver_automaton.scenario.schema import ScenarioFile
+from maneuver_automaton.scenario.schema import (
+    BoundsPart,
+    CostPart,
+    GoalPart,
+    HorizonPart,
+    ScenarioFile,
+    SearchPart,
+)
 from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     stated_obstacle,
@@ -50,7 +57,7 @@ def to_yaml(scenario: Scenario | FleetScenario, *, folder: Path | None = None) -
 
     Examples
     --------
-    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton import Automaton, Cost, Problem, Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
     >>> problem = Problem(robot, [0, 0, 0], [1, 1, 0], cost=Cost(effort=1.0))
     >>> print(to_yaml(Scenario(name="A first plan", problem=problem)))
@@ -89,21 +96,33 @@ def to_yaml(scenario: Scenario | FleetScenario, *, folder: Path | None = None) -
 def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
     """What a file states of one vehicle, key by key; nothing of what is as if left out."""
     problem = scenario.problem
-    bounds = {name: getattr(problem.bounds, name) for name in ("x", "y", "z")}
-    goals = [_goal(goal) for goal in problem.goals]
+    goals = [
+        stated(GoalPart, goal, heading="free" if goal.free_heading else None)
+        for goal in problem.goals
+    ]
+    start = {
+        "pose": problem.start.tolist(),
+        "trim": problem.start_trim,
+        "time_s": problem.start_time or None,
+    }
+    search = {"method": problem.search.method, "time_limit_s": scenario.time_limit_s}
     return {
         "vehicle": _vehicle(scenario),
         "automaton": _automaton(scenario, folder),
-        "start": _start(problem),
-        "goal": goals if len(goals) > 1 else goals[0],
+        "start": {key: value for key, value in start.items() if value is not None},
+        "goal": _one_or_several(goals),
         "cost": _cost(problem.cost),
         "horizon": _horizon(problem.horizon),
-        "bounds_m": {name: list(pair) for name, pair in bounds.items() if pair is not None},
+        "bounds_m": stated(BoundsPart, problem.bounds),
         "margin_m": problem.margin,
         "obstacles": [stated_obstacle(one, scenario.maps, folder) for one in problem.obstacles],
         "zones": [stated_zone(one) for one in problem.zones],
-        "search": _search(problem.search, scenario.time_limit_s),
+        "search": search | stated(SearchPart, problem.search),
     }
+
+
+def _one_or_several(entries: list[Any]) -> Any:
+    return entries if len(entries) > 1 else entries[0]
 
 
 def _of_most(alone: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -140,7 +159,11 @@ def _several(
             **({"priority": priority} if priority else {}),
             **({"leaves": True} if leaves else {}),
             **{key: value for key, value in one.items() if written.get(key) != _flow(value)},
-            **_loop_of(scenario, name),
+            **(
+                {"receding_horizon": scenario.loops[name].model_dump(exclude_none=True)}
+                if name in scenario.loops
+                else {}
+            ),
         }
         for name, priority, leaves, one in zip(
             fleet.names, fleet.priority, fleet.leaves, alone, strict=True
@@ -150,32 +173,23 @@ def _several(
     return {"vehicles": rows, "fleet": settings}
 
 
-def _loop_of(scenario: FleetScenario, name: str) -> dict[str, Any]:
-    """What happens to a vehicle in closed loop, if that is stated."""
-    if name not in scenario.loops:
-        return {}
-    return {"receding_horizon": scenario.loops[name].model_dump(exclude_none=True)}
-
-
 def _vehicle(scenario: Scenario) -> dict[str, Any]:
     """The model, the body, and the bodies of what it carries."""
     problem = scenario.problem
     vehicle = described(problem.automaton.model)
     if scenario.footprint:
-        shapes = list(scenario.footprint)
-        vehicle["footprint"] = shapes if len(shapes) > 1 else shapes[0]
+        vehicle["footprint"] = _one_or_several(list(scenario.footprint))
     if any(problem.body_height):
         vehicle["footprint_height_m"] = list(problem.body_height)
     for name, body in problem.parts.items():
-        stated = list(stated_footprint(body))
-        vehicle[name] = stated if len(stated) > 1 else stated[0]
+        vehicle[name] = _one_or_several(list(stated_footprint(body)))
     return vehicle
 
 
 def json_schema() -> dict[str, Any]:
     """JSON Schema of scenario files, for editors: of one vehicle, or of several."""
-    one = _without_null(ScenarioFile.model_json_schema(by_alias=True))
-    several = _without_null(FleetFile.model_json_schema(by_alias=True))
+    one = _plain(ScenarioFile.model_json_schema(by_alias=True))
+    several = _plain(FleetFile.model_json_schema(by_alias=True))
     kinds = [kind["required"] for kind in (one, several)]
     loops = [kind["properties"]["receding_horizon"] for kind in (one, several)]
     return {
@@ -194,29 +208,44 @@ def json_schema() -> dict[str, Any]:
     }
 
 
-def _without_null(schema: Any) -> Any:
-    """The schema without the nulls that stand for a key that is left out."""
-    if isinstance(schema, list):
-        return [_without_null(item) for item in schema]
-    if not isinstance(schema, dict):
-        return schema
-    kept = {key: _without_null(item) for key, item in schema.items()}
-    if "default" in kept and kept["default"] is None:
-        del kept["default"]
-    if isinstance(kept.get("anyOf"), list):
-        options = [option for option in kept["anyOf"] if option != {"type": "null"}]
-        if len(options) == 1:
-            del kept["anyOf"]
-            return options[0] | kept
-        kept["anyOf"] = options
-    return kept
+def _plain(schema: Any) -> Any:
+    """The schema without the nulls that stand for a key that is left out; parts by their titles."""
+    titles = {f"#/$defs/{name}": part["title"] for name, part in schema["$defs"].items()}
+
+    def plain(value: Any) -> Any:
+        if isinstance(value, list):
+            return [plain(item) for item in value]
+        if not isinstance(value, dict):
+            return value
+        kept = {key: plain(item) for key, item in value.items()}
+        if kept.get("$ref") in titles:
+            kept["$ref"] = f"#/$defs/{titles[kept['$ref']]}"
+        if "default" in kept and kept["default"] is None:
+            del kept["default"]
+        if isinstance(kept.get("anyOf"), list):
+            options = [option for option in kept["anyOf"] if option != {"type": "null"}]
+            if len(options) == 1:
+                del kept["anyOf"]
+                return options[0] | kept
+            kept["anyOf"] = options
+        return kept
+
+    parts = sorted(schema["$defs"].values(), key=lambda part: str(part["title"]))
+    named = {part["title"]: part for part in parts}
+    plain_schema: dict[str, Any] = plain(schema | {"$defs": named})
+    return plain_schema
 
 
 def _automaton(scenario: Scenario, folder: Path) -> dict[str, Any]:
     """Trims of a kinematic vehicle one by one; else what the scenario's own file states."""
     automaton = scenario.problem.automaton
     if not automaton.maneuvers and not automaton.model.reduced_names:
-        return {"trims": _trims(automaton)}
+        for trim in automaton.trims:
+            if math.isfinite(trim.max_duration):
+                said = "a scenario file cannot state its max_duration"
+                raise ValueError(f"trim {trim.name!r}: {said}")
+        trims = [{"name": one.name, "control": one.control.tolist()} for one in automaton.trims]
+        return {"trims": trims}
     if scenario.stated is None:
         raise ValueError("automaton: a scenario file cannot list maneuvers, save a library instead")
     entry = scenario.stated.model_dump(exclude_none=True, exclude_defaults=True)
@@ -225,66 +254,16 @@ def _automaton(scenario: Scenario, folder: Path) -> dict[str, Any]:
     return entry
 
 
-def _trims(automaton: Automaton) -> list[dict[str, Any]]:
-    for trim in automaton.trims:
-        if math.isfinite(trim.max_duration):
-            raise ValueError(f"trim {trim.name!r}: a scenario file cannot state its max_duration")
-    return [{"name": trim.name, "control": trim.control.tolist()} for trim in automaton.trims]
-
-
-def _start(problem: Problem) -> dict[str, Any]:
-    entry = {"pose": problem.start.tolist(), **_given(trim=problem.start_trim)}
-    return entry | ({"time_s": problem.start_time} if problem.start_time else {})
-
-
-def _goal(goal: Goal) -> dict[str, Any]:
-    entry = {"pose": goal.pose.tolist(), **_given(trim=goal.trim)}
-    if goal.free_heading:
-        entry["heading"] = "free"
-    tolerances = {"tolerance_m": goal.tolerance_m, "tolerance_rad": goal.tolerance_rad}
-    return entry | {key: value for key, value in tolerances.items() if value}
-
-
 def _cost(cost: StageCost) -> dict[str, Any]:
     if not isinstance(cost, Cost):
         raise ValueError("cost: a scenario file can state the class Cost only")
-    entry: dict[str, Any] = {name: getattr(cost, name) for name in WEIGHTS if getattr(cost, name)}
-    if cost.effort_matrix is not None:
-        entry["effort_matrix"] = cost.effort_matrix.tolist()
-    if cost.norm_order != 2.0:
-        entry["norm_order"] = 1 if cost.norm_order == 1.0 else "inf"
-    return entry
+    order = {1.0: 1, 2.0: 2}.get(cost.norm_order, "inf")
+    return stated(CostPart, cost, norm_order=order)
 
 
 def _horizon(horizon: Horizon) -> dict[str, Any]:
-    entry = _given(
-        time_s=horizon.time,
-        max_trims=horizon.max_trims,
-        min_coast_s=None if isinstance(horizon.min_coast, Unstated) else horizon.min_coast,
-        max_time_s=horizon.max_time,
-    )
-    return entry | ({"stay": True} if horizon.stay else {})
-
-
-def _search(search: SearchSettings, time_limit_s: float) -> dict[str, Any]:
-    return {
-        "method": search.method,
-        "time_limit_s": time_limit_s,
-        **_given(
-            max_expansions=search.max_expansions,
-            cell_m=search.cell,
-            headings=search.headings,
-            weight=search.weight,
-            backwards=search.backwards or None,
-            show_nodes=search.show_nodes or None,
-            improve=None if search.improve else False,
-            polish=None if search.polish else False,
-        ),
-    }
-
-
-def _given(**entries: Any) -> dict[str, Any]:
-    return {key: value for key, value in entries.items() if value is not None}
+    unstated = isinstance(horizon.min_coast, Unstated)
+    return stated(HorizonPart, horizon, min_coast_s=None if unstated else horizon.min_coast)
 
 
 def _block(key: str, value: Any) -> str:
@@ -316,13 +295,8 @@ def _flow(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_flow(item) for item in value) + "]"
     if isinstance(value, str):
-        return value if _is_plain(value) else _quoted(value)
+        if _PLAIN.fullmatch(value) and isinstance(scalar(value), str):
+            return value
+        quoted = json.dumps(value, ensure_ascii=False)
+        return _HARD.sub(lambda bad: f"\\u{ord(bad.group()):04x}", quoted)
     return repr(value)
-
-
-def _is_plain(text: str) -> bool:
-    return bool(_PLAIN.fullmatch(text)) and isinstance(scalar(text), str)
-
-
-def _quoted(text: str) -> str:
-    return _HARD.sub(lambda bad: f"\\u{ord(bad.group()):04x}", json.dumps(text, ensure_ascii=False))

@@ -23,9 +23,9 @@ from maneuver_automaton.models import (
 )
 from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text, to_yaml
+from maneuver_automaton.scenario.parts import keys_of
 from maneuver_automaton.scenario.presets import preset_automaton
-from maneuver_automaton.scenario.vehicle_parts import MODELS, PARTS
-from maneuver_automaton.scenario.vehicles import KEYS, described
+from maneuver_automaton.scenario.vehicles import MODELS, PARTS, described
 from tests import inertia
 
 CAR = (
@@ -128,12 +128,13 @@ def test_every_model_is_read_and_written(vehicle, automaton, model):
     assert again.problem.parts.keys() == scenario.problem.parts.keys()
 
 
-@pytest.mark.parametrize(("name", "part"), list(zip(MODELS, PARTS, strict=True)))
+@pytest.mark.parametrize(("name", "part"), list(PARTS.items()))
 def test_every_parameter_has_a_key_with_its_unit(name, part):
     fields = {field.name for field in dataclasses.fields(KINDS[name])}
-    assert KEYS[name].keys() == fields
+    keys = keys_of(part, KINDS[name])
+    assert keys.keys() == fields
     bodies = {"model", "footprint", "footprint_height_m", "trailer"}
-    assert set(KEYS[name].values()) == part.model_fields.keys() - bodies
+    assert set(keys.values()) == part.model_fields.keys() - bodies
 
 
 def test_the_body_of_the_trailer_is_a_part():

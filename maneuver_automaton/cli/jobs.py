@@ -1,0 +1,233 @@
+"""`plan` and `mpc`: read a file, do the job, write, draw, tell, complain; one file or a folder."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from maneuver_automaton._interrupts import stopped
+from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, run_folder
+from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
+from maneuver_automaton.cli.inputs import (
+    Parts,
+    is_road,
+    make_folder,
+    not_written,
+    problem_of,
+    states_several,
+)
+from maneuver_automaton.cli.options import Options, refuse_unknown
+from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, draw
+from maneuver_automaton.cli.progress import announced
+from maneuver_automaton.errors import InvalidScenario
+
+INTERRUPTED = "interrupted before there was a plan"
+DOCUMENTS = {"plan": "plan", "mpc": "closed_loop"}  # and what pictures are called
+PICTURES = {
+    "plan": ("plan.png", "plan_3d.png", "alternatives.png", "progress.png", "plan.gif",
+             "plan.html"),
+    "mpc": ("closed_loop.png", "closed_loop.gif", "closed_loop.html"),
+}  # fmt: skip
+WORK = {"plan": "planned", "mpc": "driven"}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class JobResult:
+    """What came of a job: how it is written and told, and its row in the table of a folder."""
+
+    name: str  # of the scenario
+    result: Any  # what is drawn; None: nothing
+    save: Callable[[Path], None]  # writes its document
+    tell: Callable[[str], None]  # prints it, and the folder that it is in
+    done: bool  # whether all is as asked
+    status: str
+    complaints: tuple[str, ...] = ()  # a line each
+    cost: float | None = None
+    duration: float | None = None
+    clearance: float | None = None
+    first_plan: float | None = None
+    document: str = ""  # its name; empty: that of the command
+
+    def row(self, path: Path) -> Row:
+        """For the table of a folder."""
+        return Row(
+            name=path.name,
+            code=FOUND if self.done else NO_PLAN,
+            status=self.status,
+            reason="".join(f"{path}: {line}\n" for line in self.complaints),
+            cost=self.cost,
+            duration=self.duration,
+            clearance=self.clearance,
+            first_plan=self.first_plan,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """One file for one command."""
+
+    command: str  # plan | mpc
+    path: Path
+    parts: Parts
+    options: Options
+
+    def done(self, out: Path) -> JobResult:
+        """Do it, and write its document into the folder `out`; no picture."""
+        kind, scenario = self._read()
+        refuse_unknown(self.path, self.command, kind, self.options, self.parts)
+        if kind == "fleet":
+            check_address(self.options.scheduler)
+        make_folder(out)
+        home = "single" if kind == "one" else "fleets" if kind == "fleet" else "roads"
+        work = getattr(importlib.import_module(f"{__package__}.{home}"), WORK[self.command])
+        with announced(quiet=self.options.quiet):
+            outcome: JobResult = work(self, scenario)
+        with _writing(out):
+            outcome.save(out / f"{outcome.document or DOCUMENTS[self.command]}.json")
+            for name in PICTURES[self.command] if outcome.result is not None else ():
+                (out / name).unlink(missing_ok=True)  # of an earlier one
+        return outcome
+
+    def _read(self) -> tuple[str, Any]:
+        """The kind of the job, and what the file states."""
+        if is_road(self.path):
+            return ("roads" if states_several(self.path, self.parts) else "road"), None
+        from maneuver_automaton.scenario import FleetScenario
+
+        scenario = problem_of(self.path, self.parts)
+        if self.command == "mpc" and scenario.receding_horizon is None:
+            raise InvalidScenario(
+                f"{self.path}: receding_horizon: missing, need {{step_s: ...}}, the time between "
+                "two plans"
+            )
+        return ("fleet" if isinstance(scenario, FleetScenario) else "one"), scenario
+
+    def drawn(self, outcome: JobResult, out: Path) -> None:
+        """Write the pictures that were asked for, in this process."""
+        options = self.options
+        wanted = options.plot or options.animate or options.html
+        if wanted and outcome.result is not None and not stopped():
+            with _writing(out):
+                draw(outcome.result, outcome.name, out / DOCUMENTS[self.command], options)
+
+    def wrong(self, error: ValueError, about: str = "") -> InvalidScenario:
+        """An error that names the file, and the part of it that it is `about`."""
+        if isinstance(error, InvalidScenario):
+            return error
+        said = str(error).removeprefix("receding horizon: ")
+        said = said.removeprefix("fleet horizon: ").removeprefix("fleet: ")
+        return InvalidScenario(f"{self.path}: {about}{said}")
+
+
+@contextlib.contextmanager
+def _writing(out: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise not_written(Path(error.filename or out), error) from error
+
+
+def run_jobs(command: str, path: Path, out: Path, options: Options, parts: Parts) -> int:
+    """Run `plan` or `mpc` of a file or of a folder; the exit code."""
+    if path.is_dir():
+        return _run_folder(command, path, out, options, parts)
+    return _run_file(Job(command=command, path=path, parts=parts, options=options), out)
+
+
+def _run_file(job: Job, out: Path) -> int:
+    """Do one job into the folder `out`, print what came of it, return the exit code."""
+    beside = job.command == "plan" and job.options.plot and not is_road(job.path)
+    with draughtsman(wanted=beside) as one:
+        outcome = job.done(out)
+        begun = one is not None and not stopped() and _begun(one, job, outcome, out)
+        if not begun:
+            job.drawn(outcome, out)
+        try:
+            if not job.options.quiet:
+                outcome.tell(str(out))
+            for line in outcome.complaints:
+                complain(f"{job.path}: {line}")
+            if job.command == "plan" and outcome.done and stopped():
+                complain(f"{job.path}: interrupted: the best plan so far is in {out / 'plan.json'}")
+        finally:
+            if begun and one is not None and not one.is_done():
+                job.drawn(outcome, out)
+    return FOUND if outcome.done else NO_PLAN
+
+
+def _begun(one: Draughtsman, job: Job, outcome: JobResult, out: Path) -> bool:
+    """Whether another process draws it."""
+    return one.begin(draw, outcome.result, outcome.name, out / "plan", job.options)
+
+
+def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: Parts) -> int:
+    """Do a job of every file of a folder, each into `out`/STEM; a table; the exit code."""
+    if options.resume is not None:
+        raise InvalidScenario("--resume: goes on with one loop, and a folder has many; need a file")
+    check_address(options.scheduler)
+    problems = problems_in(folder, parts)
+    if command == "mpc":
+        problems = [one for one in problems if _has_loop(*one)]
+        if not problems:
+            raise InvalidScenario(f"{folder}: no scenario in it has a receding_horizon, need one")
+    make_folder(out)
+    alone = replace(options, jobs=1, scheduler=None)
+    return run_folder(
+        functools.partial(_row, command=command, out=out, options=alone, folder=Path.cwd()),
+        problems,
+        out,
+        options=f"{command} {replace(alone, quiet=True)}",
+        jobs=options.jobs,
+        scheduler=options.scheduler,
+        quiet=options.quiet,
+        ready=functools.partial(_compile_first, quiet=options.quiet),
+    )
+
+
+def _has_loop(path: Path, parts: Parts) -> bool:
+    """Whether a file is for mpc: a drive on roads, a closed loop, or what cannot be read."""
+    if is_road(path):
+        return True
+    try:
+        return problem_of(path, parts, remark=False).receding_horizon is not None
+    except Exception:  # noqa: BLE001, told when it is driven
+        return True
+
+
+def _row(
+    problem: tuple[Path, Parts], *, command: str, out: Path, options: Options, folder: Path
+) -> tuple[Path, Row]:
+    """Do the job of one file of a folder; what goes wrong is told in its row.
+
+    Paths are relative to `folder`: a process that works for others may have begun elsewhere.
+    """
+    path, parts = problem
+    out = out / path.stem
+    if stopped():
+        reason = f"{path}: interrupted before it was {WORK[command]}"
+        return path, Row(name=path.name, code=NO_PLAN, status="interrupted", reason=reason)
+    try:
+        with contextlib.chdir(folder):
+            job = Job(command=command, path=path, parts=parts, options=options)
+            outcome = job.done(out)
+            job.drawn(outcome, out)
+    except Exception as error:  # noqa: BLE001, one bad file must not stop the others
+        reason = explained(error)
+        return path, Row(name=path.name, code=BAD_INPUT, status="bad input", reason=reason)
+    return path, outcome.row(path)
+
+
+def _compile_first(*, quiet: bool) -> None:
+    """Have the kernels in the cache, or every process would compile them for itself."""
+    from maneuver_automaton.refinement.ready import load_lattice
+    from maneuver_automaton.search.choose import load_insertion_kernels, load_word_kernels
+
+    with announced(quiet=quiet):
+        load_word_kernels(4)
+        load_insertion_kernels()
+        load_lattice()

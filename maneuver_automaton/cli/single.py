@@ -1,0 +1,196 @@
+"""`plan` and `mpc` of one vehicle: its plan, its closed loop, statistics of many loops."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+from maneuver_automaton import planning
+from maneuver_automaton._interrupts import stopped
+from maneuver_automaton.budget import Watch
+from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
+from maneuver_automaton.cli.progress import counted, has_terminal, progress_bar, waiting
+from maneuver_automaton.formats.plan_json import save_plan
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, simulate, simulate_many
+from maneuver_automaton.scenario import Scenario
+from maneuver_automaton.scenario.scenario import disturbance_of
+
+STEPS = 100  # of a loop, where neither file nor option says
+
+
+def planned(job: Job, scenario: Scenario) -> JobResult:
+    """Plan the problem of a file."""
+    budgets, quiet = job.options.budgets, job.options.quiet
+    limit, shown = budgets.time_limit or scenario.time_limit_s, SoFar.of_gap(budgets.gap)
+    told = not quiet and has_terminal()
+    try:
+        with waiting(f"planning, at most {limit:g} s", quiet=quiet, more=lambda: shown.text):
+            result = planning.plan(
+                scenario.problem,
+                time_limit=limit,
+                alternatives=budgets.alternatives,
+                gap=budgets.gap,
+                watch=shown.watch if told else None,
+                on_better=shown.better if told else None,
+                leave=job.options.leave,
+            )
+    except KeyboardInterrupt:
+        if not stopped():
+            raise  # in somebody else's program
+        result = PlanResult(problem=scenario.problem, status=PlanStatus.OUT_OF_BUDGET, reason="")
+    if stopped() and result.plan is None:
+        result = replace(result, reason=INTERRUPTED)
+    result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
+    found, status, name = result.plan is not None, result.status.value, scenario.name
+
+    def tell(folder: str) -> None:
+        from maneuver_automaton.cli.tables import print_result
+
+        print_result(name, result, folder=folder, share=budgets.gap is not None)
+
+    return JobResult(
+        name=name,
+        result=result,
+        save=lambda path: save_plan(result, path, name=name, interrupted=stopped()),
+        tell=tell,
+        done=found,
+        status=status,
+        complaints=() if found else ("; ".join([f"{status}: {result.reason}", *result.notes]),),
+        cost=result.cost,
+        duration=None if result.plan is None else result.plan.duration,
+        clearance=result.clearance_m,
+        first_plan=result.timing_s.get("first_plan"),
+    )
+
+
+@dataclass(slots=True, kw_only=True)
+class SoFar:
+    """The best plan while it is being improved, for a line on the terminal."""
+
+    watch: Watch
+    best: PlanResult | None = None
+
+    @classmethod
+    def of_gap(cls, gap: float | None) -> SoFar:
+        """Nothing yet of a search that ends with a `gap`, if one is stated."""
+        return cls(watch=Watch(gap=-math.inf if gap is None else gap))
+
+    def better(self, result: PlanResult) -> None:
+        """Take a plan that is better than the one before, and passed all checks."""
+        self.best = result
+
+    @property
+    def text(self) -> str:
+        """Cost, bound, gap if one was asked for, and clearance."""
+        best = self.best
+        if best is None or best.cost is None:
+            return ""
+        bound = max(self.watch.bound, best.lower_bound or 0.0)
+        share = max(0.0, 1.0 - bound / best.cost) if best.cost > 0.0 else 0.0
+        parts = [f"cost {best.cost:.6g}, proven: at least {bound:.6g}"]
+        if self.watch.gap > -math.inf:
+            parts.append(f"gap {100.0 * share:.2g} %")
+        if best.clearance_m is not None:
+            parts.append(f"clearance {best.clearance_m:.3g} m")
+        return ", ".join(parts)
+
+
+def driven(job: Job, scenario: Scenario) -> JobResult:
+    """Close the loop of a file, once or with seed after seed."""
+    part, options = scenario.receding_horizon, job.options
+    assert part is not None
+    budgets, noise = options.budgets, part.disturbance
+    steps = budgets.steps or part.steps or STEPS
+    how: dict[str, Any] = {
+        "step": part.step_s,
+        "steps": steps,
+        "margin": part.margin,
+        "time_limit": budgets.time_limit or scenario.time_limit_s,
+        "stay": part.stay,
+        "retimed": part.retimed,
+        "pieces": part.pieces or 0,
+        "gap": budgets.gap,
+    }
+    try:
+        if options.seeds is not None:
+            how["disturbance"] = None if noise is None else disturbance_of(noise)
+            return _statistics(job, scenario, how)
+        how["disturbance"] = None if noise is None else disturbance_of(noise, seed=options.seed)
+        problem, last = scenario.problem, None
+        if options.resume is not None:
+            from maneuver_automaton.formats.closed_loop_json import load_steps
+
+            done, poses = load_steps(options.resume, problem.automaton)
+            if done:
+                last, problem = done[-1], replace(problem, start=poses[-1])
+        with progress_bar("steps", steps, quiet=options.quiet) as advance:
+            loop = simulate(problem, **how, last=last, progress=lambda _: advance())
+    except ValueError as error:
+        raise job.wrong(error, "receding_horizon: ") from error
+    return _driven(loop, scenario.name)
+
+
+def _driven(loop: ClosedLoop, name: str) -> JobResult:
+    from maneuver_automaton.formats.closed_loop_json import save_closed_loop
+
+    broken = [f"step {n} broke a guarantee: {one}" for n, one in loop.violations]
+    disturbed = [
+        f"step {n} was disturbed: {one}"
+        for n, one in loop.disturbed
+        if one.guarantee is not Guarantee.DECREASE  # what noise does, in every other step
+    ]
+    missed = [] if loop.reached else [f"{loop.status}: {loop.reason}"]
+
+    def tell(folder: str) -> None:
+        from maneuver_automaton.cli.loop_tables import print_loop
+
+        print_loop(name, loop, folder=folder)
+
+    return JobResult(
+        name=name,
+        result=loop,
+        save=lambda path: save_closed_loop(loop, path, name=name, interrupted=stopped()),
+        tell=tell,
+        done=loop.reached and not any(loop.collisions),
+        status=loop.status,
+        complaints=(*broken, *disturbed, *missed),
+        cost=loop.cost,
+        duration=float(loop.times[-1] - loop.times[0]),
+        clearance=loop.min_clearance_m,
+    )
+
+
+def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
+    """Drive the loop with seed after seed."""
+    from maneuver_automaton.formats.closed_loop_json import save_statistics
+
+    options, count = job.options, job.options.seeds
+    assert count is not None
+    first = options.seed or 0
+    with progress_bar("loops", count, quiet=options.quiet) as advance:
+        statistics = simulate_many(
+            scenario.problem,
+            seeds=range(first, first + count),
+            **how,
+            audit=bool(scenario.problem.obstacles),  # else nothing looks for collisions
+            jobs=options.jobs,
+            scheduler=options.scheduler,
+            progress=counted(advance),
+        )
+
+    def tell(folder: str) -> None:
+        from maneuver_automaton.cli.loop_tables import print_statistics
+
+        print_statistics(scenario.name, statistics, folder=folder)
+
+    return JobResult(
+        name=scenario.name,
+        result=None,
+        save=lambda path: save_statistics(statistics, path, interrupted=stopped()),
+        tell=tell,
+        done=all(one.reached and not any(one.collisions) for one in statistics.outcomes),
+        status=f"{count} loops",
+        document="statistics",
+    )
