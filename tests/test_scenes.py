@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import cases
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.problem import Problem
 from tests import scenes
-from tests.benchmarks import cases
 from tests.solids import World, check_plan, clearance_at, map_boxes
 
 TIGHT = [

@@ -17,20 +17,10 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
-    from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
-    from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
-    from maneuver_automaton.plotting.effort import save_retiming_figure as save_retiming_figure
-    from maneuver_automaton.plotting.effort import (
-        save_uniform_effort_figure as save_uniform_effort_figure,
-    )
     from maneuver_automaton.plotting.factors import draw_factor as draw_factor
     from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
-    from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
-    from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
     from maneuver_automaton.plotting.films import film_of as film_of
     from maneuver_automaton.plotting.films import save_film as save_film
-    from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
-    from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
     from maneuver_automaton.plotting.look import Look as Look
     from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
@@ -44,14 +34,6 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.progress import draw_progress as draw_progress
     from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
-    from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
-    from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
-    from maneuver_automaton.plotting.stability import draw_distances as draw_distances
-    from maneuver_automaton.plotting.stability import draw_growth as draw_growth
-    from maneuver_automaton.plotting.stability import draw_indices as draw_indices
-    from maneuver_automaton.plotting.stability import draw_loops as draw_loops
-    from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
-    from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure
 
 _HOMES = {
     "draw_automaton": "automata",
@@ -59,18 +41,10 @@ _HOMES = {
     "save_automaton_figure": "automata",
     "trim_colors": "colors",
     "draw_controls": "controls",
-    "draw_efforts": "effort",
-    "draw_node_efforts": "effort",
-    "save_retiming_figure": "effort",
-    "save_uniform_effort_figure": "effort",
     "draw_factor": "factors",
     "save_factor_figure": "factors",
-    "draw_feasible_slice": "feasible",
-    "save_feasible_figure": "feasible",
     "film_of": "films",
     "save_film": "films",
-    "figure_shift": "lessons",
-    "figure_symmetry": "lessons",
     "Look": "look",
     "draw_maneuvers": "maneuvers",
     "save_maneuvers_figure": "maneuvers",
@@ -84,13 +58,5 @@ _HOMES = {
     "draw_progress": "progress",
     "save_progress_figure": "progress",
     "flies_among_heights": "space",
-    "CertificateCurve": "stability",
-    "DrivenLoop": "stability",
-    "draw_distances": "stability",
-    "draw_growth": "stability",
-    "draw_indices": "stability",
-    "draw_loops": "stability",
-    "save_stability_figure": "stability",
-    "save_turnpike_figure": "turnpike",
 }
 __getattr__, __dir__ = lazily(__name__, _HOMES)

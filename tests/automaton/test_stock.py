@@ -23,7 +23,7 @@ LEAST = {  # trims, maneuvers
     "single_track": (20, 200),
 }
 MOST_BYTES = 350_000
-SAMPLED = 12  # maneuvers of each that are driven again; all of them in tests/benchmarks
+SAMPLED = 12  # maneuvers of each that are driven again; all of them in benchmarks
 
 
 def test_there_is_one_for_every_stock_vehicle():

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.free_ways import drawn, planned, wrong
 from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Problem, Unicycle, plan
 from maneuver_automaton.bounds import goals_blocked, separation
 from maneuver_automaton.groups import SE2xR
@@ -13,7 +14,6 @@ from maneuver_automaton.models import UserModel
 from maneuver_automaton.planning.lower_bound import known_bound
 from maneuver_automaton.problem import Bounds, Goal, SearchSettings
 from maneuver_automaton.scenario import load_scenario
-from tests.benchmarks.free_ways import drawn, planned, wrong
 
 FIELD = Path(__file__).parents[3] / "shared" / "data" / "field"
 ROBOT = Automaton.of_controls(

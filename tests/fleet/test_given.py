@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from benchmarks.fleets import DATA, least_distance
 from maneuver_automaton.fleet import FleetStatus, plan_fleet
 from maneuver_automaton.scenario import load_scenario
-from tests.benchmarks.fleets import DATA, least_distance
 
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the given problems are not here")
 

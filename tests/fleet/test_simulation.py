@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.fleet_loops import driven
 from maneuver_automaton import (
     Disturbance,
     FleetHorizon,
@@ -20,7 +21,6 @@ from maneuver_automaton import (
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
-from tests.benchmarks.fleet_loops import driven
 from tests.fleet.robots import (
     at_rest,
     crossing,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from tests.benchmarks.library_size_figure import (
+from benchmarks.library_size_figure import (
     LibrarySizes,
     draw_library_sizes,
     save_library_size_figure,
