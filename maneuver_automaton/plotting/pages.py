@@ -168,7 +168,10 @@ def page_of(
         if look.height - frame < least:
             panels, flat, rows = (), True, 0
     wide = look.width - LABEL - EDGE
-    below = rows * (PANEL + LABEL) if flat else 0.0
+    panel = PANEL
+    if flat and rows and look.height is not None:
+        panel = min(PANEL, (look.height - frame - LEAST_PLANE) / rows - LABEL)
+    below = rows * (panel + LABEL) if flat else 0.0
     if look.height is not None:
         high = max(look.height - frame - below, LEAST_PLANE)
     elif flat:
@@ -183,7 +186,7 @@ def page_of(
             [str(k) if k < count else "." for k in range(first, first + columns)]
             for first in range(0, count, columns)
         ]
-        heights = [high, *[PANEL] * rows]
+        heights = [high, *[panel] * rows]
         axes = figure.subplot_mosaic([["plane"] * columns, *names], height_ratios=heights)
     else:
         axes = figure.subplot_mosaic(

@@ -52,9 +52,9 @@ PARTS: dict[str, Callable[[], dict[str, Any]]] = {
     "loops": loops,
     "documents": documents.recorded,
     "messages": messages.recorded,
+    "pictures": pictures.recorded,
     "exports": exports.recorded,
     "pages": exports.recorded_pages,
-    "pictures": pictures.recorded,
     "files": written.write_files,
     "inertia": inertia,
 }
