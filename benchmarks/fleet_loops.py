@@ -46,7 +46,7 @@ from maneuver_automaton.fleet import (
     simulate_fleet,
     verify_driven,
 )
-from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
+from maneuver_automaton.fleet.held import fleet_with_room, tube_of
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.receding_horizon.settings import switches_at_will

@@ -105,7 +105,7 @@ def _seed(scenario: FleetScenario, settings: Settings) -> int:
 def _first_plans(scenario: FleetScenario, *, quiet: bool) -> FleetResult | None:
     """Plans of those that are there from the begin on, if there are any, as a loop needs them."""
     from maneuver_automaton.fleet import plan_fleet
-    from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
+    from maneuver_automaton.fleet.held import fleet_with_room, tube_of
 
     part = scenario.receding_horizon
     assert part is not None

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple, Protocol
 
-from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.vehicle import OwnPlan
 
 Kind = Literal["holds", "asks", "agrees", "drives", "withdraws"]
 
@@ -34,31 +34,31 @@ class Knowledge(Protocol):
 
     sent: int  # messages
 
-    def start(self, held: Mapping[int, Found]) -> None:
+    def start(self, held: Mapping[int, OwnPlan]) -> None:
         """All know the plans that are driven at first."""
 
-    def begin(self, step: int, held: Mapping[int, Found]) -> None:
+    def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
         """A step begins: everybody says which plan it holds."""
 
-    def enter(self, k: int, found: Found, held: Mapping[int, Found]) -> bool:
+    def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
         """Let a vehicle in that holds a plan, if all others say that they know of it."""
 
-    def everything(self) -> Iterator[tuple[int, Found]]:
+    def everything(self) -> Iterator[tuple[int, OwnPlan]]:
         """All plans that somebody expects of a vehicle, with its number."""
 
-    def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
+    def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
         """Whether all others agree that a vehicle drives another plan than the one it holds."""
 
-    def announce(self, k: int, found: Found) -> None:
+    def announce(self, k: int, found: OwnPlan) -> None:
         """A vehicle drives another plan, whether the others agree or not."""
 
-    def knows(self, j: int, k: int, found: Found) -> bool:
+    def knows(self, j: int, k: int, found: OwnPlan) -> bool:
         """Whether a vehicle expects a plan of another one."""
 
-    def others_of(self, k: int) -> Mapping[int, Sequence[Found]]:
+    def others_of(self, k: int) -> Mapping[int, Sequence[OwnPlan]]:
         """The plans that a vehicle expects of each of the others."""
 
-    def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
+    def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
         """Pairs of which the first does not expect of the second what that drives."""
 
 
@@ -69,45 +69,45 @@ class Lossless:
     `near` says who may come near a vehicle with a plan: it speaks to nobody else.
     """
 
-    near: Callable[[int, Found], int]
-    held: Mapping[int, Found] = field(default_factory=dict)
+    near: Callable[[int, OwnPlan], int]
+    held: Mapping[int, OwnPlan] = field(default_factory=dict)
     sent: int = 0
 
-    def start(self, held: Mapping[int, Found]) -> None:
+    def start(self, held: Mapping[int, OwnPlan]) -> None:
         """All know the plans that are driven at first."""
         self.held = held
 
-    def begin(self, step: int, held: Mapping[int, Found]) -> None:
+    def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
         """A step begins; nobody has to say what all know."""
         self.held = held
 
-    def enter(self, k: int, found: Found, held: Mapping[int, Found]) -> bool:
+    def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
         """Let a vehicle in that holds a plan."""
         self.sent += 2 * self.near(k, found)
         return True
 
-    def everything(self) -> Iterator[tuple[int, Found]]:
+    def everything(self) -> Iterator[tuple[int, OwnPlan]]:
         """All plans that are held."""
         return iter(self.held.items())
 
-    def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
+    def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
         """All others agree: each that is near is asked, agrees, and is told."""
         self.sent += 3 * self.near(k, found)
         return True
 
-    def announce(self, k: int, found: Found) -> None:
+    def announce(self, k: int, found: OwnPlan) -> None:
         """Each that is near is told, and acknowledges it."""
         self.sent += 2 * self.near(k, found)
 
-    def knows(self, j: int, k: int, found: Found) -> bool:
+    def knows(self, j: int, k: int, found: OwnPlan) -> bool:
         """Everybody knows."""
         return True
 
-    def others_of(self, k: int) -> Mapping[int, Sequence[Found]]:
+    def others_of(self, k: int) -> Mapping[int, Sequence[OwnPlan]]:
         """The plans that all others hold."""
         return {j: (one,) for j, one in self.held.items() if j != k}
 
-    def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
+    def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
         """Nothing is unknown."""
         return []
 
@@ -119,17 +119,17 @@ class Agreement:
     names: Sequence[str]
     lost: Lost | None = None
     tries: int = 3  # to send a message and to receive its answer, in a step
-    expected: dict[int, dict[int, list[Found]]] = field(default_factory=dict)
+    expected: dict[int, dict[int, list[OwnPlan]]] = field(default_factory=dict)
     # Emergencies without an acknowledgement: the first drives what the second does not expect.
     unacknowledged: set[tuple[int, int]] = field(default_factory=set)
     step: int = 0
     sent: int = 0
 
-    def start(self, held: Mapping[int, Found]) -> None:
+    def start(self, held: Mapping[int, OwnPlan]) -> None:
         """All know the plans that are driven at first."""
         self.expected = {j: {k: [one] for k, one in held.items() if k != j} for j in held}
 
-    def begin(self, step: int, held: Mapping[int, Found]) -> None:
+    def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
         """A step begins: everybody says which plan it holds."""
         self.step = step
         for k in [*self.expected]:
@@ -138,7 +138,7 @@ class Agreement:
         for sender in held:
             self._tell(sender, held[sender], "holds")
 
-    def enter(self, k: int, found: Found, held: Mapping[int, Found]) -> bool:
+    def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
         """Let a vehicle in that holds a plan, if all others say that they know of it."""
         others = [j for j in self.expected if j != k]
         known = [j for j in others if self._say(k, j, "asks")]
@@ -149,7 +149,7 @@ class Agreement:
         self.expected[k] = {j: [held[j]] for j in others}
         return True
 
-    def everything(self) -> Iterator[tuple[int, Found]]:
+    def everything(self) -> Iterator[tuple[int, OwnPlan]]:
         """All plans that somebody expects of a vehicle, with its number."""
         for known in self.expected.values():
             yield from ((j, one) for j, some in known.items() for one in some)
@@ -161,7 +161,7 @@ class Agreement:
             others.pop(k, None)
         self.unacknowledged = {pair for pair in self.unacknowledged if k not in pair}
 
-    def agree(self, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]) -> bool:
+    def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
         """Whether all others agree that a vehicle drives another plan than the one it holds.
 
         Who holds a plan that the other one is not proven past refuses.
@@ -175,7 +175,7 @@ class Agreement:
         return agreed
 
     def _agrees(
-        self, j: int, k: int, found: Found, holds: Found, refuses: Callable[[int], bool]
+        self, j: int, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]
     ) -> bool:
         """Whether a vehicle answers that it expects another plan of one that asks."""
         for _ in range(self.tries):
@@ -190,7 +190,7 @@ class Agreement:
                 return True
         return False
 
-    def announce(self, k: int, found: Found) -> None:
+    def announce(self, k: int, found: OwnPlan) -> None:
         """A vehicle drives another plan, whether the others agree or not.
 
         It repeats that some times, until each acknowledges it. Who has not received it asks in vain
@@ -207,20 +207,20 @@ class Agreement:
                 if self._say(j, k, "agrees"):
                     break
 
-    def knows(self, j: int, k: int, found: Found) -> bool:
+    def knows(self, j: int, k: int, found: OwnPlan) -> bool:
         """Whether a vehicle expects a plan of another one."""
         return any(one.course is found.course for one in self.expected[j].get(k, ()))
 
-    def _expect(self, j: int, k: int, found: Found) -> None:
+    def _expect(self, j: int, k: int, found: OwnPlan) -> None:
         """A vehicle knows for sure what another one drives."""
         self.expected[j][k] = [found]
         self.unacknowledged.discard((k, j))
 
-    def others_of(self, k: int) -> dict[int, list[Found]]:
+    def others_of(self, k: int) -> dict[int, list[OwnPlan]]:
         """The plans that a vehicle expects of each of the others."""
         return self.expected[k]
 
-    def unknown(self, held: Mapping[int, Found]) -> list[tuple[int, int]]:
+    def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
         """Pairs of which the first does not expect of the second what that drives.
 
         But for those that have not acknowledged an emergency.
@@ -232,7 +232,7 @@ class Agreement:
             if k != j and (k, j) not in self.unacknowledged and not self.knows(j, k, found)
         ]
 
-    def _tell(self, sender: int, found: Found, kind: Kind) -> None:
+    def _tell(self, sender: int, found: OwnPlan, kind: Kind) -> None:
         """A vehicle says to all others which plan it drives."""
         for receiver in self.expected:
             if receiver != sender and self._say(sender, receiver, kind):

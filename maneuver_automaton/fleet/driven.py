@@ -26,9 +26,8 @@ from maneuver_automaton.automaton.cutting import begin_state, end_state
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape
-from maneuver_automaton.fleet.levels import Levels
-from maneuver_automaton.fleet.log import FleetLog
-from maneuver_automaton.fleet.result import Closest
+from maneuver_automaton.fleet.courses import Levels
+from maneuver_automaton.fleet.result import Closest, FleetLog
 from maneuver_automaton.fleet.verdict import CONTACT, IN_SPACE, NEAR, plan_of_motion
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Omnidirectional
@@ -95,7 +94,7 @@ def verify_driven(log: FleetLog) -> DrivenVerdict:
     fleet, edges = log.problem, log.times
     clearances, jumps, defects = dict[str, float](), dict[str, float](), dict[str, str]()
     collisions: list[str] = []
-    bodies: list[_Body] = []
+    bodies: list[_DrivenBody] = []
     for name, problem, leaves in zip(fleet.names, fleet.problems, fleet.leaves, strict=True):
         way = whole_pieces(log, name)
         gone = log.arrived_s.get(name, math.inf) if leaves else math.inf
@@ -251,7 +250,7 @@ def _is_nominal(piece: Plan, automaton: Automaton) -> bool:
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class _Body:
+class _DrivenBody:
     """One shape of a vehicle: a ring and by how much it is larger, and its motion in each step."""
 
     name: str
@@ -281,11 +280,13 @@ class _Body:
         return shapely.points(corners[:, 0]) if len(self.ring) == 1 else shapely.polygons(corners)
 
 
-def _bodies(name: str, problem: Problem, way: Mapping[int, Plan], gone: float) -> Iterator[_Body]:
+def _bodies(
+    name: str, problem: Problem, way: Mapping[int, Plan], gone: float
+) -> Iterator[_DrivenBody]:
     for shapes, pieces in _parts(problem, way):
         motions = {step: Motion.of_plan(piece) for step, piece in pieces.items()}
         for ring, grown in _rings(shapes):
-            yield _Body(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
+            yield _DrivenBody(name=name, ring=ring, grown=grown, motions=motions, gone=gone)
 
 
 def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:
@@ -302,7 +303,7 @@ def _rings(shapes: Sequence[Shape]) -> Iterator[tuple[Array, float]]:
                 yield shapely.get_coordinates(shapely.get_exterior_ring(solid))[:-1], 0.0
 
 
-def _closest(bodies: Sequence[_Body], edges: Array, most: float) -> tuple[Closest, ...]:
+def _closest(bodies: Sequence[_DrivenBody], edges: Array, most: float) -> tuple[Closest, ...]:
     """Pairs of vehicles that come nearer than `most` [m], the nearest first."""
     found: dict[tuple[str, str], Closest] = {}
     for one, other in combinations(bodies, 2):
@@ -316,7 +317,7 @@ def _closest(bodies: Sequence[_Body], edges: Array, most: float) -> tuple[Closes
     return tuple(sorted(found.values(), key=lambda row: row.distance_m))
 
 
-def _least(one: _Body, other: _Body, edges: Array, most: float) -> Closest | None:
+def _least(one: _DrivenBody, other: _DrivenBody, edges: Array, most: float) -> Closest | None:
     """Least distance of two bodies and when; None if it is not below `most` [m]."""
     steps = np.array(sorted(one.motions.keys() & other.motions.keys()), dtype=np.int64)
     steps = steps[edges[steps] <= min(one.gone, other.gone)]
@@ -354,7 +355,9 @@ def _least(one: _Body, other: _Body, edges: Array, most: float) -> Closest | Non
     return Closest((one.name, other.name), at, max(best - FINE, 0.0))
 
 
-def _apart(one: _Body, other: _Body, times: Array, steps: Array, enough: float) -> Array:
+def _apart(
+    one: _DrivenBody, other: _DrivenBody, times: Array, steps: Array, enough: float
+) -> Array:
     """Distance (n,) of two bodies at times (n,) [s]; where it is more than enough, a lower bound.
 
     Overlapping discs have a distance below 0.

@@ -1,144 +1,147 @@
-"""Guarantees of a fleet's loop, asserted in every step."""
+"""Guarantees of a fleet's loop, asserted in every step, and what a step leaves: its log."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from maneuver_automaton.fleet.agreement import Knowledge
-from maneuver_automaton.fleet.conflicts import Course, Encounters, Meeting, meetings
-from maneuver_automaton.fleet.held import (
-    CONTACT,
-    LATER,
-    arrival,
-    left_to_pay,
-    why_not_free,
-)
-from maneuver_automaton.fleet.log import FleetGuarantee, FleetStep, FleetViolation, Swap
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.held import CONTACT, LATER, arrival, why_not_free
+from maneuver_automaton.fleet.meetings import Meeting, gap_between, meetings
+from maneuver_automaton.fleet.moment import MANY, Moment
+from maneuver_automaton.fleet.result import FleetGuarantee, FleetStep, FleetViolation, Swap
 from maneuver_automaton.fleet.verdict import nearest
 
-Frame = tuple[float, float, float]
-
 ACCURACY = 1e-7  # relative, of values: a maneuver that is cut costs as much to within this
-FAR = 1.0  # [m] beyond the margin: what keeps more is not measured
-FINE = 0.02  # [m] to which the distance proven is known
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Before:
-    """What was held when a step began, at its time."""
-
-    values: dict[int, float]  # cost of what is left
-    arrivals: dict[int, float]  # [s]
-    promised: dict[int, float]  # values that the last step said, at its own time
-
-    @classmethod
-    def of(
-        cls,
-        vehicles: Sequence[Vehicle],
-        held: Mapping[int, Found],
-        time: float,
-        last: FleetStep | None,
-    ) -> Before:
-        """At a step's begin."""
-        known = {} if last is None else last.values
-        return cls(
-            values={k: left_to_pay(vehicles[k], one, time) for k, one in held.items()},
-            arrivals={k: arrival(one) for k, one in held.items()},
-            promised={k: known.get(vehicles[k].name, math.inf) for k in held},
+def logged(now: Moment) -> FleetStep:
+    """All of the step, and the guarantees that it broke."""
+    state, proofs = now.state, now.state.proofs
+    # Who holds a plan that is not proven yet, and whose plans may come near it.
+    fresh = {
+        k: now.near_to(k, found)
+        for k, found in now.held.items()
+        if proofs.apart.get(k) is not found.course
+    }
+    few = len(now.held) <= MANY
+    looked_at = now.held if few else {k for j, near in fresh.items() for k in (j, *near)}
+    courses = {k: now.left_of(now.held[k]) for k in looked_at}
+    said = list(broken(now, courses, fresh))
+    now.violations += said
+    numbers = {one.name: one.number for one in now.vehicles}
+    apart, still = FleetGuarantee.APART, FleetGuarantee.STILL
+    unproven = {
+        numbers[name] for one in said if one.guarantee in (apart, still) for name in one.names
+    }
+    proofs.apart = {k: one.course for k, one in now.held.items() if k not in unproven}
+    pairs = [sorted(numbers[name] for name in one.names) for one in said if one.guarantee is apart]
+    proofs.crossing = {(one, other) for one, other in pairs}
+    gap = now.keep
+    if few:
+        held = {k: one.course for k, one in now.held.items()}
+        proofs.gap = gap_between(
+            courses, keep=now.keep, frame=now.frame, time=now.time, held=held, last=proofs.gap
         )
+        gap = proofs.gap.distance
+    names = [one.name for one in now.vehicles]
 
+    def named(chosen: Collection[int]) -> tuple[str, ...]:
+        return tuple(names[k] for k in chosen)
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class After:
-    """What is held when it ends."""
-
-    time: float
-    held: Mapping[int, Found]
-    courses: Mapping[int, Course]  # what is left of those that are looked at
-    off: Mapping[int, float]  # [m] beside the plans
-    disturbed: set[int]  # who has another plan not by an exchange of its own
-    in_group: set[int]  # who has another one by an exchange of several at once
-    swaps: Sequence[Swap]
-    tube_m: float
-    keep: float  # [m]
-    frame: Frame
-    fresh: Mapping[int, Sequence[int]] | None = None  # who holds another plan, and who is near it
+    return FleetStep(
+        number=now.number,
+        time=now.time,
+        poses={names[k]: now.poses[k] for k in now.held},
+        plans={names[k]: one.plan for k, one in now.held.items()},
+        driven={names[k]: now.beside.get(k) or now.from_here(k).plan for k in now.held},
+        values={names[k]: now.left_to_pay(k) for k in now.held},
+        arrivals={names[k]: arrival(one) for k, one in now.held.items()},
+        off_plan={names[k]: now.off[k] for k in now.held},
+        arrived=named(sorted(state.arrived & set(now.held))),
+        swaps=tuple(now.swaps),
+        asked=named(now.asked),
+        void=named(now.void),
+        refused=named(now.refused),
+        silent=named(sorted(state.silent & set(now.held))),
+        gap_m=0.0 if proofs.crossing else gap,
+        violations=tuple(now.violations),
+        solve_s=now.budget.elapsed,
+    )
 
 
 def broken(
-    vehicles: Sequence[Vehicle], agreement: Knowledge, before: Before, after: After
+    now: Moment,
+    courses: Mapping[int, FleetCourse],
+    fresh: Mapping[int, Sequence[int]] | None = None,
 ) -> Iterator[FleetViolation]:
-    """The guarantees that a step broke."""
-    names = [one.name for one in vehicles]
-    yield from _too_near(names, after)
-    for k in after.held:
-        if after.off[k] > after.tube_m:
-            reason = f"it is {after.off[k]:.3g} m beside its plan, need at most {after.tube_m:g} m"
+    """The guarantees that a step broke; by what is left of those that are looked at.
+
+    Only who is `fresh` holds a plan that it did not hold a step ago, and who is near it: the others
+    were proven apart and free for all later times.
+    """
+    names, tube = [one.name for one in now.vehicles], now.tube
+    for row in _met(now, courses, fresh):
+        least = nearest(courses[row.one], courses[row.other]).distance
+        # The kernel cannot prove them apart, and the audit's bounds neither.
+        if least <= max(now.keep - CONTACT, CONTACT):
+            pair = (names[row.one], names[row.other])
+            reason = f"at {row.time:.6g} s they come within {least:.6g} m, need {now.keep:g} m"
+            yield FleetViolation(FleetGuarantee.APART, pair, reason)
+    for k in now.held:
+        if now.off[k] > tube:
+            reason = f"it is {now.off[k]:.3g} m beside its plan, need at most {tube:g} m"
             yield FleetViolation(FleetGuarantee.HELD, (names[k],), reason)
-        fresh = after.fresh is None or k in after.fresh
-        if fresh and (said := why_not_free(vehicles[k], after.courses[k])):
+        if fresh is not None and k not in fresh:
+            continue
+        if said := why_not_free(now.vehicles[k], courses[k]):
             yield FleetViolation(FleetGuarantee.STILL, (names[k],), said)
-    yield from _costlier(vehicles, before, after)
-    yield from _out_of_order(after.swaps)
-    for j, k in agreement.unknown(after.held):
+    yield from _costlier(now)
+    yield from _out_of_order(now.swaps)
+    for j, k in now.state.agreement.unknown(now.held):
         reason = f"{names[j]} does not know what it drives"
         yield FleetViolation(FleetGuarantee.KNOWN, (names[k],), reason)
 
 
-def _too_near(names: Sequence[str], after: After) -> Iterator[FleetViolation]:
-    """Pairs that the kernel cannot prove apart, and the audit's bounds neither.
-
-    Only pairs of which one holds a plan that it did not hold a step ago, if these are given: the
-    others were proven apart for all later times.
-    """
-    for row in _met(after):
-        least = nearest(after.courses[row.one], after.courses[row.other]).distance
-        if least <= max(after.keep - CONTACT, CONTACT):
-            pair = (names[row.one], names[row.other])
-            reason = f"at {row.time:.6g} s they come within {least:.6g} m, need {after.keep:g} m"
-            yield FleetViolation(FleetGuarantee.APART, pair, reason)
-
-
-def _met(after: After) -> list[Meeting]:
-    if after.fresh is None:
-        return meetings(after.courses, keep=after.keep, frame=after.frame)
+def _met(
+    now: Moment, courses: Mapping[int, FleetCourse], fresh: Mapping[int, Sequence[int]] | None
+) -> list[Meeting]:
+    """Pairs that the kernel cannot prove apart."""
+    if fresh is None:
+        return meetings(courses, keep=now.keep, frame=now.frame)
     found = {}
-    for k, others in after.fresh.items():
-        courses = {j: after.courses[j] for j in (k, *others)}
-        for row in meetings(courses, keep=after.keep, among=[k], frame=after.frame):
+    for k, others in fresh.items():
+        some = {j: courses[j] for j in (k, *others)}
+        for row in meetings(some, keep=now.keep, among=[k], frame=now.frame):
             found[row.one, row.other] = row
     return sorted(found.values(), key=lambda row: (row.time, row.one, row.other))
 
 
-def _costlier(
-    vehicles: Sequence[Vehicle], before: Before, after: After
-) -> Iterator[FleetViolation]:
+def _costlier(now: Moment) -> Iterator[FleetViolation]:
     """Whose value rose, or who arrives later, and whether the sum did."""
+    vehicles, last = now.vehicles, now.state.last
+    said_then = {} if last is None else last.values
     sum_now = sum_before = 0.0
     fewer_arrive_not = False  # then the sum, which was infinite, has fallen
-    for k, found in after.held.items():
-        if k in after.disturbed:
+    for k, found in now.held.items():
+        if k in now.disturbed:
             continue
-        was, promised = before.values[k], before.promised[k]
-        now = left_to_pay(vehicles[k], found, after.time)
+        name, (was, arrived) = vehicles[k].name, now.before[k]
+        value, promised = now.left_to_pay(k), said_then.get(name, math.inf)
         if was < math.inf:
-            sum_now, sum_before = sum_now + now, sum_before + was
-        fewer_arrive_not = fewer_arrive_not or now < was == math.inf
+            sum_now, sum_before = sum_now + value, sum_before + was
+        fewer_arrive_not = fewer_arrive_not or value < was == math.inf
         rounding = ACCURACY * (1.0 + abs(was))
-        costlier = now > was + rounding and k not in after.in_group
+        costlier = value > was + rounding and k not in now.in_group
         if costlier or was > promised + rounding:
-            reason = f"the value is {now:.9g}, was {was:.9g} and {promised:.9g} a step before"
-            yield FleetViolation(FleetGuarantee.DECREASE, (vehicles[k].name,), reason)
-        later = arrival(found) - before.arrivals[k] if arrival(found) < math.inf else 0.0
-        if later > LATER * (1.0 + abs(before.arrivals[k])) and k not in after.in_group:
+            reason = f"the value is {value:.9g}, was {was:.9g} and {promised:.9g} a step before"
+            yield FleetViolation(FleetGuarantee.DECREASE, (name,), reason)
+        later = arrival(found) - arrived if arrival(found) < math.inf else 0.0
+        if later > LATER * (1.0 + abs(arrived)) and k not in now.in_group:
             reason = f"it arrives {later:.3g} s later than its last plan said"
-            yield FleetViolation(FleetGuarantee.ARRIVAL, (vehicles[k].name,), reason)
+            yield FleetViolation(FleetGuarantee.ARRIVAL, (name,), reason)
     if not fewer_arrive_not and sum_now > sum_before + ACCURACY * (1.0 + abs(sum_before)):
-        everybody = tuple(vehicles[k].name for k in after.held)
+        everybody = tuple(vehicles[k].name for k in now.held)
         reason = f"the sum is {sum_now:.9g}, was {sum_before:.9g}"
         yield FleetViolation(FleetGuarantee.DECREASE, everybody, reason)
 
@@ -154,89 +157,3 @@ def _out_of_order(swaps: Sequence[Swap]) -> Iterator[FleetViolation]:
             yield FleetViolation(FleetGuarantee.ORDER, swap.names, reason)
         versions.update(known)
         versions.update(swap.holds)
-
-
-class Gap(NamedTuple):
-    """A distance that any two vehicles are proven to keep from a time on, and what shows it."""
-
-    distance: float  # [m]
-    nearest: Meeting | None  # that comes within 2 cm more; None: nobody is looked at so far out
-    held: Mapping[int, Course]  # the courses of which it is proven
-
-
-def gap_between(
-    courses: Mapping[int, Course],
-    *,
-    keep: float,
-    frame: Frame,
-    time: float = -math.inf,
-    held: Mapping[int, Course] | None = None,
-    last: Gap | None = None,
-) -> Gap:
-    """A distance [m] that any two vehicles are proven to keep from now on, to within 2 cm.
-
-    At most a metre more than the distance to keep; 0 if not even that is proven.
-
-    Parameters
-    ----------
-    courses : mapping of int to Course
-        What is left of those that are held.
-    keep : float
-        Distance to keep [m].
-    frame : (x, y, 0)
-        What places are counted from.
-    time : float
-        Now [s].
-    held : mapping of int to Course, optional
-        What is held; what is left of it if omitted.
-    last : Gap, optional
-        Of a step before. It still holds if those that hold another plan since keep it too, and the
-        two that come nearest have not passed yet: the value is the same as without it.
-    """
-    held = courses if held is None else held
-    if len(courses) < 2:
-        return Gap(math.inf, None, held)
-    if last is not None and _still_holds(last, courses, frame=frame, time=time, held=held):
-        return last._replace(held=held)
-    low, most, more = keep, keep + FAR, 2.0 * FINE
-    rows = meetings(courses, keep=most, frame=frame)
-    if not rows:
-        return Gap(most, None, held)
-    near = sorted({k for row in rows for k in (row.one, row.other)})
-    among = {row.one for row in rows}
-    met = Encounters({k: courses[k] for k in near}, frame).within
-    if met(keep, among):
-        return Gap(0.0, None, held)
-    nearest, high = rows[0], math.inf
-    while high == math.inf:
-        wanted = min(low + more, most)
-        if wanted >= most:
-            high = most
-        elif rows := met(wanted, among):
-            high, nearest = wanted, rows[0]
-        else:
-            low, more = wanted, 2.0 * more
-    while high - low > FINE:
-        middle = 0.5 * (low + high)
-        if rows := met(middle, among):
-            high, nearest = middle, rows[0]
-        else:
-            low = middle
-    return Gap(low, nearest, held)
-
-
-def _still_holds(
-    last: Gap,
-    courses: Mapping[int, Course],
-    *,
-    frame: Frame,
-    time: float,
-    held: Mapping[int, Course],
-) -> bool:
-    """Whether a distance is what was proven a step before."""
-    fresh = {k for k, one in held.items() if last.held.get(k) is not one}
-    if last.nearest is None or last.nearest.time < time:
-        return False
-    if {last.nearest.one, last.nearest.other} & (fresh | (set(last.held) - set(held))):
-        return False
-    return not (fresh and meetings(courses, keep=last.distance, among=fresh, frame=frame))

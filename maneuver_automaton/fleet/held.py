@@ -24,29 +24,93 @@ from maneuver_automaton.automaton.cutting import (
     tail_of,
     with_samples_at,
 )
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import Obstacle, Shape
+from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.world import own_frame, world_of
-from maneuver_automaton.fleet.arriving import aimed_at, with_room
-from maneuver_automaton.fleet.conflicts import Course
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.problem import FleetProblem
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan
 from maneuver_automaton.fleet.verdict import nearest_obstacle
 from maneuver_automaton.planning.tracking import PROVEN, PROVEN_SHARE
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import allowed, within
 from maneuver_automaton.receding_horizon.reanchoring import reanchored
 from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on
 
+LEFT = 0.5  # share of a tolerance that is left at least
+
+
+def with_room(problem: Problem, tube_m: float) -> Problem:
+    """The problem with goals whose tolerances are less by what a vehicle may be beside its plan.
+
+    A plan that ends at the edge of a tolerance arrives only where nothing disturbs it; one that
+    ends within these arrives from anywhere in its tube. At least half of a tolerance is left.
+
+    Parameters
+    ----------
+    problem : Problem
+    tube_m : float
+        How far any point of the body may be from where its plan has it [m].
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0)})
+    >>> goal = Goal([4, 0, 0], tolerance_m=0.15, tolerance_rad=0.3)
+    >>> there = with_room(Problem(robot, [0, 0, 0], goal, footprint=Disc(0.5)), 0.05)
+    >>> [(round(one.tolerance_m, 3), round(one.tolerance_rad, 3)) for one in there.goals]
+    [(0.1, 0.2)]
+    """
+    body = body_of(problem.footprint)
+    reach = math.hypot(body.middle_x, body.middle_y) + body.reach
+    turn = 2.0 * math.asin(min(1.0, tube_m / (2.0 * reach))) if reach > 0.0 else math.pi
+    goals = tuple(
+        replace(
+            goal,
+            tolerance_m=max(goal.tolerance_m - tube_m, LEFT * goal.tolerance_m),
+            tolerance_rad=max(goal.tolerance_rad - turn, LEFT * goal.tolerance_rad),
+        )
+        for goal in problem.goals
+    )
+    return replace(problem, goals=goals)
+
+
+def fleet_with_room(fleet: FleetProblem, tube_m: float) -> FleetProblem:
+    """The fleet as a loop plans it at first: each with goals that keep room; see `with_room`.
+
+    With inertia by maneuvers of the library alone: a motion in one piece could not be left where
+    another one breaks down.
+    """
+    roomy = (with_room(one, tube_m) for one in fleet.problems)
+    words = (replace(one, search=replace(one.search, polish=False)) for one in roomy)
+    return replace(fleet, problems=tuple(words))
+
+
+def tube_of(fleet: FleetProblem, tube_m: float | None) -> float:
+    """How far any point of a body may be beside its plan [m]; half of the margin if not given."""
+    return 0.5 * fleet.margin if tube_m is None else tube_m
+
+
+def aimed_at(plan: Plan, goal: Goal) -> Goal:
+    """A goal as a plan aims at it: where the plan ends, if that is beside but within tolerance."""
+    if not within(plan.end, goal) or within(
+        plan.end, replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
+    ):
+        return goal
+    return replace(goal, pose=plan.end)
+
+
 CONTACT = 1e-9  # [m] what is closer touches
 LATER = 1e-9  # [s], relative too: what arrives by so much later is as soon
 
 
-def resting(vehicle: Vehicle, pose: Array, time: float, found: Found | None = None) -> Found:
+def resting(
+    vehicle: FleetMember, pose: Array, time: float, found: OwnPlan | None = None
+) -> OwnPlan:
     """A vehicle's plan if it has none: it stays where it is, and does not arrive.
 
     What it carries stays as it is too: as at the end of a plan, or else as in its first trim.
@@ -61,12 +125,12 @@ def resting(vehicle: Vehicle, pose: Array, time: float, found: Found | None = No
     return _not_leading(vehicle, Plan(pose, (rest,), durations=[0.0], start_time=time))
 
 
-def _not_leading(vehicle: Vehicle, plan: Plan) -> Found:
+def _not_leading(vehicle: FleetMember, plan: Plan) -> OwnPlan:
     """A plan that does not arrive: the vehicle stays where it ends, also if it was to leave."""
-    return Found(plan, math.inf, 0, replace(vehicle.course_of(plan), until=math.inf))
+    return OwnPlan(plan, math.inf, 0, replace(vehicle.course_of(plan), until=math.inf))
 
 
-def given_up(found: Found) -> Found:
+def given_up(found: OwnPlan) -> OwnPlan:
     """A plan that is driven to its end, but does not arrive there."""
     course = found.course
     if course.until < math.inf:
@@ -74,18 +138,18 @@ def given_up(found: Found) -> Found:
     return replace(found, cost=math.inf, course=course)
 
 
-def leads(found: Found) -> bool:
+def leads(found: OwnPlan) -> bool:
     """Whether a plan arrives."""
     return found.cost < math.inf
 
 
-def arrival(found: Found) -> float:
+def arrival(found: OwnPlan) -> float:
     """When a plan arrives [s]; inf if it does not."""
     return found.arrival if leads(found) else math.inf
 
 
 @functools.lru_cache(maxsize=4096)  # a step asks for the same ones several times
-def rest_of_plan(vehicle: Vehicle, found: Found, time: float) -> Plan:
+def rest_of_plan(vehicle: FleetMember, found: OwnPlan, time: float) -> Plan:
     """What is left of a plan from a time on [s]."""
     plan = found.plan
     if time <= plan.start_time or not plan.trims:
@@ -94,7 +158,7 @@ def rest_of_plan(vehicle: Vehicle, found: Found, time: float) -> Plan:
     return tail_of(cut, time - plan.start_time)
 
 
-def begin_of(vehicle: Vehicle, plan: Plan, lasting: float) -> Plan:
+def begin_of(vehicle: FleetMember, plan: Plan, lasting: float) -> Plan:
     """The first seconds of a plan."""
     if not plan.trims or plan.duration <= lasting:
         return plan
@@ -103,7 +167,7 @@ def begin_of(vehicle: Vehicle, plan: Plan, lasting: float) -> Plan:
 
 
 @functools.lru_cache(maxsize=4096)
-def left_to_pay(vehicle: Vehicle, found: Found, time: float) -> float:
+def left_to_pay(vehicle: FleetMember, found: OwnPlan, time: float) -> float:
     """Cost of what is left of a plan; inf if it does not arrive."""
     if not leads(found) or time <= found.plan.start_time:
         return found.cost
@@ -112,12 +176,12 @@ def left_to_pay(vehicle: Vehicle, found: Found, time: float) -> float:
     return vehicle.problem.cost_of(rest_of_plan(vehicle, found, time))
 
 
-def is_over(found: Found, time: float) -> bool:
+def is_over(found: OwnPlan, time: float) -> bool:
     """Whether nothing of a plan is left but to stay."""
     return time >= found.arrival - NOTHING
 
 
-def goes_on(vehicle: Vehicle, found: Found, other: Found, time: float) -> bool:
+def goes_on(vehicle: FleetMember, found: OwnPlan, other: OwnPlan, time: float) -> bool:
     """Whether another plan has, at a time [s], the reduced state in which the held one then is."""
     rests = [rest_of_plan(vehicle, one, time) for one in (found, other)]
     if switches_at_will(vehicle.problem) or not all(one.trims for one in rests):
@@ -125,7 +189,7 @@ def goes_on(vehicle: Vehicle, found: Found, other: Found, time: float) -> bool:
     return same_state(begin_state(rests[1]), begin_state(rests[0]))
 
 
-def off_plan(vehicle: Vehicle, found: Found, time: float, pose: Array) -> float:
+def off_plan(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> float:
     """How far any point of the body is from where its plan has it [m]: an upper bound."""
     return float(beside(pose, found.plan.pose_at(time), reach_of(found, time)))
 
@@ -139,7 +203,7 @@ def beside(poses: Array, planned: Array, reach: float) -> Array:
     return np.asarray(distance + 2.0 * reach * np.sin(0.5 * np.minimum(turn, math.pi)))
 
 
-def reach_of(found: Found, time: float) -> float:
+def reach_of(found: OwnPlan, time: float) -> float:
     """How far any point of a vehicle is from its pose at a time of its plan [m]."""
     bodies = [body_of(shapes) for shapes in found.course.shapes]
     reaches = [math.hypot(body.middle_x, body.middle_y) + body.reach for body in bodies]
@@ -152,7 +216,7 @@ def reach_of(found: Found, time: float) -> float:
 
 
 def onward(
-    vehicle: Vehicle, found: Found, time: float, after: float = 0.0
+    vehicle: FleetMember, found: OwnPlan, time: float, after: float = 0.0
 ) -> tuple[Plan | None, Problem | None]:
     """What is committed from a time on, `after` seconds at least, and the problem from its end.
 
@@ -201,7 +265,7 @@ def _from_where_it_stands(own: Problem, rest: Plan, time: float) -> Problem | No
     return None if trim is None else replace(here, start_trim=trim.name)
 
 
-def _next_in_library(vehicle: Vehicle, rest: Plan, busy: float) -> tuple[float, str] | None:
+def _next_in_library(vehicle: FleetMember, rest: Plan, busy: float) -> tuple[float, str] | None:
     """When, `busy` seconds on at least, a plan is next in a trim of the library, and in which."""
     names, begin = vehicle.problem.automaton.trim_names, 0.0
     between = (*(rest.maneuvers or (None,) * (len(rest.trims) - 1)), None)
@@ -224,45 +288,7 @@ def _standing(rest: Plan, lasting: float) -> Plan:
     return Plan(rest.start, (trim,), durations=[lasting], start_time=rest.start_time)
 
 
-def proposal(
-    vehicle: Vehicle,
-    found: Found,
-    *,
-    time: float,
-    after: float,
-    others: list[Obstacle],
-    budget: Budget,
-    known: float,
-    most: int,
-    tube_m: float = 0.0,
-    keep: float = math.inf,
-) -> tuple[Found | None, Found | None]:
-    """Another plan past the others that costs less than `known`, and the way alone, if that does.
-
-    Both from a time on, with what is committed. They keep the vehicle's margin, or a distance [m]
-    that is less, and end where it arrives from anywhere in its tube.
-    """
-    head, problem = onward(vehicle, found, time, after)
-    if problem is None:
-        return None, None
-    problem = with_room(problem, tube_m)
-    if keep < problem.margin:
-        problem = replace(problem, margin=keep)
-    there = Vehicle(
-        vehicle.number, vehicle.name, problem, vehicle.leaves, vehicle.grown, vehicle.workspace
-    )
-    there.plan_alone(budget, bounded=False)
-    spent = 0.0 if head is None else vehicle.problem.cost_of(head)
-    if there.alone is None or not there.alone.cost + spent < known:
-        return None, None
-    alone = _after(vehicle, head, there.alone)
-    if budget.is_over:
-        return None, alone
-    other = there.past(others, budget, most=most, known=known - spent)
-    return None if other is None else _after(vehicle, head, other), alone
-
-
-def _after(vehicle: Vehicle, head: Plan | None, found: Found) -> Found:
+def after_head(vehicle: FleetMember, head: Plan | None, found: OwnPlan) -> OwnPlan:
     """What is committed, then a plan from its end."""
     if head is None:
         return found
@@ -271,12 +297,12 @@ def _after(vehicle: Vehicle, head: Plan | None, found: Found) -> Found:
         follows = followed_by if switches_at_will(vehicle.problem) else joined
         plan = follows(head, found.plan)
     cost = vehicle.problem.cost_of(plan)
-    return Found(plan, cost, found.goal_index, vehicle.course_of(plan))
+    return OwnPlan(plan, cost, found.goal_index, vehicle.course_of(plan))
 
 
 def rejoined(
-    vehicle: Vehicle, found: Found, time: float, pose: Array, tube_m: float
-) -> Iterator[Found]:
+    vehicle: FleetMember, found: OwnPlan, time: float, pose: Array, tube_m: float
+) -> Iterator[OwnPlan]:
     """A plan made to start where the vehicle was measured, in several ways; it arrives if that did.
 
     As it is, if it then ends where the vehicle arrives from anywhere in its tube; the same word
@@ -301,10 +327,10 @@ def rejoined(
     asis = [moved] if within(moved.end, goal) else []
     for plan in itertools.chain(asis, plans) if well else itertools.chain(plans, asis):
         cost = vehicle.problem.cost_of(plan)
-        yield Found(plan, cost, found.goal_index, vehicle.course_of(plan))
+        yield OwnPlan(plan, cost, found.goal_index, vehicle.course_of(plan))
 
 
-def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
+def stopping(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> OwnPlan:
     """The plan that comes to rest soonest; what is held where nothing stops it."""
     rest = rest_of_plan(vehicle, found, time)
     if switches_at_will(vehicle.problem) or not moves_on(rest):
@@ -323,7 +349,7 @@ def stopping(vehicle: Vehicle, found: Found, time: float, pose: Array) -> Found:
     return _not_leading(vehicle, replace(soonest, start=pose))
 
 
-def _without_coasts(vehicle: Vehicle, rest: Plan) -> Plan | None:
+def _without_coasts(vehicle: FleetMember, rest: Plan) -> Plan | None:
     """What is left of a plan, by its maneuvers alone, until it can rest; None if it never can.
 
     A trim may be left at any moment: its motion is steady.
@@ -369,7 +395,7 @@ def _brake(problem: Problem) -> Plan | None:
     )
 
 
-def why_not_free(vehicle: Vehicle, course: Course, keep: float = math.inf) -> str:
+def why_not_free(vehicle: FleetMember, course: FleetCourse, keep: float = math.inf) -> str:
     """Why a course is not free of what is not of the fleet; empty if it is.
 
     By the kernels, and where they cannot prove it by the audit's bounds. It keeps the vehicle's
@@ -418,7 +444,7 @@ def _is_free(
     return bool((free >= lasting).all())
 
 
-def distance_to_obstacles(vehicle: Vehicle, course: Course) -> float:
+def distance_to_obstacles(vehicle: FleetMember, course: FleetCourse) -> float:
     """A lower bound of the distance [m] of a course to what is not of the fleet."""
     problem = vehicle.problem
     levels = course.levels if problem.start.size > 3 else None

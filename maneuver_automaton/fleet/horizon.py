@@ -20,17 +20,15 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.fleet.agreement import Agreement, Knowledge, Lossless, Lost
-from maneuver_automaton.fleet.arriving import tube_of
-from maneuver_automaton.fleet.asking import Workers
-from maneuver_automaton.fleet.held import given_up
-from maneuver_automaton.fleet.horizon_step import step_of
-from maneuver_automaton.fleet.log import FleetStep
-from maneuver_automaton.fleet.loop_state import LoopSettings, LoopState
-from maneuver_automaton.fleet.moment import Moment
+from maneuver_automaton.fleet.exchanges import exchange, exchange_what_is_due, go_on
+from maneuver_automaton.fleet.guarantees import logged
+from maneuver_automaton.fleet.held import arrival, given_up, tube_of
+from maneuver_automaton.fleet.moment import Effort, LoopSettings, LoopState, Moment
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
-from maneuver_automaton.fleet.vehicles import prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.result import FleetResult, FleetStep
+from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Problem
 
@@ -135,32 +133,28 @@ class FleetHorizon:
             raise ValueError(f"fleet horizon: delay_steps must be at least 0, got {delay_steps}")
         vehicles = vehicles_of(fleet)
         self.fleet = fleet
-        self.state = LoopState(
-            fleet,
-            LoopSettings(
-                step=step,
-                margin=margin,
-                tube_m=tube_of(fleet, tube_m),
-                time_limit=time_limit,
-                swaps_per_step=swaps_per_step,
-                at_once=at_once,
-                group_size=group_size if lost is None else 1,
-                delay_steps=delay_steps,
-            ),
-            vehicles,
-            self._knowledge(lost),
-            _plans_of(first, vehicles),
+        settings = LoopSettings(
+            step=step,
+            margin=margin,
+            keep=fleet.margin,
+            tube_m=tube_of(fleet, tube_m),
+            time_limit=time_limit,
+            swaps_per_step=swaps_per_step,
+            at_once=at_once,
+            group_size=group_size if lost is None else 1,
+            delay_steps=delay_steps,
             workers=workers,
         )
+        knowledge: Knowledge
+        if lost is None:
+            knowledge = Lossless(lambda k, found: len(self._now.near_to(k, found)))
+        else:
+            knowledge = Agreement(fleet.names, lost)
+        self.state = LoopState(settings, vehicles, knowledge, _plans_of(first, vehicles))
         self._numbers = {name: k for k, name in enumerate(fleet.names)}
         # What is prepared for obstacles that vehicles have got since, which are kept alive.
         self._workspaces: dict[tuple[int, ...], tuple[tuple[AnyObstacle, ...], Workspace]] = {}
         prepare_vehicles(vehicles)
-
-    def _knowledge(self, lost: Lost | None) -> Knowledge:
-        if lost is not None:
-            return Agreement(self.fleet.names, lost)
-        return Lossless(lambda k, found: self._now.how_many_near(k, found))
 
     def step(
         self,
@@ -201,8 +195,22 @@ class FleetHorizon:
             )
         stopped = {self._number_of(name) for name in broken_down}
         budget = Budget.from_now(state.settings.time_limit)
-        self._now = Moment(state, at, poses, budget)
-        state.last = step_of(self._now, stopped)
+        now = self._now = Moment(state, at, poses, budget)
+        for k in [k for k in now.held if k not in now.poses]:
+            del now.held[k]
+        let_in(now)
+        now.before = {k: (now.left_to_pay(k), arrival(one)) for k, one in now.held.items()}
+        state.agreement.begin(now.number, now.held)
+        rejoin(now)
+        stop(now, stopped & set(now.held))
+        plan_anew(now)
+        note_arrivals(now)
+        exchange_what_is_due(now)
+        go_on(now)
+        exchange(now)
+        searched = budget.elapsed
+        state.last = logged(now)
+        state.note_end(budget.elapsed - min(searched, now.searches.seconds))
         return state.last
 
     def assign(self, name: str, problem: Problem) -> None:
@@ -238,14 +246,15 @@ class FleetHorizon:
         key = tuple(map(id, problem.obstacles))
         kept = self._workspaces.setdefault(key, (problem.obstacles, new.workspace))[1]
         own = replace(new.problem, obstacles=kept.obstacles)
-        state.vehicles[k] = Vehicle(k, name, own, old.leaves, old.grown, kept)
+        state.vehicles[k] = FleetMember(k, name, own, old.leaves, old.grown, kept)
         state.arrived.discard(k)
-        for known in (state.settled, state.in_vain, state.due, state.attempts, state.gains):
-            known.pop(k, None)
+        state.due.pop(k, None)
         state.stopped.pop(k, None)
+        known = state.efforts[k]
+        state.efforts[k] = Effort(known.version, known.lineage)
         if k in state.held:
             state.held[k] = given_up(state.held[k])
-            state.lineage[k] += 1
+            state.efforts[k].lineage += 1
             state.assigned.add(k)
 
     def _number_of(self, name: str) -> int:
@@ -267,7 +276,7 @@ class FleetHorizon:
         return dict(sorted(poses.items()))
 
 
-def _plans_of(first: FleetResult | None, vehicles: Sequence[Vehicle]) -> dict[int, Found]:
+def _plans_of(first: FleetResult | None, vehicles: Sequence[FleetMember]) -> dict[int, OwnPlan]:
     """The plans of an answer, by number."""
     if first is None:
         return {}
@@ -277,7 +286,7 @@ def _plans_of(first: FleetResult | None, vehicles: Sequence[Vehicle]) -> dict[in
         if result is None or result.plan is None:
             continue
         cost = one.problem.cost_of(result.plan)
-        known[one.number] = Found(
+        known[one.number] = OwnPlan(
             result.plan, cost, result.goal_index or 0, one.course_of(result.plan)
         )
     return known

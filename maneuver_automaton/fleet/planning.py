@@ -20,16 +20,20 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.fleet.conflicts import Course, components, meetings
-from maneuver_automaton.fleet.groups import by_conflicts, by_priorities
-from maneuver_automaton.fleet.one_at_a_time import one_at_a_time
+from maneuver_automaton.fleet.coordination import (
+    HeldPlans,
+    Turns,
+    by_conflicts,
+    by_priorities,
+    one_at_a_time,
+)
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.turns import Held, Turns
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, vehicles_of
 from maneuver_automaton.fleet.verdict import verified
-from maneuver_automaton.fleet.worker_pool import Done, How, Task, WorkerPool
+from maneuver_automaton.fleet.workers import Done, How, PoolTask, WorkerPool
 
 Objective = Literal["sum", "last"]
 
@@ -119,19 +123,19 @@ def plan_fleet(
         return search.run(orders, max_rounds)
 
 
-def _alone(turns: Turns, task: Task) -> Done:
+def _alone(turns: Turns, task: PoolTask) -> Done:
     """The ways of some by themselves."""
     for k in task.numbers:
         turns.vehicles[k].plan_alone(turns.budget)
     return Done(None)
 
 
-def _in_order(turns: Turns, task: Task) -> Done:
+def _in_order(turns: Turns, task: PoolTask) -> Done:
     """Plans in an order."""
     return Done(turns.one_after_another(task.numbers, task.held), turns.queries)
 
 
-def _better(turns: Turns, task: Task) -> Done:
+def _better(turns: Turns, task: PoolTask) -> Done:
     """Better plans of a group, or better ways of some by themselves."""
     if task.how == "alone":
         for k in task.numbers:
@@ -152,7 +156,7 @@ class _FleetSearch:
     budget: Budget
     seed: int
     on_better: Callable[[float, float], None] | None
-    held: Held = field(default_factory=dict)
+    held: HeldPlans = field(default_factory=dict)
     reasons: dict[int, str] = field(default_factory=dict)
     order: list[int] = field(default_factory=list)
     improvements: list[tuple[float, float]] = field(default_factory=list)
@@ -168,7 +172,7 @@ class _FleetSearch:
         return self.pool.fleet
 
     @property
-    def vehicles(self) -> list[Vehicle]:
+    def vehicles(self) -> list[FleetMember]:
         """Those of the fleet."""
         return self.pool.vehicles
 
@@ -190,7 +194,7 @@ class _FleetSearch:
 
     def _plan_alone(self) -> None:
         """The way of each by itself."""
-        tasks = [Task((one.number,), {}) for one in self.vehicles]
+        tasks = [PoolTask((one.number,), {}) for one in self.vehicles]
         for _ in self.pool.each(_alone, tasks, self.budget.stage(ALONE_SHARE)):
             pass
         for one in self.vehicles:
@@ -237,16 +241,16 @@ class _FleetSearch:
                 self.reasons[k] = self._who_is_in_the_way(k)
 
     def _one_at_a_time(
-        self, able: Sequence[int], n_th: int, rng: np.random.Generator, best: Held
-    ) -> Held:
+        self, able: Sequence[int], n_th: int, rng: np.random.Generator, best: HeldPlans
+    ) -> HeldPlans:
         """Plans in which one drives at a time, in an order, if these are better."""
         order = self._order_of(able, n_th, rng)
         found = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
         return found if self._rank(found) < self._rank(best) else best
 
     def _in_orders(
-        self, drawn: Sequence[list[int]], until: Budget, best: Held | None = None
-    ) -> Held:
+        self, drawn: Sequence[list[int]], until: Budget, best: HeldPlans | None = None
+    ) -> HeldPlans:
         """The best plans of some orders past those that are held: the first that are complete.
 
         As many at a time as there are processes.
@@ -255,7 +259,7 @@ class _FleetSearch:
             if until.is_over and best is not None:
                 break
             chosen = drawn[begin : begin + self.pool.jobs]
-            tasks = [Task(tuple(order), self.held) for order in chosen]
+            tasks = [PoolTask(tuple(order), self.held) for order in chosen]
             for order, done in zip(chosen, self.pool.each(_in_order, tasks, until), strict=True):
                 planned = done.held or {}
                 self.queries += done.queries
@@ -275,11 +279,11 @@ class _FleetSearch:
 
         return sorted(numbers, key=key)
 
-    def _rank(self, held: Mapping[int, Found]) -> tuple[int, float]:
+    def _rank(self, held: Mapping[int, OwnPlan]) -> tuple[int, float]:
         """How good plans are: as many as can be, then by the objective."""
         return -len(held), self._value(held)
 
-    def _value(self, held: Mapping[int, Found]) -> float:
+    def _value(self, held: Mapping[int, OwnPlan]) -> float:
         if self.objective == "last":
             # Among equal arrivals the one with the lesser sum.
             last = max((one.arrival for one in held.values()), default=0.0)
@@ -304,7 +308,7 @@ class _FleetSearch:
             idle += at_once - len(tasks)
             ways = unseen[: min(at_once, left - len(tasks) if max_rounds is not None else left)]
             del unseen[: len(ways)]
-            tasks += [Task((k,), {}, "alone") for k in ways]
+            tasks += [PoolTask((k,), {}, "alone") for k in ways]
             if left <= 0 or not (tasks or self._losing(set())):
                 return
             self.rounds += len(tasks)
@@ -320,9 +324,9 @@ class _FleetSearch:
                 else:
                     idle += 1
 
-    def _groups(self, most: int, rng: np.random.Generator) -> list[Task]:
+    def _groups(self, most: int, rng: np.random.Generator) -> list[PoolTask]:
         """Groups to plan anew, no vehicle twice."""
-        tasks: list[Task] = []
+        tasks: list[PoolTask] = []
         busy: set[int] = set()
         for _ in range(most):
             task = self._task(rng, busy)
@@ -331,7 +335,7 @@ class _FleetSearch:
                 busy.update(task.numbers)
         return tasks
 
-    def _task(self, rng: np.random.Generator, busy: set[int]) -> Task | None:
+    def _task(self, rng: np.random.Generator, busy: set[int]) -> PoolTask | None:
         """A group and how to plan it, unless that was asked of the same plans before."""
         open_ = [row for row in self.whole if not busy & set(row[0])]
         first = next((row for row in open_ if self._lost(row[0]) > LOST_BY[row[1]]), None)
@@ -352,9 +356,9 @@ class _FleetSearch:
         self.asked.add(asked)
         others = {k: one for k, one in self.held.items() if k not in group}
         priced = math.fsum(self.held[k].cost for k in group)
-        return Task(group, others, how, priced if self.objective == "sum" else math.inf)
+        return PoolTask(group, others, how, priced if self.objective == "sum" else math.inf)
 
-    def _is_taken(self, now: Held, taken: set[int]) -> bool:
+    def _is_taken(self, now: HeldPlans, taken: set[int]) -> bool:
         """Take plans of a group if they are better, and keep apart from those taken before."""
         if not self._value({**self.held, **now}) < self._value(self.held) * (1.0 - WORTH):
             return False
@@ -378,12 +382,11 @@ class _FleetSearch:
         first = int(rng.choice(list(losing), p=weights / weights.sum()))
         size = int(rng.integers(1, LARGEST_GROUP + 1))
         alone = self.vehicles[first].alone
-        courses: dict[int, Course] = {k: one.course for k, one in self.held.items()}
+        courses: dict[int, FleetCourse] = {k: one.course for k, one in self.held.items()}
         if alone is not None:
             courses[first] = alone.course
         met = meetings(courses, keep=self.fleet.margin, among=[first])
-        near = [m.one if m.other == first else m.other for m in met]
-        near = [k for k in near if k not in busy]
+        near = [k for k in (m.other_than(first) for m in met) if k not in busy]
         rng.shuffle(near)
         group = [first, *near[: size - 1]]
         if rng.random() < 0.5:
@@ -423,14 +426,14 @@ class _FleetSearch:
         alone = self.vehicles[k].alone
         if alone is None:
             return "it has no path even alone"
-        courses: dict[int, Course] = {
+        courses: dict[int, FleetCourse] = {
             one.number: self.held[one.number].course if one.number in self.held else one.standing
             for one in self.vehicles
         }
         met = meetings({**courses, k: alone.course}, keep=self.fleet.margin, among=[k])
         rows = []
         for one in met:
-            other = self.vehicles[one.other if one.one == k else one.one].name
+            other = self.vehicles[one.other_than(k)].name
             x, y = alone.plan.pose_at(max(one.time, alone.plan.start_time))[:2]
             rows.append(f"{other} at {one.time:.4g} s near ({x:.4g}, {y:.4g})")
         spent = f" within {self.budget.seconds:.4g} s" if self.budget.is_over else ""

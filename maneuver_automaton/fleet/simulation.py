@@ -13,15 +13,21 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.agreement import Lost
-from maneuver_automaton.fleet.arriving import fleet_with_room, tube_of
-from maneuver_automaton.fleet.asking import Workers
+from maneuver_automaton.fleet.held import fleet_with_room, tube_of
 from maneuver_automaton.fleet.horizon import FleetHorizon
-from maneuver_automaton.fleet.log import FleetGuarantee, FleetLog, FleetStep, FleetViolation
 from maneuver_automaton.fleet.planning import plan_fleet
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.result import Closest, FleetResult
-from maneuver_automaton.fleet.vehicle import Vehicle
+from maneuver_automaton.fleet.result import (
+    Closest,
+    FleetGuarantee,
+    FleetLog,
+    FleetResult,
+    FleetStep,
+    FleetViolation,
+)
+from maneuver_automaton.fleet.vehicle import FleetMember
 from maneuver_automaton.fleet.verdict import measured
+from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.disturbance import (
@@ -131,8 +137,10 @@ def simulate_fleet(
         lost=lost,
         workers=workers,
     )
-    drives = [_Drive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)]
-    world = _World(loop, drives, step, dict(joins_s), dict(breaks_s))
+    drives = [
+        _VehicleDrive(one, upset) for one, upset in _upsets(loop.state.vehicles, disturbance, seed)
+    ]
+    world = _FleetWorld(loop, drives, step, dict(joins_s), dict(breaks_s))
     with patient():
         for number in range(steps):
             if stopped() or world.is_over:
@@ -154,8 +162,10 @@ def _first_plans(
 
 
 def _upsets(
-    vehicles: list[Vehicle], disturbance: Disturbance | Mapping[str, Disturbance] | None, seed: int
-) -> Iterator[tuple[Vehicle, Disturbance]]:
+    vehicles: list[FleetMember],
+    disturbance: Disturbance | Mapping[str, Disturbance] | None,
+    seed: int,
+) -> Iterator[tuple[FleetMember, Disturbance]]:
     """Every vehicle with its disturbance, whose numbers are its own."""
     calm = Disturbance()
     seeds = np.random.SeedSequence(seed).generate_state(len(vehicles)).tolist()
@@ -174,10 +184,10 @@ def _upsets(
 
 
 @dataclass(slots=True, eq=False)
-class _Drive:
+class _VehicleDrive:
     """A vehicle along the loop."""
 
-    vehicle: Vehicle
+    vehicle: FleetMember
     upset: Disturbance
     pose: Array = field(init=False)
     random: Iterator[Draw] = field(init=False)
@@ -214,11 +224,11 @@ class _Drive:
 
 
 @dataclass(slots=True, eq=False)
-class _World:
+class _FleetWorld:
     """All vehicles, the loop that drives them, and what happens to them."""
 
     loop: FleetHorizon
-    drives: list[_Drive]
+    drives: list[_VehicleDrive]
     step: float
     joins_s: dict[str, float]
     breaks_s: dict[str, float]
@@ -305,7 +315,7 @@ class _World:
         names = {one.vehicle.name for one in self.drives}
         left = names - set(self.arrived_s) - self.broken
         status, reason = "reached", ""
-        of_loop = self.loop.state.workers
+        of_loop = self.loop.state.settings.workers
         workers = {} if of_loop is None else of_loop.counts
         if left:
             status = "steps_spent"

@@ -1,26 +1,28 @@
-"""One vehicle of a fleet: its way alone, and its way past what the others do."""
+"""One vehicle of a fleet: its way alone, its way past what the others do, and places aside."""
 
 from __future__ import annotations
 
 import functools
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import (
     Disc,
     Obstacle,
 )
-from maneuver_automaton.fleet.conflicts import PROOF, Course, standing_still, where_it_stays
-from maneuver_automaton.fleet.levels import levels_of
-from maneuver_automaton.fleet.refuge import by_a_refuge, refuges
+from maneuver_automaton.fleet.courses import FleetCourse, levels_of, standing_still, where_it_stays
+from maneuver_automaton.fleet.meetings import PROOF, load_meetings
+from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.planning.blocked import (
     blocked_ends,
     goals_left,
@@ -29,18 +31,112 @@ from maneuver_automaton.planning.blocked import (
 )
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, uses_lattice
-from maneuver_automaton.planning.plan import plan_in
+from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.shifting import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.limits import outside
+from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.transitions import SWITCH
-from maneuver_automaton.words.word import Word, word_of_plan
+from maneuver_automaton.words.word import Word, word_of_plan, word_of_steps
+
+SAMPLES = 4000  # places that are looked at
+MOST_TRIED = 40  # refuges that ways are searched to
+AS_NOW = 0.5  # share of the places at which the vehicle keeps its heading
+ALIKE, TURNED = 0.5, 0.8  # [lengths of the body], [rad]: of refuges so near only one is tried
+SEED = 14  # of the places
+FAR = 8.0  # [lengths of the body] from the way alone
+EXPANSIONS = 4000  # of the way to a refuge, and of that from there
+
+
+def by_a_refuge(
+    problem: Problem,
+    query: LatticeQuery,
+    query_of: Callable[[Problem], LatticeQuery],
+    way: Plan,
+    budget: Budget,
+) -> Word | None:
+    """The cheapest path past moving obstacles, with a stop where none ever passes; None if none.
+
+    Places beside the `way` alone, the nearest first; the vehicle drives there, waits, and goes on,
+    as soon as rests along that way allow.
+    """
+    best: Word | None = None
+    counted = replace(budget, expansions=EXPANSIONS)
+    for pose in refuges(problem, query, way):
+        if budget.is_over:
+            break
+        aim = problem.starting_at(problem.start, time=problem.start_time, goals=Goal(pose))
+        there = first_plan(query_of(aim), budget=counted).word
+        if there is None or (best is not None and there.cost >= best.cost):
+            continue
+        leaving = problem.starting_at(pose, time=problem.start_time)
+        back = first_plan(query_of(leaving), budget=counted).word
+        if back is None:
+            continue
+        steps = [
+            (SWITCH, int(k), float(t))
+            for word in (there, back)
+            for k, t in zip(word.trims, word.durations, strict=True)
+        ]
+        timed = with_waits(query, word_of_steps(steps, goal=back.goal))
+        if timed is not None and (best is None or timed.cost < best.cost):
+            best = timed
+    return best
+
+
+def refuges(problem: Problem, query: LatticeQuery, way: Plan, *, off: bool = False) -> list[Array]:
+    """Poses (3,) beside a way at which the vehicle may stand from when it gets there, for ever.
+
+    The nearest to the way first. `off` the way of another vehicle it stands from its start on: near
+    that way, or near its start.
+    """
+    rng, world = np.random.default_rng(SEED), query.world
+    size = max(world.body.reach, query.library.radius * 0.5)
+    # Seen from the way, so that a moved problem has the moved refuges.
+    since = way.duration * rng.uniform(0.0, 1.0, SAMPLES)
+    bases = np.array(way.pose_at(way.start_time + since)[:, :3])
+    if off:
+        since[:], bases[::2] = 0.0, problem.start[:3]
+    away = size * rng.uniform(0.0, FAR, SAMPLES)
+    bearing, turned = rng.uniform(-math.pi, math.pi, (2, SAMPLES))
+    turned[: int(AS_NOW * SAMPLES)] = 0.0
+    heading, bearing = bases[:, 2] + turned, bases[:, 2] + bearing
+    if problem.automaton.translated is not None:
+        heading[:] = problem.start[2]
+    poses = np.column_stack(
+        [bases[:, 0] + away * np.cos(bearing), bases[:, 1] + away * np.sin(bearing), heading]
+    )
+    begins = problem.start_time + since
+    lasting = np.maximum(world.last_event - begins, 0.0) + 1.0
+    stands = free_times(
+        world,
+        world.into(poses),
+        twists=np.zeros((SAMPLES, 3)),
+        durations=lasting,
+        margin=query.margin,
+        keep=problem.margin,
+        times=begins,
+    )
+    kept = np.flatnonzero(stands >= lasting)
+    found: list[Array] = []
+    for k in kept[np.argsort(away[kept], kind="stable")]:
+        pose, others = poses[k], np.array(found).reshape(-1, 3)
+        near = np.hypot(*(others[:, :2] - pose[:2]).T) < ALIKE * size
+        turn = np.abs(np.remainder(others[:, 2] - pose[2] + math.pi, 2.0 * math.pi) - math.pi)
+        if not (near & (turn < TURNED)).any() and not outside(pose, problem.bounds):
+            found.append(pose)
+            if len(found) == MOST_TRIED:
+                break
+    return found
+
 
 WAYS = 6  # alone, that are tried with rests
 QUICK = 1500  # expansions in space and time at first ...
@@ -55,13 +151,13 @@ POINT = (Disc(1e-6),)  # the body of a vehicle that is a point, as others see it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class OwnPlan:
     """A plan of a vehicle, its cost, and where that leaves its bodies."""
 
     plan: Plan
     cost: float
     goal_index: int
-    course: Course
+    course: FleetCourse
 
     @property
     def arrival(self) -> float:
@@ -70,7 +166,7 @@ class Found:
 
 
 @dataclass(eq=False)
-class Vehicle:
+class FleetMember:
     """One vehicle: `problem` is its own, with the obstacles that it has without the others."""
 
     number: int
@@ -79,12 +175,12 @@ class Vehicle:
     leaves: bool
     grown: float  # [m] by which others see it larger
     workspace: Workspace
-    alone: Found | None = None  # its plan by itself
+    alone: OwnPlan | None = None  # its plan by itself
     bound: LowerBound | None = None  # no plan of it costs less
     why_none: str = ""  # why it has no plan by itself
     ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
     aside: Word | None = None  # a way that first makes room for others
-    standing: Course = field(init=False)  # at its start, for ever
+    standing: FleetCourse = field(init=False)  # at its start, for ever
     expansions: int = 0
 
     def __post_init__(self) -> None:
@@ -96,7 +192,9 @@ class Vehicle:
             shapes.append(of_part)
             poses.append(carried(here, problem.automaton.model, name).start[:3])
         motions = tuple(Motion([problem.start_time], [pose]) for pose in poses)
-        self.standing = Course(tuple(shapes), motions, grown=self.grown, levels=levels_of(problem))
+        self.standing = FleetCourse(
+            tuple(shapes), motions, grown=self.grown, levels=levels_of(problem)
+        )
 
     @functools.cached_property
     def at_will(self) -> bool:
@@ -105,13 +203,13 @@ class Vehicle:
         steers = uses_lattice(replace(self.problem, search=searched))
         return steers and not has_inertia(self.problem) and self.problem.start.size == 3
 
-    def course_of(self, plan: Plan) -> Course:
+    def course_of(self, plan: Plan) -> FleetCourse:
         """Its bodies in time if it drives a plan."""
         plans = [(self.problem.footprint or POINT, plan)]
         for name, shapes in self.problem.parts.items():
             plans.append((shapes, carried(plan, self.problem.automaton.model, name)))
         until = plan.start_time + plan.duration if self.leaves else math.inf
-        return Course(
+        return FleetCourse(
             tuple(shapes for shapes, _ in plans),
             tuple(Motion.of_plan(one) for _, one in plans),
             until,
@@ -184,15 +282,17 @@ class Vehicle:
 
     def _word_found(
         self, query: LatticeQuery, word: Word, aims: Sequence[tuple[int, Goal]]
-    ) -> Found:
+    ) -> OwnPlan:
         plan = plan_of_word(query, word)
         goal_index = aims[query.goal_index[word.goal]][0]
-        return Found(plan, word.cost + query.padding, goal_index, self.course_of(plan))
+        return OwnPlan(plan, word.cost + query.padding, goal_index, self.course_of(plan))
 
-    def _found(self, result: PlanResult) -> Found | None:
+    def _found(self, result: PlanResult) -> OwnPlan | None:
         if result.plan is None or result.cost is None:
             return None
-        return Found(result.plan, result.cost, result.goal_index or 0, self.course_of(result.plan))
+        return OwnPlan(
+            result.plan, result.cost, result.goal_index or 0, self.course_of(result.plan)
+        )
 
     def past(
         self,
@@ -202,7 +302,7 @@ class Vehicle:
         most: int = QUICK,
         known: float = math.inf,
         again: bool = False,
-    ) -> Found | None:
+    ) -> OwnPlan | None:
         """The cheapest way found past what the others do; None if there is none below a cost.
 
         One that does not switch at will is improved if it is searched for `again`.
@@ -252,13 +352,13 @@ class Vehicle:
 
     def leg(
         self,
-        before: Found | None,
+        before: OwnPlan | None,
         others: Sequence[Obstacle],
         begin: float,
         budget: Budget,
         *,
         aim: Goal | None = None,
-    ) -> Found | None:
+    ) -> OwnPlan | None:
         """A plan from where it stands at a time [s], past others that all stand: home, or aside.
 
         It stands at its start, or where what it has driven `before` ends.
@@ -285,7 +385,7 @@ class Vehicle:
         return self._word_found(query, word, aims)
 
     def refuges(
-        self, before: Found | None, way: Found, others: Sequence[Obstacle], begin: float
+        self, before: OwnPlan | None, way: OwnPlan, others: Sequence[Obstacle], begin: float
     ) -> list[Goal]:
         """Poses off the way of another vehicle, and off others, the nearest to it first."""
         start = self.problem.start if before is None else before.plan.end
@@ -294,7 +394,7 @@ class Vehicle:
         poses = refuges(calm, self._query(calm), way.plan, off=True)
         return [Goal(pose=np.append(pose, start[3:])) for pose in poses]
 
-    def then(self, before: Found | None, leg: Found, begin: float) -> Found:
+    def then(self, before: OwnPlan | None, leg: OwnPlan, begin: float) -> OwnPlan:
         """What it has driven before, a rest until a time [s], and another leg."""
         automaton = self.problem.automaton
         at = self.problem.start_time if before is None else before.arrival
@@ -308,9 +408,9 @@ class Vehicle:
         if before is not None:
             plan = followed_by(before.plan, plan)
         cost = self.problem.cost_of(plan)
-        return Found(plan, cost, leg.goal_index, self.course_of(plan))
+        return OwnPlan(plan, cost, leg.goal_index, self.course_of(plan))
 
-    def keep_aside(self, found: Found) -> None:
+    def keep_aside(self, found: OwnPlan) -> None:
         """Keep a way on which it makes room for others, to drive it at other times."""
         plan, exact = found.plan, not (self.problem.goals[0].tolerance_m or len(self.aims) > 1)
         if self.at_will and exact and not self.problem.goals[0].tolerance_rad:
@@ -395,3 +495,32 @@ class Vehicle:
 
     def _count(self, expansions: int) -> None:
         self.expansions += expansions
+
+
+def prepare_vehicles(vehicles: Sequence[FleetMember]) -> None:
+    """Have ready what every search of a fleet needs, once for each kind and map."""
+    kinds = {(id(one.problem.automaton), id(one.workspace)): one for one in vehicles}
+    for one in kinds.values():
+        prepare(one.problem, one.workspace)
+    load_lattice()
+    load_meetings()
+
+
+def vehicles_of(fleet: FleetProblem, prepared: Prepared | None = None) -> list[FleetMember]:
+    """The vehicles of a fleet, which share what is prepared: anew, or with others."""
+    prepared = Prepared() if prepared is None else prepared
+    workspaces: dict[tuple[int, ...], Workspace] = {}
+    keeps = [problem.margin for problem in fleet.problems]
+    # Every search keeps its own margin from what it must not touch: what that lacks of the fleet's,
+    # the others are larger by.
+    grown = max(fleet.margin - min(keeps), 0.0)
+    vehicles = []
+    for k, problem in enumerate(fleet.problems):
+        key = tuple(map(id, problem.obstacles))
+        workspace = workspaces.setdefault(key, Workspace(problem.obstacles, prepared))
+        settings = replace(problem.search, improve=False)
+        # Obstacles of its own may move too, and pass where it stays.
+        horizon = replace(problem.horizon, stay=not fleet.leaves[k])
+        own = replace(problem, search=settings, obstacles=workspace.obstacles, horizon=horizon)
+        vehicles.append(FleetMember(k, fleet.names[k], own, fleet.leaves[k], grown, workspace))
+    return vehicles

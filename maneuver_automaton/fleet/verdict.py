@@ -4,24 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Least, closest_to, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.fleet.conflicts import Course, meetings
-from maneuver_automaton.fleet.levels import Levels
+from maneuver_automaton.fleet.courses import FleetCourse, Levels
+from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import Closest, FleetResult, FleetStatus
-from maneuver_automaton.fleet.vehicle import Found, Vehicle
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, vehicles_of
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import Omnidirectional, UserModel
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import SearchSettings
 
@@ -37,14 +39,14 @@ IN_SPACE = UserModel(
 
 def verified(
     fleet: FleetProblem,
-    vehicles: Sequence[Vehicle],
-    held: Mapping[int, Found],
+    vehicles: Sequence[FleetMember],
+    held: Mapping[int, OwnPlan],
     reasons: Mapping[int, str],
 ) -> FleetResult:
     """The answer for these plans; a plan that does not pass is left out, with its reason."""
     results: dict[str, PlanResult] = {}
     why = {vehicles[k].name: said for k, said in reasons.items()}
-    passed: dict[int, Course] = {}
+    passed: dict[int, FleetCourse] = {}
     for one in vehicles:
         result, said = _checked(one, held.get(one.number), fleet.problems[one.number].search)
         if said:
@@ -62,7 +64,7 @@ def verified(
         row, driven = next(((row, some) for row, some in pairs if some), (None, []))
         if row is None:
             break
-        # Past a vehicle that has no plan nobody may drive; and what two libraries do not agree on
+        # ToPass a vehicle that has no plan nobody may drive; and what two libraries do not agree on
         # is not returned. Who stands all the time stands there without its plan too.
         name = max(driven, key=lambda one: (passed[names.index(one)].quiet_after, one))
         other = row.pair[0] if name == row.pair[1] else row.pair[1]
@@ -99,7 +101,9 @@ def least_apart(closest: Sequence[Closest], fleet: FleetProblem) -> float:
     return min([fleet.margin + NEAR, *(row.distance_m for row in closest)])
 
 
-def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tuple[PlanResult, str]:
+def _checked(
+    one: FleetMember, found: OwnPlan | None, settings: SearchSettings
+) -> tuple[PlanResult, str]:
     """The answer for one vehicle, and why its plan was refused."""
     problem = replace(one.problem, search=settings)
     if found is None:
@@ -134,7 +138,7 @@ def _checked(one: Vehicle, found: Found | None, settings: SearchSettings) -> tup
 
 
 def measured(
-    courses: Mapping[int, Course], names: Sequence[str], *, keep: float
+    courses: Mapping[int, FleetCourse], names: Sequence[str], *, keep: float
 ) -> tuple[Closest, ...]:
     """Pairs of vehicles that come near each other, the nearest first, by the audit's bounds.
 
@@ -148,21 +152,21 @@ def measured(
     return tuple(sorted(rows, key=lambda row: row.distance_m))
 
 
-def nearest(one: Course, other: Course, *, enough: float = 0.0) -> Least:
+def nearest(one: FleetCourse, other: FleetCourse, *, enough: float = 0.0) -> Least:
     """Least distance of two vehicles at all times [m], and when, by the audit's bounds.
 
     From the first begin of the two on, as who begins later stands at its start until then, until
     both have come to rest. `enough` decides: the bound is sharp enough to tell its side. Of two
-    that climb, each is taken once as it is, past the other in stages: the better bound counts.
+    that climb, each is taken once as it is, past the other in bands: the better bound counts.
     """
-    if len(other.stages) > len(one.stages):
+    if len(other.bands) > len(one.bands):
         one, other = other, one
-    pairs = [(one, other), (other, one)] if len(other.stages) > 1 else [(one, other)]
+    pairs = [(one, other), (other, one)] if len(other.bands) > 1 else [(one, other)]
     found = [_nearest(*pair, enough=enough) for pair in pairs]
     return max(found, key=lambda least: least.distance)
 
 
-def _nearest(one: Course, other: Course, *, enough: float) -> Least:
+def _nearest(one: FleetCourse, other: FleetCourse, *, enough: float) -> Least:
     """The same, the first driven as it is past the other's bodies."""
     begin = min(float(way.time[0]) for way in (*one.motions, *other.motions))
     quiet = min(max(one.quiet_after, other.quiet_after), one.until)
@@ -204,9 +208,9 @@ def nearest_obstacle(
     )
 
 
-def _heights_matter(one: Course, other: Course) -> bool:
+def _heights_matter(one: FleetCourse, other: FleetCourse) -> bool:
     """Whether one may be above the other at some time."""
-    return any(mine.above(its.low, its.high) > 0.0 for mine in one.stages for its in other.stages)
+    return any(mine.above(its.low, its.high) > 0.0 for mine in one.bands for its in other.bands)
 
 
 def plan_of_motion(
@@ -241,3 +245,68 @@ def plan_of_motion(
         Trim(name=str(k), body_velocity=twist, control=twist) for k, twist in enumerate(twists)
     )
     return Plan(start, trims, durations=durations, start_time=begin)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetVerdict:
+    """What the checks say of the plans of a fleet, each alone and every pair."""
+
+    passed: bool
+    verdicts: dict[str, Verdict]  # of each that has a plan
+    closest: tuple[Closest, ...]  # pairs that come near each other, the nearest first
+    too_near: tuple[Closest, ...]  # those of them that do not keep the fleet's margin
+
+    __repr__ = brief
+
+
+def verify_fleet(fleet: FleetProblem, plans: Mapping[str, Plan]) -> FleetVerdict:
+    """Check plans of a fleet, say from a file, as `plan_fleet` checks its own.
+
+    Each plan is verified past static obstacles, and every pair of vehicles is proven apart at all
+    times, also after all have arrived. Who has no plan stands at its start.
+
+    Parameters
+    ----------
+    fleet : FleetProblem
+    plans : mapping of str to Plan
+        By the names of the vehicles.
+
+    Returns
+    -------
+    FleetVerdict
+        ``passed`` if every vehicle has a plan that passes, and every pair keeps the margin.
+
+    Raises
+    ------
+    ValueError
+        If a plan is of no vehicle of the fleet, or does not live in its group.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Plan, Problem, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0)})
+    >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
+    >>> back = Problem(robot, [4, 0.5, 3.0], [0, 0.5, 3.0], footprint=Disc(0.3))
+    >>> fleet = FleetProblem([there, back], names=["a", "b"])
+    >>> verdict = verify_fleet(fleet, {"a": Plan([0, 0, 0], robot.trims, durations=[4.0])})
+    >>> verdict.passed, verdict.verdicts["a"].passed, verdict.too_near[0].pair
+    (False, True, ('a', 'b'))
+    """
+    unknown = [name for name in plans if name not in fleet.names]
+    if unknown:
+        raise ValueError(
+            f"plans: there is no vehicle {unknown[0]!r}, need some of {', '.join(fleet.names)}"
+        )
+    vehicles = vehicles_of(fleet)
+    problems = {one.name: one.problem for one in vehicles}
+    verdicts = {name: verify(problems[name], plan) for name, plan in plans.items()}
+    courses = {
+        one.number: one.course_of(plans[one.name]) if one.name in plans else one.standing
+        for one in vehicles
+    }
+    closest = measured(courses, fleet.names, keep=fleet.margin)
+    too_near = tuple(row for row in closest if row.distance_m <= enough_for(fleet.margin))
+    complete = len(plans) == len(fleet) and all(one.passed for one in verdicts.values())
+    return FleetVerdict(
+        passed=complete and not too_near, verdicts=verdicts, closest=closest, too_near=too_near
+    )

@@ -105,8 +105,12 @@ class Planner:
 
     def __reduce__(self) -> tuple[Callable[[], Planner], tuple[()]]:
         """What makes the like of it: what is prepared is made again, in another process too."""
-        stated = {one.name: getattr(self, one.name) for one in fields(self) if one.init}
-        return functools.partial(Planner, **stated), ()
+        return functools.partial(Planner, **self.stated), ()
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What it is made of, by the names of its arguments."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.init}
 
     def problem(
         self,

@@ -22,12 +22,13 @@ from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_plane
+from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
-from maneuver_automaton.search.distance_grid import OCTILE, DistanceGrid, distance_grid
+from maneuver_automaton.search.distance_grid import OCTILE, distance_grid
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_library import Carried, library_of_trims
-from maneuver_automaton.search.lattice_memory import SearchArrays, give_back
+from maneuver_automaton.search.lattice_memory import give_back
 from maneuver_automaton.search.lattice_pass import Pass, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import (

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias, TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +26,16 @@ from maneuver_automaton.models import OnLattice
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
-from maneuver_automaton.search.free_costs import UNKNOWN, FreeCosts, FreeTable
-from maneuver_automaton.search.lattice_arrays import LatticeArrays, LatticeLibrary
+from maneuver_automaton.search.arrays import Aims, FreeCosts, GraphArrays, StateLattice, Tested
+from maneuver_automaton.search.free_costs import UNKNOWN, FreeTable
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_goals import EXACT, at_headings, cells_within, facing
 from maneuver_automaton.search.lattice_library import library_of_trims
 from maneuver_automaton.search.lattice_memory import GROWN_S
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.prepared import Prepared
-from maneuver_automaton.search.scene import Scene, for_library
+from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
@@ -51,60 +52,8 @@ MOST_TABLES = 64  # of costs without obstacles, of one library
 STAGES = (1 << 10, 1 << 14), (1 << 12, 1 << 16), (1 << 14, 1 << 18)
 
 
-class StateLattice(NamedTuple):
-    """The graph of a library with S states and E edges, along time or against it."""
-
-    cell: float  # [m]
-    frame: tuple[float, float, float, float, float]  # x, y, heading, cos, sin in the world's frame
-    sign: int  # 1: along time, -1: against it
-    heading: Array  # (S,) [rad] in the frame of the lattice
-    first: IntArray  # (S + 1,) where the edges out of each state begin
-    target: IntArray  # (E,)
-    step: IntArray  # (E, 2) columns and rows
-    cost: Array  # (E,)
-    edge: IntArray  # (E,) in the arrays of the library
-    travel: Array  # (E,) [m] length of the path of the pose, or more
-    source: IntArray  # (E,)
-    into_first: IntArray  # (S + 1,) where the edges that lead to each state begin ...
-    into_edge: IntArray  # (E,) ... in this list of them
-    most_links: int  # edges of a state that lead away, or those that lead to it
-    roots: IntArray  # (R, 3) column, row, state
-
-
 _Number = TypeVar("_Number", np.float64, np.int64)
 Frame: TypeAlias = tuple[StateLattice, IntArray]  # seen from it, and there the number of each state
-
-
-class GraphArrays(NamedTuple):
-    """Arrays of a search, as in `_kernels_state_lattice`."""
-
-    table: IntArray  # (4 p, 2)
-    node: NDArray[np.int32]  # (p, S)
-    least: Array  # (p, S)
-    cost: Array  # (n,)
-    clearance: Array  # (n,)
-    links: NDArray[np.int32]  # (n, 5)
-    heap_key: Array  # (m,)
-    heap_item: IntArray  # (m,)
-    state: IntArray  # (7,)
-    found: Array  # (1,)
-
-
-class Aims(NamedTuple):
-    """Where a search leads: the nodes of some states within a distance of some places."""
-
-    place: Array  # (G, 2) [m] in the frame of the lattice
-    within: Array  # (G,) [m]
-    admits: NDArray[np.bool_]  # (G, S)
-    per_metre: float  # least cost of a displacement
-    surplus: Array  # (S,) least cost beyond that of the displacement, from a state to an aim's
-
-
-class Tested(NamedTuple):
-    """What motions are tested with: pieces of their courses, and a scene that knows these."""
-
-    lib: LatticeArrays
-    scene: Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import FleetProblem
-from maneuver_automaton.fleet.asking import Answer, Question, answered
-from maneuver_automaton.fleet.planning import vehicles_of
+from maneuver_automaton.fleet.vehicle import vehicles_of
+from maneuver_automaton.fleet.workers import PlanRequest, Proposal, answered
 
 
 class Mortal:
@@ -18,13 +18,16 @@ class Mortal:
         self.vehicles, self.dies = vehicles_of(fleet), dies
         self.counts = {"questions": 0}
 
-    def ask(self, questions: Sequence[Question], budget: Budget) -> list[Answer | None]:
+    def ask(self, questions: Sequence[PlanRequest], budget: Budget) -> list[Proposal | None]:
         self.counts["questions"] += len(questions)
         return [
             None
-            if one.time >= self.dies.get(one.number, math.inf)
+            if one.terms.time >= self.dies.get(one.number, math.inf)
             else answered(
-                self.vehicles[one.number], one, budget, lambda f, at=one.time: f.course.after(at)
+                self.vehicles[one.number],
+                one,
+                budget,
+                lambda f, at=one.terms.time: f.course.after(at),
             )
             for one in questions
         ]

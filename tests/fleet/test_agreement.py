@@ -12,16 +12,18 @@ from maneuver_automaton.collision.shapes import (
 )
 from maneuver_automaton.fleet import Message
 from maneuver_automaton.fleet.agreement import Agreement
-from maneuver_automaton.fleet.conflicts import Course
-from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.vehicle import OwnPlan
 from tests.fleet.robots import at_rest, crossing, least_distance
 
 MOST = 200  # messages of the small example, more than it sends
 
 
-def found(cost: float) -> Found:
+def found(cost: float) -> OwnPlan:
     motion = Motion([0.0], [[0.0, 0.0, 0.0]])
-    return Found(Plan([0, 0, 0], (), durations=[]), cost, 0, Course(((Disc(0.1),),), (motion,)))
+    return OwnPlan(
+        Plan([0, 0, 0], (), durations=[]), cost, 0, FleetCourse(((Disc(0.1),),), (motion,))
+    )
 
 
 class Drops:

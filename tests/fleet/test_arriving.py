@@ -9,8 +9,7 @@ import pytest
 
 from maneuver_automaton import Disturbance, FleetProblem, Goal, Problem, plan_fleet, simulate_fleet
 from maneuver_automaton.collision import Disc
-from maneuver_automaton.fleet.arriving import aimed_at, with_room
-from maneuver_automaton.fleet.held import beside
+from maneuver_automaton.fleet.held import aimed_at, beside, with_room
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon.candidates import within
 from tests.fleet.mortal import Mortal

@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.surroundings import parts_of
-from maneuver_automaton.fleet.conflicts import (
-    Course,
-    Encounters,
-    Meeting,
-    components,
-    larger,
-    meetings,
-)
+from maneuver_automaton.fleet.courses import FleetCourse, larger
+from maneuver_automaton.fleet.meetings import Encounters, Meeting, components, meetings
 from maneuver_automaton.fleet.verdict import measured, nearest
 from maneuver_automaton.groups import SE2
 from tests.collision.test_arcs import arcs
@@ -32,7 +26,7 @@ places = st.tuples(st.floats(-4.0, 4.0), st.floats(-4.0, 4.0), st.floats(-3.0, 3
 
 
 def course(start, parts, begin=0.0, **more):
-    return Course((BODY,), (arcs(start, parts, begin),), **more)
+    return FleetCourse((BODY,), (arcs(start, parts, begin),), **more)
 
 
 def dense(one, other, step=0.002):
@@ -67,7 +61,7 @@ def test_what_is_prepared_once_is_met_at_any_distance(here, parts, there, others
     ways = {
         2: course(here, parts),
         3: course(there, others),
-        7: Course((BODY,), (Motion([0.0], [stands]),)),
+        7: FleetCourse((BODY,), (Motion([0.0], [stands]),)),
     }
     prepared = Encounters(ways)
     for keep in (0.5, 0.0, 2.0):
@@ -122,7 +116,7 @@ def test_a_moved_pair_meets_at_the_same_time():
         0: course([0, 0, 0], [((1.0, 0.0, 0.2), 5.0)]),
         1: course([4, -3, 1.5], [((1.0, 0.0, 0.0), 5.0)]),
     }
-    moved = {k: Course(one.shapes, (one.motions[0].moved(by),)) for k, one in ways.items()}
+    moved = {k: FleetCourse(one.shapes, (one.motions[0].moved(by),)) for k, one in ways.items()}
     (first,), (second,) = meetings(ways, keep=0.3), meetings(moved, keep=0.3)
     assert second.time == pytest.approx(first.time, abs=1e-4)
 

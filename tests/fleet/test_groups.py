@@ -9,10 +9,16 @@ import pytest
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet
-from maneuver_automaton.fleet.conflicts import meetings
-from maneuver_automaton.fleet.groups import _closed, _until, _within, by_conflicts, by_priorities
-from maneuver_automaton.fleet.turns import Turns
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.coordination import (
+    Turns,
+    _closed,
+    _until,
+    _within,
+    by_conflicts,
+    by_priorities,
+)
+from maneuver_automaton.fleet.meetings import meetings
+from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet import fleets

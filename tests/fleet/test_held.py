@@ -16,13 +16,13 @@ from maneuver_automaton.fleet import FleetHorizon, FleetProblem, plan_fleet
 from maneuver_automaton.fleet.held import (
     given_up,
     onward,
-    proposal,
     rejoined,
     rest_of_plan,
     resting,
     stopping,
 )
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.vehicle import vehicles_of
+from maneuver_automaton.fleet.workers import PlanRequest, Terms, answered
 from tests.inertia import car_automaton, unicycle_automaton
 
 TUBE = 0.05  # [m]
@@ -107,8 +107,9 @@ def test_another_plan_goes_on_from_the_state_that_it_has(driving):
     vehicle, found = driving
     budget = Budget.from_now(60.0)
     for time in times_of(found.plan, 6)[1:-1]:
-        past = {"others": [], "budget": budget, "known": np.inf, "most": 200}
-        other, _ = proposal(vehicle, found, time=time, after=0.0, tube_m=TUBE, **past)
+        terms = Terms(time, 0.0, 0.0, known=np.inf, most=200, tube_m=TUBE, keep=np.inf)
+        request = PlanRequest(0, found, (), terms)
+        other, _ = answered(vehicle, request, budget, lambda one: one.course)
         assert other is not None
         assert same_state(begin_state(other.plan), state_at(vehicle, found, time))
 

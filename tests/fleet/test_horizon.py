@@ -15,18 +15,13 @@ from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
 from maneuver_automaton.fleet.agreement import Agreement
-from maneuver_automaton.fleet.conflicts import Course, meetings
-from maneuver_automaton.fleet.guarantees import After, Before, broken, gap_between
-from maneuver_automaton.fleet.held import (
-    left_to_pay,
-    off_plan,
-    proposal,
-    rest_of_plan,
-    resting,
-)
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.guarantees import broken
+from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
+from maneuver_automaton.fleet.meetings import gap_between, meetings
 from maneuver_automaton.fleet.moment import Moment
-from maneuver_automaton.fleet.vehicle import Found
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
+from maneuver_automaton.fleet.workers import PlanRequest, Terms, ToPass, answered
 from maneuver_automaton.groups import SE2
 from tests.fleet.robots import (
     at_rest,
@@ -160,11 +155,13 @@ def test_searches_leave_time_for_what_follows_them():
 def test_without_time_only_the_way_alone_is_looked_for():
     vehicle = vehicles_of(crossing())[0]
     rest = resting(vehicle, vehicle.problem.start, 0.0)
-    numbers = {"time": 0.0, "after": 0.0, "known": math.inf, "most": 1500}
-    other = [ma.Obstacle(Disc(0.3, [0.0, 0.0]))]
-    found, alone = proposal(vehicle, rest, others=other, budget=Budget.from_now(60.0), **numbers)
+    stands = FleetCourse(((Disc(0.3),),), (Motion([0.0], [[0.0, 0.0, 0.0]]),))
+    other = ToPass(1, OwnPlan(rest.plan, math.inf, 0, stands), 0.0)
+    terms = Terms(0.0, 0.0, 0.0, known=math.inf, most=1500, tube_m=0.0, keep=math.inf)
+    request = PlanRequest(0, rest, (other,), terms)
+    found, alone = answered(vehicle, request, Budget.from_now(60.0), lambda one: one.course)
     assert found.cost > alone.cost
-    found, _ = proposal(vehicle, rest, others=other, budget=Budget.from_now(0.0), **numbers)
+    found, _ = answered(vehicle, request, Budget.from_now(0.0), lambda one: one.course)
     assert found is None
 
 
@@ -227,61 +224,49 @@ def found_on(vehicle, *, cost=2.0, start=(0.0, 0.0, 0.0), duration=2.0):
     """A robot's plan straight on."""
     trim = vehicle.problem.automaton["on"]
     plan = ma.Plan(start, (trim,), durations=[duration])
-    return Found(plan, cost, 0, vehicle.course_of(plan))
-
-
-def after_of(held, *, time=0.0, swaps=(), off=None, keep=0.1):
-    return After(
-        time=time,
-        held=held,
-        courses={k: one.course.after(time) for k, one in held.items()},
-        off=off or dict.fromkeys(held, 0.0),
-        disturbed=set(),
-        in_group=set(),
-        swaps=swaps,
-        tube_m=0.05,
-        keep=keep,
-        frame=ORIGIN,
-    )
+    return OwnPlan(plan, cost, 0, vehicle.course_of(plan))
 
 
 def pair(gap=1.0):
-    """Two robots that drive beside each other, their bodies a distance apart."""
-    ends = ([0, 0, 0], [2, 0, 0]), ([0, 0.6 + gap, 0], [2, 0.6 + gap, 0])
+    """A moment at which two robots hold plans side by side."""
+    ends = [([0, 0, 0], [2, 0, 0]), ([0, 0.6 + gap, 0], [2, 0.6 + gap, 0])]
     fleet = FleetProblem([problem_of(*one) for one in ends], names=("a", "b"), margin=0.1)
-    vehicles = vehicles_of(fleet)
-    held = {k: found_on(one, start=one.problem.start) for k, one in enumerate(vehicles)}
-    agreement = Agreement(fleet.names)
-    agreement.start(held)
-    return vehicles, held, agreement
+    state = FleetHorizon(fleet, step=0.5).state
+    state.agreement = Agreement(fleet.names)
+    for k, one in enumerate(state.vehicles):
+        state.held[k] = found_on(one, start=one.problem.start)
+    state.agreement.start(state.held)
+    now = Moment(state, 0.0, {}, Budget.from_now(1.0))
+    now.before = {k: (one.cost, one.arrival) for k, one in now.held.items()}
+    now.off = dict.fromkeys(now.held, 0.0)
+    return now
 
 
-def broken_by(vehicles, agreement, before, after):
-    return [(one.guarantee, one.names) for one in broken(vehicles, agreement, before, after)]
+def courses_of(now):
+    return {k: one.course for k, one in now.held.items()}
+
+
+def broken_by(now):
+    return [(one.guarantee, one.names) for one in broken(now, courses_of(now))]
 
 
 def test_apart():
     for gap, expected in ((0.2, []), (0.09, [(FleetGuarantee.APART, ("a", "b"))])):
-        vehicles, held, agreement = pair(gap)
-        before = Before.of(vehicles, held, 0.0, None)
-        assert broken_by(vehicles, agreement, before, after_of(held)) == expected
+        assert broken_by(pair(gap)) == expected
 
 
 def test_held():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
-    after = after_of(held, off={0: 0.06, 1: 0.0})
-    assert broken_by(vehicles, agreement, before, after) == [(FleetGuarantee.HELD, ("a",))]
+    now = pair()
+    now.off[0] = 0.06
+    assert broken_by(now) == [(FleetGuarantee.HELD, ("a",))]
 
 
 def test_value_and_arrival():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
-    later = dict(held)
-    later[1] = found_on(vehicles[1], cost=3.0, start=held[1].plan.start, duration=3.0)
-    agreement.start(later)
-    said = broken_by(vehicles, agreement, before, after_of(later))
-    assert said == [
+    now = pair()
+    start = now.held[1].plan.start
+    now.held[1] = found_on(now.vehicles[1], cost=3.0, start=start, duration=3.0)
+    now.state.agreement.start(now.held)
+    assert broken_by(now) == [
         (FleetGuarantee.DECREASE, ("b",)),
         (FleetGuarantee.ARRIVAL, ("b",)),
         (FleetGuarantee.DECREASE, ("a", "b")),
@@ -289,33 +274,29 @@ def test_value_and_arrival():
 
 
 def test_still_is_free():
-    vehicles, held, agreement = pair()
-    wall = replace(vehicles[0].problem, obstacles=(ma.Obstacle(Disc(0.5, [2.0, 0.0])),))
-    vehicles[0].problem = wall
-    before = Before.of(vehicles, held, 0.0, None)
-    said = broken_by(vehicles, agreement, before, after_of(held))
-    assert said == [(FleetGuarantee.STILL, ("a",))]
+    now = pair()
+    vehicle = now.vehicles[0]
+    wall = ma.Obstacle(Disc(0.5, [2.0, 0.0]))
+    vehicle.problem = replace(vehicle.problem, obstacles=(wall,))
+    assert broken_by(now) == [(FleetGuarantee.STILL, ("a",))]
 
 
 def test_commit_order():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
+    now = pair()
     numbers = {"before": 3.0, "after": 2.0}
     one = Swap(names=("a",), past=(("b", 0),), holds=(("a", 1),), order=0, **numbers)
     stale = Swap(names=("b",), past=(("a", 0),), holds=(("b", 1),), order=1, **numbers)
     fresh = replace(stale, past=(("a", 1),))
-    assert not broken_by(vehicles, agreement, before, after_of(held, swaps=(one, fresh)))
-    said = broken_by(vehicles, agreement, before, after_of(held, swaps=(one, stale)))
-    assert said == [(FleetGuarantee.ORDER, ("b",))]
+    now.swaps = [one, fresh]
+    assert not broken_by(now)
+    now.swaps = [one, stale]
+    assert broken_by(now) == [(FleetGuarantee.ORDER, ("b",))]
 
 
 def test_known():
-    vehicles, held, agreement = pair()
-    before = Before.of(vehicles, held, 0.0, None)
-    other = dict(held)
-    other[0] = found_on(vehicles[0])
-    said = broken_by(vehicles, agreement, before, after_of(other))
-    assert said == [(FleetGuarantee.KNOWN, ("a",))]
+    now = pair()
+    now.held[0] = found_on(now.vehicles[0])
+    assert broken_by(now) == [(FleetGuarantee.KNOWN, ("a",))]
 
 
 def gap_of(courses, **more):
@@ -324,22 +305,22 @@ def gap_of(courses, **more):
 
 def test_the_gap_that_is_proven():
     for gap in (0.15, 0.4, 0.9):
-        _, held, _ = pair(gap)
-        proven = gap_of({k: one.course for k, one in held.items()}).distance
+        now = pair(gap)
+        proven = gap_of(courses_of(now)).distance
         assert gap - 0.05 < proven <= gap
-    _, held, _ = pair(0.05)
-    assert gap_of({k: one.course for k, one in held.items()}).distance == 0.0
+    now = pair(0.05)
+    assert gap_of(courses_of(now)).distance == 0.0
 
 
 def test_a_gap_that_still_holds_is_not_measured_again():
-    _, held, _ = pair(0.4)
-    courses = {k: one.course for k, one in held.items()}
+    now = pair(0.4)
+    courses = courses_of(now)
     proven = gap_of(courses)
     before, after = proven.nearest.time - 0.1, proven.nearest.time + 0.1
     assert gap_of(courses, time=before, last=proven).nearest is proven.nearest
     assert gap_of(courses, time=after, last=proven).nearest is not proven.nearest
     # Who holds another plan is looked at, and so is what is left where one of the nearest is gone.
-    third = Course(courses[0].shapes, (Motion([0.0], [[0.0, -0.9, 0.0]]),))
+    third = FleetCourse(courses[0].shapes, (Motion([0.0], [[0.0, -0.9, 0.0]]),))
     far = replace(third, motions=(Motion([0.0], [[0.0, -9.0, 0.0]]),))
     near = gap_of({**courses, 2: third}, time=before, last=proven)
     assert near.distance == pytest.approx(0.3, abs=0.02)
@@ -368,8 +349,8 @@ def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
 
 
 def test_what_is_left_of_a_plan():
-    (vehicle, _), held, _ = pair()
-    found = held[0]
+    now = pair()
+    vehicle, found = now.vehicles[0], now.held[0]
     assert left_to_pay(vehicle, found, 0.5) == pytest.approx(1.5)
     assert left_to_pay(vehicle, found, 5.0) == 0.0
     assert math.isinf(left_to_pay(vehicle, resting(vehicle, found.plan.start, 0.0), 1.0))
@@ -377,7 +358,8 @@ def test_what_is_left_of_a_plan():
 
 
 def test_how_far_a_body_is_off_its_plan():
-    (vehicle, _), held, _ = pair()
+    now = pair()
+    vehicle, held = now.vehicles[0], now.held
     assert off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.1, 0.0])) == pytest.approx(0.1)
     turned = off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.0, 0.2]))
     assert turned == pytest.approx(2.0 * 0.3 * math.sin(0.1))  # a disc that turns does not move
@@ -385,7 +367,7 @@ def test_how_far_a_body_is_off_its_plan():
 
 def test_what_is_left_of_a_course():
     motion = Motion([0.0, 2.0, 3.0], [[0, 0, 0], [2, 0, 0], [2, 0, 1.0]], [[1, 0, 0], [0, 0, 1]])
-    course = Course(((Disc(0.3),),), (motion,))
+    course = FleetCourse(((Disc(0.3),),), (motion,))
     for time in (0.0, 0.7, 2.0, 2.5, 3.0, 4.0):
         (left,) = course.after(time).motions
         assert left.time[0] == pytest.approx(time)
@@ -395,7 +377,11 @@ def test_what_is_left_of_a_course():
 
 @pytest.mark.parametrize("first", [0, 1])
 def test_who_begins_later_stands_at_its_start_until_then(first):
-    passing = Course(((Disc(0.3),),), (Motion([0.0, 4.0], [[-2, 0, 0], [2, 0, 0]], [[1, 0, 0]]),))
-    later = Course(((Disc(0.3),),), (Motion([9.0, 10.0], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0]]),))
+    passing = FleetCourse(
+        ((Disc(0.3),),), (Motion([0.0, 4.0], [[-2, 0, 0], [2, 0, 0]], [[1, 0, 0]]),)
+    )
+    later = FleetCourse(
+        ((Disc(0.3),),), (Motion([9.0, 10.0], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0]]),)
+    )
     (met,) = meetings({first: passing, 1 - first: later}, keep=0.0)
     assert met.time == pytest.approx(1.4, abs=1e-3)

@@ -25,10 +25,10 @@ from maneuver_automaton.fleet import (
     verify_driven,
     verify_fleet,
 )
-from maneuver_automaton.fleet.conflicts import Course, meetings
+from maneuver_automaton.fleet.courses import BANDS, FleetCourse, Levels
 from maneuver_automaton.fleet.held import distance_to_obstacles, why_not_free
-from maneuver_automaton.fleet.levels import STAGES, Levels
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.meetings import meetings
+from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
@@ -107,31 +107,31 @@ def least_in_space(fleet, plans):
 def test_stages_hold_the_body_at_all_times(rows, high):
     time = np.cumsum([lasting for lasting, _ in rows])
     levels = Levels(time, [z for _, z in rows], (-0.5, high))
-    stages = levels.stages
-    assert stages[0].begin == -math.inf
-    assert stages[-1].end == math.inf
-    assert all(a.end == b.begin for a, b in itertools.pairwise(stages))
+    bands = levels.bands
+    assert bands[0].begin == -math.inf
+    assert bands[-1].end == math.inf
+    assert all(a.end == b.begin for a, b in itertools.pairwise(bands))
     for at in np.linspace(time[0] - 1.0, time[-1] + 1.0, 200):
-        now = [one for one in stages if one.begin <= at <= one.end]
+        now = [one for one in bands if one.begin <= at <= one.end]
         assert now
         z = float(levels.at(at))
         assert all(one.low <= z - 0.5 and z + high <= one.high for one in now)
     spread = np.ptp(levels.altitude)
-    most = max(spread / STAGES, high + 0.5)
-    assert all(one.high - one.low <= most + high + 0.5 + 1e-3 for one in stages)
+    most = max(spread / BANDS, high + 0.5)
+    assert all(one.high - one.low <= most + high + 0.5 + 1e-3 for one in bands)
 
 
 def test_stages_rise_with_the_altitude():
     low = Levels([0.0, 4.0, 6.0], [1.0, 9.0, 9.0], (0.0, 1.0))
     high = Levels(low.time, low.altitude + 100.0, low.body)
-    for one, other in zip(low.stages, high.stages, strict=True):
+    for one, other in zip(low.bands, high.bands, strict=True):
         assert (other.begin, other.end) == pytest.approx((one.begin, one.end), rel=1e-9)
         assert (other.low, other.high) == pytest.approx((one.low + 100.0, one.high + 100.0))
 
 
 def test_a_level_flight_is_one_stage():
     levels = Levels([0.0, 4.0, 6.0], [7.0, 7.0, 7.0], (-1.0, 1.0))
-    assert len(levels.stages) == 1
+    assert len(levels.bands) == 1
 
 
 @pytest.mark.slow
@@ -182,7 +182,7 @@ def test_what_keeps_the_margin_in_height_by_a_hair_passes(margin, more, turned, 
 def climbing(low, high):
     """A disc that goes ahead for ten seconds while it climbs between two heights."""
     way = Motion([0.0, 10.0], [[0, 0, 0], [10, 0, 0]], [[1.0, 0.0, 0.0]])
-    return Course(((ROTOR,),), (way,), levels=Levels(way.time, [low, high], (0.0, 1.0)))
+    return FleetCourse(((ROTOR,),), (way,), levels=Levels(way.time, [low, high], (0.0, 1.0)))
 
 
 def test_who_climbs_is_met_at_the_height_of_the_other():
@@ -198,9 +198,9 @@ def test_who_climbs_is_met_at_the_height_of_the_other():
 
 
 def test_two_that_climb_are_judged_each_as_it_is():
-    """In stages of one height both overlap; one as it is, past the other in stages, does not."""
+    """In bands of one height both overlap; one as it is, past the other in bands, does not."""
     one, other = climbing(0.0, 80.0), climbing(14.0, 94.0)
-    assert len(one.stages) > 1
+    assert len(one.bands) > 1
     assert 0.5 < nearest(one, other).distance <= 13.0 + 1e-5
     assert nearest(other, one).distance == nearest(one, other).distance
 

@@ -11,14 +11,14 @@ import pytest
 
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.fleet.conflicts import Course, meetings
-from maneuver_automaton.fleet.nearby import SLOT, Nearby, near_pairs, swept
+from maneuver_automaton.fleet.courses import FleetCourse
+from maneuver_automaton.fleet.meetings import SLOT, Nearby, meetings, near_pairs, swept
 from maneuver_automaton.groups import SE2
 
 BODY = (Box([1.2, 0.6], [0.3, 0.0]),)
 
 
-def course(rng, *, begin=0.0, size=12.0, until=math.inf) -> Course:
+def course(rng, *, begin=0.0, size=12.0, until=math.inf) -> FleetCourse:
     """Coasts at random."""
     count = int(rng.integers(1, 6))
     times = begin + np.cumsum([0.0, *rng.uniform(0.2, 3.0, count)])
@@ -27,7 +27,7 @@ def course(rng, *, begin=0.0, size=12.0, until=math.inf) -> Course:
     poses = [np.array([*rng.uniform(0, size, 2), rng.uniform(-3, 3)])]
     for twist, lasting in zip(twists, np.diff(times), strict=True):
         poses.append((SE2(poses[-1]) @ SE2.exp(lasting * twist)).pose)
-    return Course((BODY,), (Motion(times, poses, twist=twists),), until)
+    return FleetCourse((BODY,), (Motion(times, poses, twist=twists),), until)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -63,10 +63,12 @@ def test_no_meeting_is_missed(seed, since):
 
 
 def test_who_leaves_is_met_by_nobody_later():
-    stands = Course(((Disc(0.5),),), (Motion([0.0], [[4.0, 0.0, 0.0]]),))
+    stands = FleetCourse(((Disc(0.5),),), (Motion([0.0], [[4.0, 0.0, 0.0]]),))
     passes = Motion([0.0, 8.0], [[0, 0, 0], [8, 0, 0]], twist=[[1, 0, 0]])
-    goes = Course(((Disc(0.5),),), (Motion([0.0, 1.0], [[4, 0, 0], [4, 1, 0]], twist=[[0, 1, 0]]),))
-    one = Course(((Disc(0.5),),), (passes,))
+    goes = FleetCourse(
+        ((Disc(0.5),),), (Motion([0.0, 1.0], [[4, 0, 0], [4, 1, 0]], twist=[[0, 1, 0]]),)
+    )
+    one = FleetCourse(((Disc(0.5),),), (passes,))
     near = Nearby(0.0)
     assert near.near(one, [stands, goes, replace(goes, until=1.0)], keep=0.1) == [True, True, False]
 
@@ -75,7 +77,7 @@ def test_who_leaves_is_met_by_nobody_later():
 def test_pairs_that_stand_near(seed):
     rng = np.random.default_rng(seed)
     standing = {
-        3 * k: Course((BODY,), (Motion([0.0], [[*rng.uniform(0, 9, 2), rng.uniform(-3, 3)]]),))
+        3 * k: FleetCourse((BODY,), (Motion([0.0], [[*rng.uniform(0, 9, 2), rng.uniform(-3, 3)]]),))
         for k in range(20)
     }
     met = {(row.one, row.other) for row in meetings(standing, keep=0.2)}

@@ -13,11 +13,11 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
-from maneuver_automaton.fleet.conflicts import meetings
-from maneuver_automaton.fleet.one_at_a_time import one_at_a_time
+from maneuver_automaton.fleet.coordination import one_at_a_time
+from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.planning import _FleetSearch
-from maneuver_automaton.fleet.vehicles import vehicles_of
-from maneuver_automaton.fleet.worker_pool import WorkerPool
+from maneuver_automaton.fleet.vehicle import vehicles_of
+from maneuver_automaton.fleet.workers import WorkerPool
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem

@@ -19,8 +19,8 @@ from maneuver_automaton.fleet import (
     simulate_fleet,
     verify_fleet,
 )
-from maneuver_automaton.fleet.conflicts import standing_still
-from maneuver_automaton.fleet.vehicles import vehicles_of
+from maneuver_automaton.fleet.courses import standing_still
+from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario import load_scenario

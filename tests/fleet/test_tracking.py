@@ -7,9 +7,9 @@ import pytest
 
 from maneuver_automaton.fleet import FleetProblem
 from maneuver_automaton.fleet.held import off_plan
-from maneuver_automaton.fleet.planning import plan_fleet, vehicles_of
-from maneuver_automaton.fleet.tracking import back_onto
-from maneuver_automaton.fleet.vehicle import Found
+from maneuver_automaton.fleet.planning import plan_fleet
+from maneuver_automaton.fleet.upkeep import back_onto
+from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
 from maneuver_automaton.groups import SE2
 from tests.fleet.robots import crossing, problem_of
 from tests.inertia import unicycle_automaton
@@ -20,7 +20,7 @@ STEP, TUBE = 0.5, 0.05
 def held_by(problem):
     (vehicle,) = vehicles_of(FleetProblem([problem]))
     plan = plan_fleet(FleetProblem([problem]), time_limit=20.0, max_rounds=0).plans["1"]
-    return vehicle, Found(plan, 1.0, 0, vehicle.course_of(plan))
+    return vehicle, OwnPlan(plan, 1.0, 0, vehicle.course_of(plan))
 
 
 def driven(vehicle, found, pose, steps, *, tube=TUBE):
@@ -58,7 +58,7 @@ def test_a_moved_plan_has_the_moved_way_back():
     plan = type(found.plan)(
         moved.pose, found.plan.trims, durations=found.plan.durations, maneuvers=found.plan.maneuvers
     )
-    there = Found(plan, 1.0, 0, vehicle.course_of(plan))
+    there = OwnPlan(plan, 1.0, 0, vehicle.course_of(plan))
     pose = np.array([0.0, 0.02, 0.03])
     here = back_onto(vehicle, found, 0.0, pose, STEP, TUBE)
     away = back_onto(vehicle, there, 0.0, (by @ SE2(pose)).pose, STEP, TUBE)

@@ -12,9 +12,8 @@ from maneuver_automaton import Disturbance, FleetProblem, Goal, Problem, simulat
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.fleet import plan_fleet
 from maneuver_automaton.fleet.held import rest_of_plan, resting
-from maneuver_automaton.fleet.planning import vehicles_of
-from maneuver_automaton.fleet.vehicle import Found
-from maneuver_automaton.fleet.wire import decoded, encoded
+from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
+from maneuver_automaton.fleet.workers import decoded, encoded
 from tests.fleet.mortal import Mortal
 from tests.fleet.robots import at_rest, crossing, least_distance, problem_of, scattered
 from tests.inertia import unicycle_automaton
@@ -109,7 +108,7 @@ def test_a_plan_in_few_bytes(heavy):
     fleet = FleetProblem([problem])
     (vehicle,), (again,) = vehicles_of(fleet), vehicles_of(fleet)
     plan = plan_fleet(fleet, time_limit=20.0, max_rounds=0).plans["1"]
-    found = Found(plan, 7.25, 0, vehicle.course_of(plan))
+    found = OwnPlan(plan, 7.25, 0, vehicle.course_of(plan))
     said = encoded(vehicle, found)
     assert heavy or len(said) <= 200  # a motion that was polished is sent whole
     for one in (found, resting(vehicle, np.array([1.0, 2.0, 3.0]), 0.25)):
@@ -121,7 +120,7 @@ def test_a_plan_in_few_bytes(heavy):
             assert np.array_equal(ours.time, theirs.time)
             assert np.array_equal(ours.pose, theirs.pose)
     cut = rest_of_plan(vehicle, found, 0.3)  # with inertia it begins within a maneuver
-    rest = Found(cut, 1.0, 0, vehicle.course_of(cut))
+    rest = OwnPlan(cut, 1.0, 0, vehicle.course_of(cut))
     assert np.array_equal(decoded(again, encoded(vehicle, rest)).plan.end, cut.end)
     with pytest.raises(ValueError, match="a message is cut off"):
         decoded(again, encoded(vehicle, resting(vehicle, plan.start, 0.0))[:20])
