@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,8 @@ from maneuver_automaton.analysis.report import listed
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.cli.automaton_command import few, report_lines
+from maneuver_automaton.cli.check_plans import Finding
+from maneuver_automaton.cli.check_plans import findings as findings_of_plans
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, problem_of
 from maneuver_automaton.cli.progress import announced, waiting
@@ -34,21 +36,9 @@ TRIM_TOLERANCE = 1e-7  # [m, rad] between trim and ODE solver
 UNDECIDED = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Finding:
-    """One line of the report; `holds` is None for a fact that is not judged."""
-
-    what: str
-    holds: bool | None
-    worst: float | None = None
-    words: str
-
-
 def check_file(path: Path, *, parts: Parts, leave: bool = False) -> int:
     """Print the report of a problem, of a fleet, or of plans, and return the exit code."""
-    from maneuver_automaton.cli import check_plans
-
-    if (proven := check_plans.findings(path, parts, leave=leave)) is not None:
+    if (proven := findings_of_plans(path, parts, leave=leave)) is not None:
         return reported(*proven)
     scenario = problem_of(path, parts)
     if not isinstance(scenario, Scenario):

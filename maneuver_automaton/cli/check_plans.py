@@ -5,13 +5,12 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.cli.check_command import Finding
 from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.planned import fleet_planned, road_fleet
@@ -47,6 +46,16 @@ ALONE = {  # kinds of documents that do not state what they were made from
     "road-plan": ("a plan on a road", "planned from"),
     "drive": ("a drive on a road", "driven on"),
 }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One line of the report; `holds` is None for a fact that is not judged."""
+
+    what: str
+    holds: bool | None
+    worst: float | None = None
+    words: str
 
 
 def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, list[Finding]] | None:
