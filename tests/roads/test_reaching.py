@@ -20,7 +20,7 @@ from maneuver_automaton.roads import (
     drive_scene,
     plan_road,
     road_planner,
-    single_plan,
+    driving,
 )
 from tests.formats.outside import DATA, needs_data
 from tests.roads.files import LANES, interval, lanelet, parked, problem, scene_of
@@ -98,7 +98,7 @@ def test_braking_before_the_end_of_the_road_is_a_plan(tmp_path, end, begin, spar
 
 def test_what_the_loop_drives_is_a_plan(tmp_path, monkeypatch):
     scene = scene_of(tmp_path)
-    monkeypatch.setattr(single_plan, "WIDTHS", (0,))
+    monkeypatch.setattr(driving, "WIDTHS", (0,))
     result, drive = plan_road(scene, time_limit=LIMIT), drive_scene(road_planner(scene))
     assert result.plan.duration == pytest.approx(drive.driven.duration)
     assert result.cost <= sum(step.applied_cost for step in drive.steps)
