@@ -290,27 +290,32 @@ def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPl
     limited = bool(np.isfinite(planner.route.limit).any())
     with patient():
         widths = WIDTHS if planner.limits_leave_time else WIDTHS[:2]
-        best = _wider(planner, begin + (0.5 if limited else 1.0) * limit, widths, loop=loop)
+        give_up = begin + (0.5 if limited else 1.0) * limit
+        best = _wider(planner, give_up, begin + limit, widths, loop=loop)
         if limited and best.plan is None and not stopped():
-            hurried = _wider(planner.hurried(), begin + limit, WIDTHS, loop=True)
+            hurried = _wider(planner.hurried(), begin + limit, begin + limit, WIDTHS, loop=True)
             best = best if hurried.plan is None else hurried
     return replace(best, search_s=time.perf_counter() - begin)
 
 
 def _wider(
-    planner: RoadPlanner, deadline: float, widths: Sequence[int], *, loop: bool
+    planner: RoadPlanner, give_up: float, deadline: float, widths: Sequence[int], *, loop: bool
 ) -> RoadPlanResult:
-    """The better one of the first search that finds a plan, and of the next wider one."""
+    """The better one of the first search that finds a plan, and of the next wider one.
+
+    No search begins after the deadline, nor, as long as there is no plan, after `give_up`.
+    """
     best, driven = _without(planner, ""), ""
     for width in widths:
-        if width != widths[0] and (stopped() or time.perf_counter() > deadline):
+        over = give_up if best.plan is None else deadline
+        if width != widths[0] and (stopped() or time.perf_counter() > over):
             break
         cost = best.cost
         if width:
             horizon = planner.last_tick * planner.tick
             found = _searched(planner.wider(width, horizon_s=horizon))
         elif cost is None and loop:
-            found, driven = _driven(planner, deadline)
+            found, driven = _driven(planner, give_up)
         else:
             continue
         if found.plan is not None and (cost is None or (found.cost or 0.0) < cost):
