@@ -29,7 +29,7 @@ from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Polygon
 from maneuver_automaton.planning.checking import load_checks, what_is_hit
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from tests.inertia import car_automaton
 from tests.scenes import moving_scene, room_queries

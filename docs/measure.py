@@ -9,6 +9,7 @@ the numbers of a table whose rows have a command of ``maneuver-automaton`` and w
 file that it writes. Only what has an output below it gets one; outputs that begin with
 "(measured on" depend on the clock or the machine.
 ``notebooks``: their outputs, but players (extra docs).
+``figures``: the pictures of studies, by docs/figures.
 ``gallery``: each scenario by its own command: pictures, plan, and for the README its film.
 """
 
@@ -34,7 +35,7 @@ import numpy as np
 from PIL import Image
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "docs" / "hooks"))
+sys.path[:0] = [str(ROOT / "docs" / "hooks"), str(ROOT / "docs" / "figures")]
 
 import gallery  # noqa: E402
 import printed  # noqa: E402
@@ -55,8 +56,10 @@ LARGE = {  # pictures of the README and of pages, by their scenarios
     "helicopter_city": ("plan_3d.png", "helicopter_city.png"),
 }
 FILMED = "parallel_parking"
+FIGURES = ("symmetry", "feasible", "uniform_effort", "unconstrained", "turnpike")
 TABLES = {  # between a line <!-- word --> and <!-- end -->
     "reference/keys.md": ("keys", reference.keys),
+    "reference/documents.md": ("documents", reference.documents),
     "reference/options.md": ("options", reference.options),
     "reference/python.md": ("names", reference.names),
     "gallery.md": ("scenarios", gallery.table),
@@ -235,6 +238,15 @@ def few_colours(image: Image.Image) -> bytes:
     return written.getvalue()
 
 
+def draw_figure(name: str) -> None:
+    """Draw a picture of a study."""
+    import studies
+    import symmetry
+
+    (symmetry.PICTURES | studies.PICTURES)[f"{name}.png"]().savefig(f"{name}.png", dpi=130)
+    shrink(Path(f"{name}.png"), ROOT / "scenarios" / "pictures" / f"{name}.png", most=WHOLE)
+
+
 def work() -> dict[str, dict[str, Callable[[], None]]]:
     """What there is to do, by word and name."""
     notebooks = sorted((ROOT / "docs" / "tutorials").glob("*.ipynb"))
@@ -242,6 +254,7 @@ def work() -> dict[str, dict[str, Callable[[], None]]]:
         "tables": {TABLES[page][0]: lambda page=page: write_table(page) for page in TABLES},
         "pages": {page.stem: lambda page=page: run_page(page) for page in measured_pages()},
         "notebooks": {file.stem: lambda file=file: run_notebook(file) for file in notebooks},
+        "figures": {name: lambda name=name: draw_figure(name) for name in FIGURES},
         "gallery": {one.stem: lambda one=one: draw_scenario(one) for one in gallery.scenarios()},
     }
 

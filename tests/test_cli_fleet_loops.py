@@ -13,7 +13,7 @@ from PIL import Image
 from maneuver_automaton import fleet
 from maneuver_automaton.cli import run
 from maneuver_automaton.fleet import plan_fleet, simulate_fleet
-from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.scenario import load_scenario, to_yaml
@@ -319,5 +319,5 @@ class TestPlot:
         driven["vehicles"]["east"]["steps"][0].pop("plan")
         Path("out/closed_loop.json").write_text(json.dumps(driven))
         assert run(["plot", "out/closed_loop.json"]) == 2
-        said = "out/closed_loop.json: vehicles.east: misses the key 'plan'\n"
+        said = "out/closed_loop.json: vehicles.east.steps[0].plan: is missing, need a list\n"
         assert capsys.readouterr().err == said

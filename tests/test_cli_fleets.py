@@ -356,11 +356,11 @@ class TestFile:
             ('{"kind": "fleet"}',
              ": is no plan.json, need an object with schema, status, vehicles"),
             ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": []}',
-             ": vehicles: need an object with a plan for each name"),
+             ": vehicles: got [], need an object"),
             ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": {"a": 3}}',
-             ": vehicles.a: 'int' object is not subscriptable"),
+             ": vehicles.a: got 3, need an object"),
             ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": {"a": {"status": '
-             '"found"}}}', ": vehicles.a: misses the key 'trajectory'"),
+             '"found"}}}', ": vehicles.a.schema: is missing, need a whole number"),
         ],
     )  # fmt: skip
     def test_damaged_files(self, tmp_path, content, message):

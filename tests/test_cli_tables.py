@@ -9,11 +9,12 @@ import pytest
 from rich.cells import cell_len
 
 from maneuver_automaton import Automaton, Plan, Problem, SecondOrderCar, Unicycle
+from maneuver_automaton.audit.values import TerminalError
 from maneuver_automaton.cli.loop_tables import print_loop
 from maneuver_automaton.cli.tables import print_result, stretches
 from maneuver_automaton.collision import Box
 from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.planning.result import LowerBound, TerminalError
+from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.receding_horizon import Disturbance, simulate
 from tests.plotting.loops import flight_loop, parking_loop, pushed_loop

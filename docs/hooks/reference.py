@@ -13,6 +13,7 @@ import typer
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli.app import app
+from maneuver_automaton.formats.documents import KINDS, schema_of
 from maneuver_automaton.scenario import json_schema
 
 TOPICS = {  # rooms of the package
@@ -25,6 +26,11 @@ TOPICS = {  # rooms of the package
     "Several vehicles": ("fleet",),
     "Roads": ("roads",),
     "Files and other programs": ("scenario", "formats", "exports"),
+}
+WHOLE = {  # documents that are parts of others, by their sections
+    "PlanDocument": "plan",
+    "RoadPlanDocument": "road-plan",
+    "DriveDocument": "drive",
 }
 PICTURES = "Pictures"
 NAMES = "reference/python.md"
@@ -102,6 +108,28 @@ def keys() -> str:
     )
 
 
+def documents() -> str:
+    """A table of keys for every kind of result file, and for each of their parts once."""
+    wholes, parts = {}, {}
+    for name in KINDS:
+        schema = schema_of(name)
+        wholes[name] = schema
+        parts |= schema.get("$defs", {})
+    inner = {title: part for title, part in sorted(parts.items()) if title.endswith("Entry")}
+    inner["Piece"] = parts["Piece"]
+    return "\n\n".join(stated(title, part) for title, part in (wholes | inner).items())
+
+
+def stated(title: str, part: Mapping[str, Any]) -> str:
+    """The keys of one document, or of a part."""
+    rows = [
+        f"| `{key}` | {kind(value)} | {meaning(value)} |"
+        for key, value in part["properties"].items()
+    ]
+    head = "| key | value | meaning |\n| --- | --- | --- |"
+    return f"## {title}\n\n{part.get('description', '')}\n\n{head}\n" + "\n".join(rows)
+
+
 def section(title: str, part: Mapping[str, Any]) -> str:
     """The keys of one part."""
     required = set(part.get("required", ()))
@@ -122,7 +150,8 @@ def meaning(value: Mapping[str, Any]) -> str:
 def kind(value: Mapping[str, Any]) -> str:
     """What a key may hold, in words."""
     if "$ref" in value:
-        title = value["$ref"].rsplit("/", 1)[1].removesuffix("Part")
+        name = value["$ref"].rsplit("/", 1)[1]
+        title = WHOLE.get(name, name.removesuffix("Part"))
         return f"[{title}](#{title.lower()})"
     if "const" in value:
         return f"`{value['const']}`"
@@ -136,6 +165,8 @@ def kind(value: Mapping[str, Any]) -> str:
         if items:
             return f"list of {len(items)}: {kind(items[0])}"
         return f"list of: {kind(value.get('items', {}))}"
+    if value.get("type") == "object" and value.get("additionalProperties", True) is not True:
+        return f"by name: {kind(value['additionalProperties'])}"
     return {"boolean": "true or false", "string": "text"}.get(
         value.get("type", ""), limited(value) or "any"
     )

@@ -7,16 +7,13 @@ time, so that a stretch is halved only where it matters. Points are complex numb
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import Array, IntArray
 
 LEAST = 1e-300  # a squared length that is none
 ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off

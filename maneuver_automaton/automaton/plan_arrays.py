@@ -5,24 +5,55 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._brief import brief
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Trajectory, Trim
-
-if TYPE_CHECKING:
-    from maneuver_automaton.automaton.plan import Plan
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad", "z_m")
 TWIST_COLUMNS = ("v_x_m_s", "v_y_m_s", "turn_rate_rad_s", "v_z_m_s")
 COLUMNS = ("time", "pose", "twist", "reduced_state", "control")  # arrays with a row an instant
 ROUNDING = 1e-9  # steps, by which a duration may miss a whole number of them
+
+
+class Sampled(Protocol):
+    """A `Plan`, as far as its rows are made of it."""
+
+    @property
+    def start(self) -> Array:
+        """Pose at its beginning."""
+
+    @property
+    def start_time(self) -> float:
+        """Time at its beginning [s]."""
+
+    @property
+    def duration(self) -> float:
+        """From its beginning to its end [s]."""
+
+    @property
+    def switching_times(self) -> Array:
+        """When each primitive begins, and when the last one ends [s]."""
+
+    @property
+    def primitives(self) -> Sequence[Trim | Maneuver]:
+        """Its trims and maneuvers, in their order."""
+
+    @property
+    def word(self) -> tuple[str, ...]:
+        """Their names."""
+
+    def sample(self) -> Trajectory:
+        """Its poses, states and controls at enough times."""
+
+    def pose_at(self, time: ArrayLike, /) -> Array:
+        """Its poses at times [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -65,7 +96,7 @@ class PlanArrays:
         return {"time_s": self.time, **named, "primitive": self.primitive}
 
 
-def plan_arrays(plan: Plan, *, step: float | None, model: Model | None) -> PlanArrays:
+def plan_arrays(plan: Sampled, *, step: float | None, model: Model | None) -> PlanArrays:
     """The arrays of `Plan.as_arrays`."""
     samples = plan.sample()
     if step is not None:
@@ -74,7 +105,7 @@ def plan_arrays(plan: Plan, *, step: float | None, model: Model | None) -> PlanA
     return _arrays(plan, samples, model)
 
 
-def arrays_at(plan: Plan, times: Array, *, model: Model | None) -> PlanArrays:
+def arrays_at(plan: Sampled, times: Array, *, model: Model | None) -> PlanArrays:
     """As `Plan.as_arrays`, at times (n,) that rise [s]."""
     return _arrays(plan, _at_times(plan, plan.sample(), times, model), model)
 
@@ -98,7 +129,7 @@ def joined(parts: Sequence[PlanArrays]) -> PlanArrays:
     )
 
 
-def _arrays(plan: Plan, samples: Trajectory, model: Model | None) -> PlanArrays:
+def _arrays(plan: Sampled, samples: Trajectory, model: Model | None) -> PlanArrays:
     after = np.searchsorted(plan.switching_times[1:-1], samples.time, side="right")
     index = after if plan.primitives else np.full(samples.time.shape, -1)
     n_states, n_controls = samples.reduced_state.shape[1], samples.control.shape[1]
@@ -123,7 +154,7 @@ def step_times(start: float, duration: float, step: float) -> Array:
     return np.append(start + step * np.arange(count), start + duration)
 
 
-def _at_times(plan: Plan, samples: Trajectory, times: Array, model: Model | None) -> Trajectory:
+def _at_times(plan: Sampled, samples: Trajectory, times: Array, model: Model | None) -> Trajectory:
     """The plan at other times: poses exact, reduced states cubic between samples.
 
     The cubic has the rates that the model's equations give at both samples; without a model it is
@@ -148,7 +179,7 @@ def _at_times(plan: Plan, samples: Trajectory, times: Array, model: Model | None
     return Trajectory(time=times, pose=plan.pose_at(times), reduced_state=state, control=control)
 
 
-def _twists(plan: Plan, samples: Trajectory, index: IntArray, model: Model | None) -> Array:
+def _twists(plan: Sampled, samples: Trajectory, index: IntArray, model: Model | None) -> Array:
     """Twists (n, dof): a trim's own; of a maneuver what its model says, or else the mean."""
     twists = np.zeros_like(samples.pose)
     for k, primitive in enumerate(plan.primitives):
@@ -163,7 +194,7 @@ def _twists(plan: Plan, samples: Trajectory, index: IntArray, model: Model | Non
     return twists
 
 
-def _mean_twists(plan: Plan, times: Array, rows: IntArray) -> Array:
+def _mean_twists(plan: Sampled, times: Array, rows: IntArray) -> Array:
     """Constant twist (m, dof) that leads from the pose of each row to that of the next."""
     begin = np.minimum(rows, times.size - 2)
     group = group_of(plan.start.size)

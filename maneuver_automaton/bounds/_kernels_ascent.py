@@ -10,18 +10,15 @@ layers, its neighbours along x and y at the lower and at the upper one), 40 to 4
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.bounds._kernels_dual import LANES, gather
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import IntArray
-    from maneuver_automaton.bounds.program import Single
+from maneuver_automaton.bounds.arrays import Single
 
 ROWS = 48  # of the array `w`
 

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.bounds.pose_scene import PoseArrays
+from maneuver_automaton.bounds.arrays import PoseArrays
 
 BLOCKED, UNKNOWN, FREE = 0, 1, 2  # states of a box
 

@@ -7,17 +7,13 @@ headings; in a cell it is bilinear in the place and linear in the heading.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_kernel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.bounds.families import Families
+from maneuver_automaton.bounds.families import Families
 
 
 @bare_kernel

@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 from heapq import heappop, heappush
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.bounds._kernels_boxes import box_state
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.bounds.connectivity import Cells, Grid
-    from maneuver_automaton.bounds.pose_scene import PoseArrays
+from maneuver_automaton.bounds.arrays import Cells, Grid, PoseArrays
 
 BLOCKED, UNKNOWN, FREE = 0, 1, 2  # states of a box
 START, GOAL = 1, 2  # bits of `Cells.ends`

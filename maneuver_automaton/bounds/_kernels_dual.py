@@ -12,16 +12,11 @@ the turn, 32 to 43 what differences 8 to 19 get back.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton.bounds.program import Rows, Single
+from maneuver_automaton.bounds.arrays import Rows, Single
 
 LANES = 64  # cells of a block
 ROWS = 44  # of the array `w`

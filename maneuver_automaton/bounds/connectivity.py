@@ -12,15 +12,14 @@ import enum
 import math
 import time
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.bounds import _kernels_connectivity
 from maneuver_automaton.bounds._kernels_boxes import UNKNOWN
 from maneuver_automaton.bounds._kernels_connectivity import GOAL, ROUNDED, START
+from maneuver_automaton.bounds.arrays import Cells, Grid
 from maneuver_automaton.bounds.pose_scene import TOUCHING, PoseScene
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
@@ -41,33 +40,6 @@ class Connection(enum.Enum):
     CONNECTED = "connected"  # through boxes that are free
     SEPARATED = "separated"  # proven: no path leads through boxes that may be free
     OPEN = "open"  # not known after the work that was allowed
-
-
-class Grid(NamedTuple):
-    """Sizes of the boxes of a tree, level by level, the roots first."""
-
-    origin_x: float
-    origin_y: float
-    origin_heading: float
-    columns: int
-    rows: int
-    size: Array  # (levels,) [m] in x and y
-    price: Array  # (levels,) of a box that is not known to be free
-    half_turn: Array  # (levels,) [rad] half a size in heading
-    turns: IntArray  # (levels,) how many boxes fill the circle; 1 where no heading matters
-    splits: NDArray[np.bool_]  # (levels,) whether the next level is finer in heading
-    doublings: IntArray  # (levels,) how often it has become so
-    touching: float  # [m, rad] by which an end may be beside a box that holds it
-
-
-class Cells(NamedTuple):
-    """Boxes of a tree; the roots come first, the children of a cell stand together."""
-
-    level: NDArray[np.int8]  # (n,)
-    at: NDArray[np.int32]  # (n, 3) column, row and heading in the grid of its level
-    state: NDArray[np.int8]  # (n,) 0 blocked, 1 not known, 2 free
-    child: IntArray  # (n,) the first of its children, -1 of a leaf
-    ends: NDArray[np.int8]  # (n,) 1 if it holds the start, 2 a goal, 3 both
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

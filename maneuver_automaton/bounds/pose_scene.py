@@ -4,45 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.bounds import _kernels_boxes
+from maneuver_automaton.bounds.arrays import PoseArrays
 from maneuver_automaton.collision import AnyObstacle
 from maneuver_automaton.collision.convex import Solids, solids_of
 from maneuver_automaton.collision.layers import always
-from maneuver_automaton.collision.world import Buckets, World, own_frame, world_of
+from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.problem import Bounds, Problem, moves
 
 TOUCHING = 1e-6  # [m] what is less deep in an obstacle may pass: checks and places are rounded
 FLAT = 2e-3  # [m] that the sides of a polygon in a disc may cut off
 MOST_SIDES = 64  # of such a polygon
-
-
-class PoseArrays(NamedTuple):
-    """Convex parts of a body and convex obstacles that never leave, for the kernels.
-
-    Round corners are cut by sides inside of them, so what collides with these arrays collides;
-    they lack at most `body_loose` and `loose`, so what is further apart than those is free.
-    """
-
-    body: Array  # (V, 5) as in `Solids`, seen from the vehicle
-    body_first: IntArray  # (P + 1,)
-    body_loose: Array  # (P,) [m]
-    solids: Array  # (W, 5) as in `Solids`, grown by the margin
-    first: IntArray  # (O + 1,)
-    plates: Array  # (O, 5) rectangles around the obstacles, without the margin
-    loose: Array  # (O,) [m]
-    buckets: Buckets  # obstacles near each place of the middle of the body
-    limits: Array  # (L, 3) n_x, n_y, c: a pose is within the bounds where n . (x, y) <= c
-    middle_x: float  # [m] of a disc that holds the body ...
-    middle_y: float
-    reach: float  # ... and its radius
-    margin: float  # [m] kept from every obstacle
-    touching: float  # [m] depth and clearance below which nothing is said
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -12,29 +12,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.bounds import _kernels_ascent, _kernels_certificate, _kernels_dual
+from maneuver_automaton.bounds.arrays import Rows, Single
 from maneuver_automaton.bounds.cells import Cells
 from maneuver_automaton.bounds.families import Families, Motions
 
-Single = NDArray[np.float32]
-
 OVER = 1.9  # times the step of the method: the limit for convergence is 2
 ROUNDING = 1e-9  # relative, of the largest slope
-
-
-class Rows(NamedTuple):
-    """Rows of the program: weights of the directions at each layer, and sizes of dual steps."""
-
-    table: Single  # (F * 7 * (K + 1),) both layers' directions, and three steps; the last is 0
-    turn: Single  # (F,)
-    side: IntArray  # (F,)
-    gear: IntArray  # (F,)
 
 
 @dataclass(slots=True, eq=False, kw_only=True)

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.bounds.connectivity import (
     MOST_BOXES,
     Connection,
+    Connectivity,
     connectivity,
 )
 from maneuver_automaton.bounds.pose_scene import PoseScene, lasting_obstacles, pose_scene
@@ -87,8 +89,13 @@ def separation(
     if not lasting_obstacles(problem):
         return None
     scene, start, goals = _asked(problem)
-    proof = connectivity(
-        scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
+    known = _proofs(problem)
+    proof = (
+        known[0]
+        if known
+        else connectivity(
+            scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
+        )
     )
     if proof.answer is not Connection.SEPARATED:
         return None
@@ -119,6 +126,7 @@ def widest_path(
     scene, start, goals = _asked(problem)
     ask = functools.partial(connectivity, scene, start, goals, bounds=problem.bounds)
     found, kept, apart = ask(most_boxes=most_boxes, deadline=deadline), 0.0, first
+    _proofs(problem).extend([found] if found.answer is Connection.SEPARATED else [])
     for _ in range(TRIES if found.answer is Connection.CONNECTED else 0):
         if time.monotonic() > deadline or apart - kept <= ROUGHLY * kept / 2.0:
             break
@@ -128,6 +136,13 @@ def widest_path(
         else:
             apart = 0.5 * (kept + apart)
     return found.answer, found.path, kept
+
+
+@kept_by_first
+def _proofs(problem: Problem) -> list[Connectivity]:
+    """Where a search that has met the proof for a problem leaves it for `separation`."""
+    del problem
+    return []
 
 
 def goals_blocked(problem: Problem, *, most_boxes: int, deadline: float = math.inf) -> bool:

@@ -346,7 +346,7 @@ def check(
 
     FILE may be a plan.json: its plans are proven again, in the world of the file that they were
     planned from, which is that of --with or, of several vehicles, the one that they name. So is
-    what was driven in a closed_loop.json of several vehicles.
+    what was driven in a closed_loop.json, of one vehicle or several, on roads too.
     """
     from maneuver_automaton.cli import check_command
     from maneuver_automaton.cli.inputs import Parts
@@ -577,8 +577,18 @@ def export(
 
 @app.command(epilog=ending("schema"))
 @exits
-def schema() -> int:
-    """Print the JSON Schema of scenario files, for editors."""
+def schema(
+    document: Annotated[
+        str | None,
+        typer.Option(
+            "--document",
+            metavar="KIND",
+            help="Of a result file: plan, loop, statistics, fleet, fleet-loop, road-plan, drive, "
+            "road-fleet or road-fleet-drive.",
+        ),
+    ] = None,
+) -> int:
+    """Print the JSON Schema of scenario files, for editors, or of a file that is written."""
     from maneuver_automaton.cli import convert_command
 
-    return convert_command.print_schema()
+    return convert_command.print_schema(document)

@@ -1,4 +1,4 @@
-"""`check PLAN.json`: the plans of a file proven again, each alone and every pair; loops too."""
+"""`check` of a result file: its plans proven again, or what was driven looked at again."""
 
 from __future__ import annotations
 
@@ -18,95 +18,109 @@ from maneuver_automaton.cli.planned import fleet_planned, road_fleet
 from maneuver_automaton.cli.progress import announced
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.fleet import Closest, DrivenVerdict, FleetLog, verify_driven, verify_fleet
-from maneuver_automaton.fleet.driven import FINE
-from maneuver_automaton.formats.driven_json import read_closed_loop_document
-from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop, read_fleet_loop_document
-from maneuver_automaton.formats.plan_json import (
-    load_plan,
-    load_plans,
-    read_fleet_document,
-    read_plan_document,
+from maneuver_automaton.fleet import (
+    Closest,
+    DrivenVerdict,
+    FleetLog,
+    FleetProblem,
+    FleetStep,
+    verify_driven,
+    verify_fleet,
 )
+from maneuver_automaton.fleet.driven import FINE
+from maneuver_automaton.formats.closed_loop_json import load_closed_loop
+from maneuver_automaton.formats.documents import checked, kind_of, parsed, told_of
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.formats.plan_json import load_plan, load_plans
 from maneuver_automaton.planning.verdict import Verdict, verify
-from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon import within
+from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.receding_horizon import ClosedLoop, within
 from maneuver_automaton.roads import RoadFleetResult, RoadPair
 
 ENDING = ".json"
 AGREES = 1e-9  # share by which a cost may differ from that of the file
 THERE = 1e-9  # [m, rad] between a start and where a vehicle begins
 NEARER = 1e-6  # [m] by which a distance may be below that of the file
+ALONE = {  # kinds of documents that do not state what they were made from
+    "plan": ("a plan", "planned from"),
+    "loop": ("a closed loop", "driven in"),
+    "road-plan": ("a plan on a road", "planned from"),
+    "drive": ("a drive on a road", "driven on"),
+}
 
 
-def findings(
-    path: Path, parts: Parts, *, leave: bool = False
-) -> tuple[str, Iterator[Finding]] | None:
-    """The name of what was planned, and what holds of the plans of a file; None of no plans.
+def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, list[Finding]] | None:
+    """The name of what was planned or driven, and what holds of it; None of no result file.
 
-    The plan of one vehicle needs the file of --with, and may `leave` a start in contact; plans of
-    several name theirs.
+    What one vehicle did needs the file of --with, and its plan may `leave` a start in contact;
+    files of several vehicles name theirs.
 
     Raises
     ------
     InvalidScenario
-        If the file holds no plans, or the scenario of `parts` is not theirs.
+        If the file is damaged or holds statistics, or the scenario of `parts` is not its own.
     """
-    if path.suffix.lower() != ENDING:
+    if path.suffix.lower() != ENDING or not (kind := kind_of(value := parsed(path))):
         return None
+    if kind == "statistics":
+        raise InvalidScenario(
+            f"{path}: holds statistics, which do not say what was driven; need a plan.json or a "
+            "closed_loop.json"
+        )
+    if kind in ALONE and parts.beside is None:
+        what, how = ALONE[kind]
+        raise InvalidScenario(
+            f"{path}: is {what}, which does not state its problem; need --with FILE, the scenario "
+            f"that it was {how}"
+        )
     if (roads := road_fleet(path, parts, alone=True)) is not None:
-        return roads.name, _on_road(roads)
-    if (driven := read_fleet_loop_document(path)) is not None:
-        return loop_findings(path, driven, parts)
-    document = read_fleet_document(path)
-    if document is not None:
-        return _of_fleet(path, document, parts)
-    if read_closed_loop_document(path) is not None:
-        raise InvalidScenario(
-            f"{path}: is a closed loop of one vehicle, which is audited while it is driven; need "
-            "a plan, or a closed loop of several vehicles"
-        )
-    if parts.beside is None:
-        try:
-            read_plan_document(path)
-        except InvalidScenario:
-            return None  # told by who reads scenarios
-        raise InvalidScenario(
-            f"{path}: is a plan, which does not state its problem; need --with FILE, the scenario "
-            "that it was planned from"
-        )
-    stated = read_plan_document(path)
+        return roads.name, list(_on_road(roads))
+    if "road" in kind or kind == "drive":
+        raise InvalidScenario(f"{path}: was made on a road, need --with and its CommonRoad file")
+    document = checked(kind, value, path)
+    if kind in ("fleet", "fleet-loop"):
+        fleet = fleet_planned(path, document, parts)
+        if kind == "fleet":
+            return fleet.name, _plans(path, document, fleet.fleet)
+        return fleet.name, _loop(path, document, load_fleet_loop(path, fleet.fleet))
+    assert parts.beside is not None
     scenario = scenario_of(parts.beside, replace(parts, beside=None))
+    if kind == "loop":
+        log = _log_of(load_closed_loop(path, scenario.problem))
+        return scenario.name, _loop(path, document, log)
     plan = load_plan(path, model=scenario.problem.automaton.model)
     with announced(), _of_this(path):
         verdict = verify(scenario.problem, plan, leave=leave)
-    return scenario.name, iter([_plan("plan", verdict, stated.get("cost"))])
+    return scenario.name, [_plan("plan", verdict, document.get("cost"))]
 
 
-def _of_fleet(
-    path: Path, document: Mapping[str, Any], parts: Parts
-) -> tuple[str, Iterator[Finding]]:
-    scenario = fleet_planned(path, document, parts)
+# -- plans
+
+
+def _plans(path: Path, document: Mapping[str, Any], fleet: FleetProblem) -> list[Finding]:
+    """What holds of the plans of several vehicles, each alone and every pair."""
     plans = load_plans(path)
     with announced(), _of_this(path):
-        verdict = verify_fleet(scenario.fleet, plans)
+        verdict = verify_fleet(fleet, plans)
     stated = document["vehicles"]
     rows = [
         _plan(f"{name}: plan", verdict.verdicts[name], stated[name].get("cost"))
         if name in verdict.verdicts
-        else Finding(what=f"{name}: plan", holds=False, words=_why_none(stated.get(name)))
-        for name in scenario.fleet.names
+        else Finding(
+            what=f"{name}: plan",
+            holds=False,
+            words=_why_none(stated.get(name, {}).get("reason")),
+        )
+        for name in fleet.names
     ]
-    return scenario.name, iter([*rows, *_pairs(verdict.closest, verdict.too_near)])
+    return [*rows, *_pairs(verdict.closest, verdict.too_near)]
 
 
 def _on_road(result: RoadFleetResult) -> Iterator[Finding]:
     """What the judge says of each drive past the others, and whether it ends at a goal."""
     for name, one in result.results.items():
         if one.plan is None or one.verdict is None:
-            yield Finding(
-                what=f"{name}: plan", holds=False, words=_why_none({"reason": one.reason})
-            )
+            yield Finding(what=f"{name}: plan", holds=False, words=_why_none(one.reason))
             continue
         scene, verdict = one.planner.scene, one.verdict
         said = "; ".join(words for _, words in verdict.faults)
@@ -152,17 +166,18 @@ def _plan(what: str, verdict: Verdict, stated: Any) -> Finding:
     """What holds of a plan, and whether it costs what its file says."""
     if not verdict.passed:
         return Finding(what=what, holds=False, words=verdict.reason)
-    same = isinstance(stated, int | float) and (
-        abs(stated - verdict.cost) <= AGREES * max(1.0, abs(verdict.cost))
-    )
+    same = _agrees(stated, verdict.cost)
     clearance = None if verdict.audit is None else verdict.audit.min_clearance_m
     words = f"cost {verdict.cost:.9g}" + ("" if same else f", but the file says {stated}")
     return Finding(what=what, holds=same, worst=clearance, words=words)
 
 
-def _why_none(stated: Any) -> str:
-    reason = stated.get("reason") if isinstance(stated, dict) else None
+def _why_none(reason: str | None) -> str:
     return f"there is none: {reason}" if reason else "there is none"
+
+
+def _agrees(stated: Any, cost: float) -> bool:
+    return isinstance(stated, int | float) and abs(stated - cost) <= AGREES * max(1.0, abs(cost))
 
 
 @contextlib.contextmanager
@@ -174,31 +189,71 @@ def _of_this(path: Path) -> Iterator[None]:
         raise InvalidScenario(f"{path}: {error}") from error
 
 
-def loop_findings(
-    path: Path, document: Mapping[str, Any], parts: Parts
-) -> tuple[str, Iterator[Finding]]:
-    """The name of what was driven, and what holds of it.
+# -- closed loops
 
-    Raises
-    ------
-    InvalidScenario
-        If the file is damaged, or the scenario is not that of the loop.
-    """
-    scenario = fleet_planned(path, document, parts)
-    log = load_fleet_loop(path, scenario.fleet)
-    try:
+
+def _log_of(loop: ClosedLoop) -> FleetLog:
+    """The loop of one vehicle as that of a fleet."""
+    steps = [
+        FleetStep(
+            number=step.number,
+            time=step.time,
+            poses={"vehicle": pose},
+            plans={"vehicle": step.plan},
+            driven={"vehicle": step.plan},
+            values={"vehicle": step.value},
+            arrivals={"vehicle": math.inf},
+            off_plan={"vehicle": 0.0},
+            arrived=(),
+            swaps=(),
+            asked=(),
+            void=(),
+            refused=(),
+            gap_m=math.inf,
+            violations=(),
+            solve_s=step.solve_s,
+        )
+        for step, pose in zip(loop.steps, loop.poses, strict=False)
+    ]
+    return FleetLog(
+        problem=FleetProblem(  # which admits no fixed time, and no goal in motion but of who leaves
+            [replace(loop.problem, horizon=Horizon())], names=["vehicle"], leaves=[True]
+        ),
+        step=loop.step,
+        steps=tuple(steps),
+        driven={"vehicle": loop.driven},
+        arrived_s={"vehicle": float(loop.times[-1])} if loop.reached else {},
+        broken_down=(),
+        closest=None,
+        status=loop.status,
+        cost=loop.cost,
+    )
+
+
+def _loop(path: Path, document: Mapping[str, Any], log: FleetLog) -> list[Finding]:
+    """What holds of what was driven: each vehicle alone, and every pair."""
+    several = "vehicles" in document
+    with told_of(path):
         with announced():
             verdict = verify_driven(log)
         rows = [
             one
             for name, problem in zip(log.problem.names, log.problem.problems, strict=True)
-            for one in _vehicle(log, verdict, name, problem, document["vehicles"][name])
+            for one in _vehicle(
+                log, verdict, name, problem, document["vehicles"][name] if several else document
+            )
         ]
-        rows += _together(log, verdict, document)
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{path}: {said}") from error
-    return scenario.name, iter(rows)
+        if several:
+            rows += _together(log, verdict, document["clearance_m"]["between"])
+        broken = {one["step"] for one in document["broken_guarantees"]}
+        rows.append(
+            Finding(
+                what="guarantees: as the file says",
+                holds=not broken,
+                words=f"broken in {len(broken)} steps" if broken else "hold in every step",
+            )
+        )
+        return rows
 
 
 def _vehicle(
@@ -251,9 +306,7 @@ def _ended(log: FleetLog, name: str, problem: Problem, stated: Mapping[str, Any]
     return Finding(what=what, holds=there, words=words)
 
 
-def _together(
-    log: FleetLog, verdict: DrivenVerdict, document: Mapping[str, Any]
-) -> Iterator[Finding]:
+def _together(log: FleetLog, verdict: DrivenVerdict, stated: float | None) -> Iterator[Finding]:
     """Whether any two kept apart, and the file says what was measured."""
     calm = max(verdict.jumps_m.values(), default=0.0) <= THERE
     near = [row for row in verdict.closest if row.distance_m < log.problem.margin - 2.0 * FINE]
@@ -274,7 +327,6 @@ def _together(
             worst=nearest[0].distance_m if nearest else None,
             words=pair_text(nearest[0]) if nearest else "there is none that comes near",
         )
-    stated = document["clearance_m"]["between"]
     if verdict.distance_m < (math.inf if stated is None else stated) - NEARER:
         yield Finding(
             what="least distance: as the file says",
@@ -282,13 +334,3 @@ def _together(
             worst=verdict.distance_m,
             words=f"but the file says {stated}",
         )
-    broken = len({number for number, _ in log.violations})
-    yield Finding(
-        what="guarantees: as the file says",
-        holds=not broken,
-        words=f"broken in {broken} steps" if broken else "hold in every step",
-    )
-
-
-def _agrees(stated: Any, cost: float) -> bool:
-    return isinstance(stated, int | float) and abs(stated - cost) <= AGREES * max(1.0, abs(cost))

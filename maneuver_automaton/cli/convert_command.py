@@ -178,7 +178,7 @@ def plot(
         draw = functools.partial(_draw_roads, roads, path, what, look)
     elif (driven := _loop_of_fleet(file)) is not None:
         from maneuver_automaton.cli.planned import fleet_planned
-        from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
+        from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 
         fleet = fleet_planned(file, driven, Parts(beside=beside))
         log = load_fleet_loop(file, fleet.fleet)
@@ -222,7 +222,7 @@ def _plans_of_fleet(file: Path) -> dict[str, Any] | None:
 
 def _loop_of_fleet(file: Path) -> dict[str, Any] | None:
     """The content of a closed_loop.json of several vehicles; None of anything else."""
-    from maneuver_automaton.formats.fleet_loop_reading import read_fleet_loop_document
+    from maneuver_automaton.formats.fleet_loop_json import read_fleet_loop_document
 
     return read_fleet_loop_document(file)
 
@@ -322,8 +322,11 @@ def _picture(file: Path, out: Path | None, what: str) -> Path:
 
 def _value_of(file: Path, problem: Problem) -> PlanResult | ClosedLoop:
     """The plan or closed loop of a file, in the world that it was made for."""
-    from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
-    from maneuver_automaton.formats.result_json import load_result
+    from maneuver_automaton.formats.closed_loop_json import (
+        load_closed_loop,
+        read_closed_loop_document,
+    )
+    from maneuver_automaton.formats.plan_json import load_result
 
     if read_closed_loop_document(file) is None:
         return load_result(file, problem)
@@ -332,7 +335,10 @@ def _value_of(file: Path, problem: Problem) -> PlanResult | ClosedLoop:
 
 def _drawn(file: Path) -> dict[str, Any]:
     """What to draw of a plan.json, or of a closed_loop.json, whose drive is drawn as a plan."""
-    from maneuver_automaton.formats.driven_json import driven_document, read_closed_loop_document
+    from maneuver_automaton.formats.closed_loop_json import (
+        driven_document,
+        read_closed_loop_document,
+    )
     from maneuver_automaton.formats.plan_json import read_plan_document
 
     loop = read_closed_loop_document(file)
@@ -345,9 +351,13 @@ def _drawn(file: Path) -> dict[str, Any]:
         raise InvalidScenario(f"{file}: {said}") from error
 
 
-def print_schema() -> int:
-    """Print the JSON Schema of scenario files."""
+def print_schema(document: str | None = None) -> int:
+    """Print the JSON Schema of scenario files, or of a kind of document."""
+    from maneuver_automaton.formats.documents import KINDS, schema_of
     from maneuver_automaton.scenario import json_schema
 
-    sys.stdout.write(json.dumps(json_schema(), indent=2) + "\n")
+    if document is not None and document not in KINDS:
+        raise InvalidScenario(f"--document: got {document!r}, need {', '.join(KINDS)}")
+    schema = json_schema() if document is None else schema_of(document)
+    sys.stdout.write(json.dumps(schema, indent=2) + "\n")
     return FOUND

@@ -71,7 +71,10 @@ EXAMPLES = {
         "maneuver-automaton plot out/plan.json --html --with scenarios/parking.yaml",
         "maneuver-automaton plot out/closed_loop.json --with scenarios/parking_loop.yaml",
     ),
-    "schema": ("maneuver-automaton schema > scenario.schema.json",),
+    "schema": (
+        "maneuver-automaton schema > scenario.schema.json",
+        "maneuver-automaton schema --document plan > plan.schema.json",
+    ),
 }
 
 

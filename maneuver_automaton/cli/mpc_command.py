@@ -201,7 +201,7 @@ def _loop(path: Path, scenario: Scenario, settings: Settings) -> ClosedLoop:
 
 def _statistics(path: Path, scenario: Scenario, out: Path, settings: Settings) -> int:
     """Drive the loop with seed after seed; print a table and write statistics.json."""
-    from maneuver_automaton.formats.statistics_json import save_statistics
+    from maneuver_automaton.formats.closed_loop_json import save_statistics
     from maneuver_automaton.receding_horizon import simulate_many
 
     part = scenario.receding_horizon

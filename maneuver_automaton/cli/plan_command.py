@@ -205,7 +205,7 @@ def _road_row(path: Path, parts: Parts, out: Path, settings: Settings) -> Row:
 def compile_first(*, quiet: bool) -> None:
     """Have the kernels in the cache, or every process would compile them for itself."""
     from maneuver_automaton.refinement.ready import load_lattice
-    from maneuver_automaton.search.ready import load_insertion_kernels, load_word_kernels
+    from maneuver_automaton.search.choose import load_insertion_kernels, load_word_kernels
 
     with announced(quiet=quiet):
         load_word_kernels(4)

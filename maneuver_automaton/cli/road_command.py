@@ -32,7 +32,7 @@ def is_road(path: Path) -> bool:
 
 def plan_file(path: Path, out: Path, *, settings: PlanSettings, parts: Parts) -> RoadPlanResult:
     """Plan one drive into the folder `out`, and print the plan; the result."""
-    from maneuver_automaton.formats.plan_json import write_document
+    from maneuver_automaton.formats.documents import write_document
     from maneuver_automaton.formats.road_json import road_plan_to_dict
     from maneuver_automaton.roads import plan_road
 
@@ -80,7 +80,7 @@ def drive_file(path: Path, out: Path, *, settings: mpc_command.Settings, parts: 
     Where the search of one step finds no plan to a goal from the start, a wider one is made before
     the vehicle sets off, and told apart from the steps.
     """
-    from maneuver_automaton.formats.plan_json import write_document
+    from maneuver_automaton.formats.documents import write_document
     from maneuver_automaton.formats.road_json import road_drive_to_dict
     from maneuver_automaton.roads import drive_scene, plan_before, road_planner
 

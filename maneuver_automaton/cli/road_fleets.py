@@ -182,8 +182,7 @@ def _write(
     settings: Settings,
     parts: Parts,
 ) -> None:
-    from maneuver_automaton.formats.fleet_json import source_entry
-    from maneuver_automaton.formats.plan_json import write_document
+    from maneuver_automaton.formats.documents import source_entry, write_document
     from maneuver_automaton.formats.road_json import road_fleet_to_dict
 
     document = road_fleet_to_dict(result, status=_status(result), reason=_reason(result))
@@ -201,8 +200,7 @@ def _write_drive(
     settings: mpc_command.Settings,
     parts: Parts,
 ) -> None:
-    from maneuver_automaton.formats.fleet_json import source_entry
-    from maneuver_automaton.formats.plan_json import write_document
+    from maneuver_automaton.formats.documents import source_entry, write_document
     from maneuver_automaton.formats.road_json import road_fleet_drive_to_dict
 
     file = out / "closed_loop.json"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import (
     NEAR,
@@ -15,12 +15,9 @@ from maneuver_automaton.collision._kernels_clearance import (
     static_clearance,
 )
 from maneuver_automaton.collision._kernels_moving import free_of_moving, moving_clearance
+from maneuver_automaton.collision.arrays import WorldArrays
+from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.collision.body import Body
-    from maneuver_automaton.collision.world import WorldArrays
 
 FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
 

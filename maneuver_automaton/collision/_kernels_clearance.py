@@ -8,15 +8,11 @@ offset.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-
-if TYPE_CHECKING:
-    from maneuver_automaton.collision.body import Body
-    from maneuver_automaton.collision.convex import Solids
-    from maneuver_automaton.collision.swept_areas import SweptAreas
-    from maneuver_automaton.collision.world import Buckets, Field, WorldArrays
+from maneuver_automaton.collision.arrays import Buckets, Field, SweptAreas, WorldArrays
+from maneuver_automaton.collision.body import Body
+from maneuver_automaton.collision.convex import Solids
 
 NEAR = 0.1  # share of a body's reach below which solids are looked at one by one
 SHARP = 0.3  # share of that below which clearances to sharp corners are made exact

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import point_to_segment
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import Array, IntArray
 
 
 @inner_kernel

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from maneuver_automaton._compile import bare_inner_kernel
+from maneuver_automaton.collision.arrays import Buckets, Field, MovingObstacles, Slabs, WorldArrays
 from maneuver_automaton.collision.convex import Solids
-from maneuver_automaton.collision.slabs import Slabs
-from maneuver_automaton.collision.world import Buckets, Field, MovingObstacles, WorldArrays
-
-if TYPE_CHECKING:
-    from maneuver_automaton.collision.layers import LayerArrays
+from maneuver_automaton.collision.layers import LayerArrays
 
 
 @bare_inner_kernel

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
 from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
+from maneuver_automaton.collision.arrays import MovingObstacles
+from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton.collision.body import Body
-    from maneuver_automaton.collision.world import MovingObstacles
 
 SOON = 1e-11  # [s] a knot that is nearer in time counts as reached: in it nothing moves 1e-9 m
 

@@ -9,16 +9,12 @@ axis. So a box needs two places and a length, on lines and on arcs alike.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_kernel, inlined_kernel
+from maneuver_automaton.collision.arrays import MovingObstacles, Slabs
+from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.collision.body import Body
-    from maneuver_automaton.collision.slabs import Slabs
-    from maneuver_automaton.collision.world import MovingObstacles
 
 LONGER = 1.0 + 1e-12  # than a straight path by rounding, squared
 

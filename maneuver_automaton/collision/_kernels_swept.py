@@ -6,18 +6,14 @@ One test of a polygon that holds the whole motion spares the tests of the poses 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import separation
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.collision.body import Body
-    from maneuver_automaton.collision.swept_areas import SweptAreas
-    from maneuver_automaton.collision.world import WorldArrays
+from maneuver_automaton.collision.arrays import SweptAreas, WorldArrays
+from maneuver_automaton.collision.body import Body
 
 WIDEST = 0.5 * math.pi  # [rad] of a turn whose tangents hold it closely
 SHORT = 1e-9  # [m] of an edge without a normal

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.arrays import Field, MovingObstacles, WorldArrays
 from maneuver_automaton.collision.convex import Solids
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.collision.shapes import AnyObstacle
 from maneuver_automaton.collision.slabs import NO_SLABS
-from maneuver_automaton.collision.world import Field, MovingObstacles, World, WorldArrays
+from maneuver_automaton.collision.world import World
 
 MOST_LAYERS = 24  # more are joined, the thinnest first
 ROUNDED = 1e-8  # [m] by which heights may be off

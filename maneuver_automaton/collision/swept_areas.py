@@ -5,24 +5,12 @@ For the exact solids of a finished plan see `swept`; these are for the proof alo
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import _kernels_swept
+from maneuver_automaton.collision.arrays import SweptAreas
 from maneuver_automaton.collision.body import Body
-
-
-class SweptAreas(NamedTuple):
-    """Convex polygons, one for every motion and piece of the body, that hold all it covers.
-
-    They are grown by the rounding of the piece, which the body knows.
-    """
-
-    edges: Array  # (V, 5) as in `Solids`
-    first: IntArray  # (m k P + 1,) where each polygon begins, those of a motion one after the other
-    places: Array  # (m k, 5) middle x, y, and radius of a disc around all; cosine, sine of the turn
 
 
 def swept_areas(body: Body, twists: Array, durations: Array) -> SweptAreas:

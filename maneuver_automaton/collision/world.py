@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import FEW, Array, IntArray, wrapped
+from maneuver_automaton._arrays import FEW, Array, wrapped
 from maneuver_automaton.collision import _kernels_field
+from maneuver_automaton.collision.arrays import Buckets, Field, MovingObstacles, WorldArrays
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
     DIGITS,
@@ -35,7 +35,7 @@ from maneuver_automaton.collision.shapes import (
     OccupancyMap,
     Shape,
 )
-from maneuver_automaton.collision.slabs import NO_SLABS, Slabs, slabs_of
+from maneuver_automaton.collision.slabs import NO_SLABS, slabs_of
 from maneuver_automaton.groups import SE2
 
 MOST_FIELD_CELLS = 60_000
@@ -44,55 +44,6 @@ MOST_BUCKETS = 100_000
 ALONG = 0.5  # [rad] of an arc between the places that say where a moving obstacle goes
 SHARE = 10.0**DIGITS  # of a metre or radian that a coordinate is rounded to
 HALF_TURN = float(np.round(np.pi, DIGITS))
-
-
-class Field(NamedTuple):
-    """Distances to the nearest solid at cell centres, capped."""
-
-    distance: Array  # (rows, columns) [m]
-    origin_x: float
-    origin_y: float
-    cell: float  # [m]
-    outside: float  # [m] distance that holds outside the field
-
-
-class Buckets(NamedTuple):
-    """Solids near each place: those left out are at least `reach` from a body in the middle."""
-
-    start: IntArray  # (rows * columns + 1,)
-    items: IntArray
-    origin_x: float
-    origin_y: float
-    cell: float  # [m]
-    columns: int
-    rows: int
-    reach: float  # [m]
-
-
-class MovingObstacles(NamedTuple):
-    """Moving obstacles: each a range of solids in its own frame, and knots in time."""
-
-    solids: Solids
-    first_piece: IntArray  # (M + 1,)
-    first_knot: IntArray  # (M + 1,)
-    time: Array  # (K,) [s]
-    pose: Array  # (K, 3)
-    speed: Array  # (M,) [m/s] greatest of any of its points
-    middle: Array  # (M, 2) of a disc around it, in its frame
-    reach: Array  # (M,) radius of that disc
-    present: Array  # (M, 2) [s] it is there from and until; held at its first and last knot beyond
-    rate: Array  # (K, 3) after each knot: of the pose, or the twist in the frame of what coasts
-    arcs: NDArray[np.bool_]  # (M,) whether it coasts on arcs from knot to knot
-    slabs: Slabs  # where each may be, by time
-
-
-class WorldArrays(NamedTuple):
-    """Arrays of a world for the kernels."""
-
-    solids: Solids
-    buckets: Buckets
-    field: Field
-    moving: MovingObstacles
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

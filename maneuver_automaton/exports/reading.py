@@ -14,7 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.driven import Driven, driven_of, driven_on_road
-from maneuver_automaton.formats.driven_json import load_closed_loop, read_closed_loop_document
+from maneuver_automaton.formats.closed_loop_json import load_closed_loop, read_closed_loop_document
 from maneuver_automaton.formats.plan_json import load_plan, plan_of_document, read_plan_document
 from maneuver_automaton.scenario import (
     FleetScenario,

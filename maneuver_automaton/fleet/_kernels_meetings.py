@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_moving import free_of_moving
 from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
-from maneuver_automaton.collision.slabs import Slabs
-from maneuver_automaton.collision.world import MovingObstacles
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.collision.body import Body
+from maneuver_automaton.collision.arrays import MovingObstacles, Slabs
+from maneuver_automaton.collision.body import Body
 
 
 @bare_kernel

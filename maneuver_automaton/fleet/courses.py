@@ -16,7 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Box, Disc, Obstacle, Polygon, Shape
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice_edges import altitude_ranges
+from maneuver_automaton.search.lattice_library import altitude_ranges
 
 BANDS = 8  # into which a climb is cut at most, about, to be an obstacle of one height in each
 THIN = 1e-6  # [m] by which what is flat stands out, either way

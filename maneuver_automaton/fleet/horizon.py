@@ -30,7 +30,7 @@ from maneuver_automaton.fleet.result import FleetLog, FleetResult, FleetStep
 from maneuver_automaton.fleet.upkeep import let_in, note_arrivals, plan_anew, rejoin, stop
 from maneuver_automaton.fleet.vehicle import FleetMember, prepare_vehicles, vehicles_of
 from maneuver_automaton.fleet.workers import Workers
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import within
 

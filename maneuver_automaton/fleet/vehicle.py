@@ -30,17 +30,16 @@ from maneuver_automaton.planning.blocked import (
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in, prepare
-from maneuver_automaton.planning.result import LowerBound, PlanResult
+from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.within_tolerance import aims_within
-from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.shifting import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
-from maneuver_automaton.search.inside import outside
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.limits import outside
 from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.transitions import SWITCH

@@ -1,50 +1,164 @@
-"""closed_loop.json: what a closed loop did, and the loop taken up again from it.
+"""closed_loop.json: what a closed loop did, and the loop taken up again; statistics.json of many.
 
-Strict JSON; numbers read back to the last bit, so a loop that was stopped goes on as if it had
-not been. One entry per step applied, and a last one where the vehicle ended.
+One entry per step applied, and a last one where the vehicle ended; a loop that was stopped goes on
+from them as if it had not been.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, NotRequired
 
 import numpy as np
+from pydantic import Discriminator, Field, Tag
+from typing_extensions import TypedDict
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.json_source import Place
-from maneuver_automaton.formats.plan_json import (
+from maneuver_automaton.formats.documents import (
+    SCHEMA,
+    Document,
+    Flag,
+    Known,
+    ModelEntry,
+    Number,
+    Whole,
+    document_if,
+    misstated,
     package_version,
-    read_json,
+    read_document,
+    says,
+    told_of,
     vehicle_entry,
     write_document,
 )
-from maneuver_automaton.formats.word_json import plan_entries, plan_of_entries
 from maneuver_automaton.formats.yaml_source import shown
+from maneuver_automaton.groups import group_of
 from maneuver_automaton.planning.polishing import left_out
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
     Decision,
     Guarantee,
     Origin,
+    Outcome,
+    Statistics,
     Step,
     Violation,
+    within,
 )
 
-SCHEMA = 1
-COUNTED = ("time_s", "value", "accumulated_cost")  # of every entry of `steps`, numbers
-APPLIED = ("applied_s", "applied_cost", "lower_bound", "solve_s")  # of those applied
 MOST_STEPS = 1_000_000
-NEEDED = ("schema", "automaton_hash", "reached", "steps", "step_s")
-NOT_APPLIED = ("control", "word", "plan", "replanned", "solve_s")
+FINEST_M, FINEST_RAD = 0.05, 0.05  # between samples of what was driven
+NOTHING = "nothing"  # the name of a step in which nothing was applied
+
+Numbers = list[Number]
 
 
-def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> dict[str, Any]:
+class BrokenEntry(TypedDict):
+    """A guarantee that did not hold, and why."""
+
+    step: NotRequired[Annotated[Whole | None, says("its number, where it is not that of the row")]]
+    guarantee: str
+    reason: str
+
+
+class PlaceEntry(TypedDict):
+    """Where the vehicle was at a time, and what it had paid and had left to pay."""
+
+    time_s: Number
+    pose: Numbers
+    value: Number
+    accumulated_cost: Annotated[Number, says("of all steps before")]
+    vehicle_pose: Annotated[Numbers, says("where it was, if pose is where it will be")]
+
+
+class AppliedEntry(PlaceEntry):
+    """A step that was applied, and the plan from there."""
+
+    control: Annotated[Numbers | None, says("null if it varies, or nothing is left to do")]
+    word: list[str]
+    plan: list[Piece]
+    replanned: Annotated[Flag, says("the word is not the rest of the previous one")]
+    solve_s: Number
+    number: Annotated[Whole, Field(ge=0, lt=MOST_STEPS, description="0 for the first")]
+    measured_pose: Annotated[Numbers | None, says("that was measured, if it is used a step later")]
+    goal: Annotated[Whole, says("which of several")]
+    applied_s: Annotated[Number, says("until the next step")]
+    applied_cost: Number
+    origin: Annotated[str, says("of the plan: " + ", ".join(one.value for one in Origin))]
+    value_of_the_rest: Annotated[Known, says("of the last plan; null if it has none here")]
+    off_plan: Annotated[Known, says("m or rad between pose and the last plan's prediction")]
+    lower_bound: Number
+    gap: NotRequired[Annotated[Known, says("(value - lower_bound) / value")]]
+    exhaustive: Annotated[Flag, says("every admitted word was searched")]
+    arrived: Flag
+    decision: NotRequired[Annotated[str, says(", ".join(one.value for one in Decision))]]
+    deed: NotRequired[Annotated[str, says("decision, in files of earlier versions")]]
+    free_until_s: Annotated[Known, says("no contact is predicted until then")]
+    clearance_m: Known
+    broken_guarantees: list[BrokenEntry]
+    disturbed: NotRequired[Annotated[list[BrokenEntry], says("what noise took from it")]]
+
+
+class EndedEntry(PlaceEntry):
+    """Where the loop ended."""
+
+    control: None
+    word: None
+    plan: None
+    replanned: None
+    solve_s: None
+
+
+class PiecesEntry(TypedDict):
+    """The audit of the pieces that were driven."""
+
+    pieces: Whole
+    failed: Whole
+    max_dynamics_defect: Known
+
+
+StepEntry = Annotated[
+    Annotated[AppliedEntry, Tag("<AppliedEntry>")] | Annotated[EndedEntry, Tag("<EndedEntry>")],
+    Discriminator(lambda row: tag_of(row, "<AppliedEntry>", "<EndedEntry>")),
+]
+
+
+def tag_of(row: Any, applied: str, ended: str) -> str:
+    """Which of two kinds a row of `steps` is of."""
+    return ended if isinstance(row, dict) and row.get("word", "") is None else applied
+
+
+class LoopDocument(Document):
+    """What a closed loop of one vehicle did."""
+
+    vehicle: NotRequired[ModelEntry | None]
+    automaton_hash: NotRequired[Annotated[str, says("what the library was")]]
+    status: NotRequired[Annotated[str, says("reached, steps_spent or no_plan")]]
+    reached: Flag
+    cost: NotRequired[Annotated[Number, says("accumulated over the steps applied")]]
+    duration_s: NotRequired[Number]
+    step_s: Number
+    steps_bound: NotRequired[Annotated[Whole | None, says("steps are proven to suffice")]]
+    audit: NotRequired[PiecesEntry]
+    min_clearance_m: NotRequired[Known]
+    collisions: NotRequired[Annotated[Whole, says("steps that hit an obstacle, by the audit")]]
+    broken_guarantees: NotRequired[list[BrokenEntry]]
+    disturbed: NotRequired[list[BrokenEntry]]
+    steps: Annotated[list[StepEntry], Field(min_length=1)]
+
+
+def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
     """The content of closed_loop.json, as plain values; `name` is that of the scenario.
 
     Examples
@@ -107,6 +221,57 @@ def save_closed_loop(
     write_document(closed_loop_to_dict(loop, name=name), path, interrupted=interrupted)
 
 
+def _step(step: Step, vehicle_pose: list[float], automaton: Automaton) -> AppliedEntry:
+    return {
+        "time_s": step.time,
+        "pose": step.pose.tolist(),
+        "value": step.value,
+        "accumulated_cost": step.accumulated_cost,
+        "control": None if step.control is None else step.control.tolist(),
+        "word": list(step.plan.word),
+        "plan": words_of(step.plan, automaton),
+        "replanned": step.replanned,
+        "solve_s": step.solve_s,
+        "number": step.number,
+        "vehicle_pose": vehicle_pose,
+        "measured_pose": None if step.measured is None else step.measured.tolist(),
+        "goal": step.goal_index,
+        "applied_s": step.applied,
+        "applied_cost": step.applied_cost,
+        "origin": step.origin.value,
+        "value_of_the_rest": step.shifted_value,
+        "off_plan": step.off_plan,
+        "lower_bound": step.lower_bound,
+        "gap": step.gap,
+        "exhaustive": step.exhaustive,
+        "arrived": step.arrived,
+        "decision": step.decision.value,
+        "free_until_s": step.free_until,
+        "clearance_m": step.clearance_m,
+        "broken_guarantees": [_broken(one) for one in step.violations],
+        "disturbed": [_broken(one) for one in step.disturbed],
+    }
+
+
+def _last(loop: ClosedLoop) -> EndedEntry:
+    pose = loop.poses[-1].tolist()
+    return {
+        "time_s": float(loop.times[-1]),
+        "pose": pose,
+        "value": loop.value if math.isfinite(loop.value) else 0.0,
+        "accumulated_cost": loop.cost,
+        "control": None,
+        "word": None,
+        "plan": None,
+        "replanned": None,
+        "solve_s": None,
+        "vehicle_pose": pose,
+    }
+
+
+# -- reading
+
+
 def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:
     """The steps of a closed_loop.json, and where the vehicle was before each and at the end.
 
@@ -128,146 +293,297 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
     InvalidScenario
         If the file cannot be read, is no closed_loop.json, or belongs to another library.
     """
-    document = read_json(path, needed=NEEDED, kind="closed loop")
-    if document["automaton_hash"] != automaton_hash(automaton):
+    document = read_document(path, "loop")
+    if document.get("automaton_hash") != automaton_hash(automaton):
         raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
-    _check_entries(document["steps"], automaton, str(path))
-    try:
-        steps = tuple(
-            _step_of(number, entry, automaton)
-            for number, entry in enumerate(document["steps"][:-1])
-        )
-        poses = np.array([entry["vehicle_pose"] for entry in document["steps"]], dtype=np.float64)
-        as_array("vehicle_pose", poses, last=automaton.model.group.dof)
-    except (ValueError, KeyError, TypeError, IndexError, OverflowError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{path}: {said}") from error
-    return steps, poses
+    _check_rows(document["steps"], automaton, path)
+    with told_of(path):
+        steps = tuple(_step_of(row, automaton) for row in document["steps"][:-1])
+    return steps, np.array([row["vehicle_pose"] for row in document["steps"]], dtype=np.float64)
 
 
-def _check_entries(entries: Any, automaton: Automaton, file: str) -> None:
-    """Every entry has its times, costs, poses and controls, as numbers."""
-    if not isinstance(entries, list) or not entries:
-        raise InvalidScenario(f"{file}: steps: got {shown(entries)}, need a list of steps")
-    before, last = -math.inf, len(entries) - 1
-    for k, entry in enumerate(entries):
-        place = Place(entry, file, ("steps", k))
-        for key in COUNTED if k == last else (*COUNTED, *APPLIED):
-            place.get(key, float)
-        time = place.value["time_s"]
-        if time < before:
-            raise place.get("time_s", float).error(f"got {time:g}, need at least {before:g}")
-        before = time
+def _check_rows(rows: list[dict[str, Any]], automaton: Automaton, path: Path | str) -> None:
+    """Steps in order, each with poses and controls of the automaton; raises InvalidScenario."""
+    before, dof = -math.inf, automaton.model.group.dof
+    names = automaton.model.control_names
+    for k, row in enumerate(rows):
+        if (row["plan"] is None) != (k == len(rows) - 1):
+            said = f"got {shown(row['plan'])}, need a list, but nothing in the last entry"
+            raise misstated(path, ("steps", k, "plan"), said)
         for key in ("pose", "vehicle_pose"):
-            pose = place.get(key, list)
-            if len(pose.numbers()) != automaton.model.group.dof:
-                raise pose.error(f"need {automaton.model.group.dof} numbers")
-        if k < last:
-            _check_applied(place, automaton)
+            if len(row[key]) != dof:
+                raise misstated(path, ("steps", k, key), f"need {dof} numbers")
+        if row["time_s"] < before:
+            said = f"got {row['time_s']:g}, need at least {before:g}"
+            raise misstated(path, ("steps", k, "time_s"), said)
+        before, control = row["time_s"], row["control"]
+        if control is None and row["plan"] and row["plan"][0]["kind"] == "trim":
+            raise misstated(path, ("steps", k, "control"), "got nothing, need a list")
+        if control is not None and len(control) != len(names):
+            raise misstated(path, ("steps", k, "control"), f"need {', '.join(names)}")
 
 
-def _check_applied(place: Place, automaton: Automaton) -> None:
-    """The number, the plan and the control of a step that was applied."""
-    number = place.get("number", int)
-    if not 0 <= number.value < MOST_STEPS:
-        raise number.error(f"got {number.value}, need 0 to {MOST_STEPS - 1}")
-    plan = place.get("plan", list)
-    for j in range(len(plan.value)):
-        plan.item(j).get("name", str)
-        plan.item(j).get("duration_s", float)
-    trim = bool(plan.value) and plan.item(0).get("kind", str).value == "trim"
-    if not trim and place.value.get("control", "") is None:
-        return  # nothing was left to do, or the control of a maneuver varies
-    control = place.get("control", list)
-    if len(control.numbers()) != len(automaton.model.control_names):
-        raise control.error(f"need {', '.join(automaton.model.control_names)}")
-
-
-def _step(step: Step, vehicle_pose: list[float], automaton: Automaton) -> dict[str, Any]:
-    return {
-        "time_s": step.time,
-        "pose": step.pose.tolist(),
-        "value": step.value,
-        "accumulated_cost": step.accumulated_cost,
-        "control": None if step.control is None else step.control.tolist(),
-        "word": list(step.plan.word),
-        "plan": plan_entries(step.plan, automaton),
-        "replanned": step.replanned,
-        "solve_s": step.solve_s,
-        "number": step.number,
-        "vehicle_pose": vehicle_pose,
-        "measured_pose": None if step.measured is None else step.measured.tolist(),
-        "goal": step.goal_index,
-        "applied_s": step.applied,
-        "applied_cost": step.applied_cost,
-        "origin": step.origin.value,
-        "value_of_the_rest": step.shifted_value,
-        "off_plan": step.off_plan,
-        "lower_bound": step.lower_bound,
-        "gap": step.gap,
-        "exhaustive": step.exhaustive,
-        "arrived": step.arrived,
-        "decision": step.decision.value,
-        "free_until_s": step.free_until,
-        "clearance_m": step.clearance_m,
-        "broken_guarantees": [_violation(one) for one in step.violations],
-        "disturbed": [_violation(one) for one in step.disturbed],
-    }
-
-
-def _last(loop: ClosedLoop) -> dict[str, Any]:
-    pose = loop.poses[-1].tolist()
-    return {
-        "time_s": float(loop.times[-1]),
-        "pose": pose,
-        "value": loop.value if math.isfinite(loop.value) else 0.0,
-        "accumulated_cost": loop.cost,
-        **dict.fromkeys(NOT_APPLIED),
-        "vehicle_pose": pose,
-    }
-
-
-def _step_of(number: int, entry: Mapping[str, Any], automaton: Automaton) -> Step:
-    where = f"steps[{number}]"
-    pose = as_array(f"{where}.pose", entry["pose"], last=automaton.model.group.dof)
-    plan = plan_of_entries(pose, entry["plan"], float(entry["time_s"]), automaton)
+def _step_of(row: Mapping[str, Any], automaton: Automaton) -> Step:
+    pose, measured = np.array(row["pose"], dtype=np.float64), row["measured_pose"]
     return Step(
-        time=float(entry["time_s"]),
+        time=float(row["time_s"]),
         pose=pose,
-        plan=plan,
-        goal_index=int(entry["goal"]),
-        value=float(entry["value"]),
-        applied=float(entry["applied_s"]),
-        applied_cost=float(entry["applied_cost"]),
-        accumulated_cost=float(entry["accumulated_cost"]),
-        origin=Origin(entry["origin"]),
-        replanned=bool(entry["replanned"]),
-        shifted_value=entry["value_of_the_rest"],
-        off_plan=entry["off_plan"],
-        lower_bound=float(entry["lower_bound"]),
-        exhaustive=bool(entry["exhaustive"]),
-        solve_s=float(entry["solve_s"]),
-        number=int(entry["number"]),
-        arrived=bool(entry["arrived"]),
-        decision=Decision(entry["decision"] if "decision" in entry else entry["deed"]),
-        free_until=entry["free_until_s"],
-        clearance_m=entry["clearance_m"],
-        measured=None if entry["measured_pose"] is None else np.array(entry["measured_pose"]),
-        violations=_violations(entry["broken_guarantees"]),
-        disturbed=_violations(entry.get("disturbed", ())),
+        plan=plan_of(pose, float(row["time_s"]), row["plan"], automaton),
+        goal_index=row["goal"],
+        value=float(row["value"]),
+        applied=float(row["applied_s"]),
+        applied_cost=float(row["applied_cost"]),
+        accumulated_cost=float(row["accumulated_cost"]),
+        origin=Origin(row["origin"]),
+        replanned=row["replanned"],
+        shifted_value=row["value_of_the_rest"],
+        off_plan=row["off_plan"],
+        lower_bound=float(row["lower_bound"]),
+        exhaustive=row["exhaustive"],
+        solve_s=float(row["solve_s"]),
+        number=row["number"],
+        arrived=row["arrived"],
+        decision=Decision(row.get("decision") or row["deed"]),
+        free_until=row["free_until_s"],
+        clearance_m=row["clearance_m"],
+        measured=None if measured is None else np.array(measured, dtype=np.float64),
+        violations=tuple(map(_violation_of, row["broken_guarantees"])),
+        disturbed=tuple(map(_violation_of, row.get("disturbed", ()))),
     )
 
 
-def entries_of(found: Iterable[tuple[int, Violation]]) -> list[dict[str, Any]]:
+def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
+    """The closed loop of a closed_loop.json; a file states neither its library nor its obstacles.
+
+    What was driven is each plan from where the vehicle was, and then what disturbed it at once.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or was planned with another library.
+    """
+    steps, poses = load_steps(path, problem.automaton)
+    document = read_document(path, "loop")
+    with told_of(path):
+        return ClosedLoop(
+            problem=problem,
+            step=float(document["step_s"]),
+            steps=steps,
+            poses=poses,
+            times=np.array([row["time_s"] for row in document["steps"]], dtype=np.float64),
+            reached=document["reached"],
+            status=document["status"],
+            reason=document["reason"],
+            cost=float(document["cost"]),
+            value=float(document["steps"][-1]["value"]),
+            driven=tuple(
+                replace(step.piece, start=pose) for step, pose in zip(steps, poses, strict=False)
+            ),
+            inside=tuple(any(within(pose, goal) for goal in problem.goals) for pose in poses),
+            steps_bound=document["steps_bound"],
+        )
+
+
+def read_closed_loop_document(path: Path | str) -> dict[str, Any] | None:
+    """The content of a closed_loop.json, of roads and of fleets too; None if the file is none.
+
+    Raises
+    ------
+    InvalidScenario
+        If it is one, but states what it may not.
+    """
+    return document_if(path, "loop", "drive", "fleet-loop")
+
+
+# -- guarantees
+
+
+def entries_of(found: Iterable[tuple[int, Violation]]) -> list[BrokenEntry]:
     """Guarantees with the numbers of their steps, as the files have them."""
-    return [{"step": number, **_violation(one)} for number, one in found]
+    return [{"step": number, **_broken(one)} for number, one in found]
 
 
-def _violation(one: Violation) -> dict[str, Any]:
+def _broken(one: Violation) -> BrokenEntry:
     return {"guarantee": one.guarantee.value, "reason": one.reason}
 
 
-def _violations(entries: Iterable[Mapping[str, Any]]) -> tuple[Violation, ...]:
-    return tuple(
-        Violation(guarantee=Guarantee(one["guarantee"]), reason=one["reason"]) for one in entries
+def _violation_of(entry: Mapping[str, Any]) -> Violation:
+    return Violation(guarantee=Guarantee(entry["guarantee"]), reason=entry["reason"])
+
+
+# -- what was driven, as a plan
+
+
+def driven_document(document: Mapping[str, Any]) -> dict[str, Any]:
+    """The drive of a closed loop in the words of plan.json.
+
+    The vehicle is known where each step began; between, it is taken to move at a constant twist. A
+    step is named after the primitives that were to be driven in it, and steps of one name in a row
+    are one maneuver, as disturbances may have it turn otherwise in each.
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If a key is missing, or holds no numbers.
+    """
+    steps = document["steps"]
+    time = as_array("steps: time_s", [step["time_s"] for step in steps])
+    poses = as_array(
+        "steps: pose", [step.get("vehicle_pose") or step["pose"] for step in steps], last=(3, 4)
+    )
+    names = [_driven(step, lasting) for step, lasting in zip(steps, np.diff(time), strict=False)]
+    runs = [(name, [k for k, _ in run]) for name, run in groupby(enumerate(names), lambda p: p[1])]
+    return {
+        "name": document.get("name", ""),
+        "vehicle": document.get("vehicle"),
+        "status": "found",
+        "cost": document["cost"],
+        "duration_s": float(time[-1] - time[0]),
+        "clearance_m": document.get("min_clearance_m"),
+        "primitives": [
+            {
+                "kind": "maneuver",
+                "name": name,
+                "source": name,
+                "target": name,
+                "duration_s": float(time[rows[-1] + 1] - time[rows[0]]),
+            }
+            for name, rows in runs
+        ],
+        "trajectory": _trajectory(steps, time, poses),
+    }
+
+
+def _driven(step: Mapping[str, Any], lasting: float) -> str:
+    """Names of the primitives that begin within a step."""
+    begin, names = 0.0, []
+    for one in step["plan"]:
+        if begin < lasting * (1.0 - 1e-9):
+            names.append(str(one["name"]))
+        begin += float(one["duration_s"])
+    return ", ".join(names) or NOTHING
+
+
+def _trajectory(steps: list[Mapping[str, Any]], time: Array, poses: Array) -> dict[str, Any]:
+    """Samples along an arc from the pose of each step to that of the next."""
+    group = group_of(poses.shape[1])
+    arcs = (group(poses[:-1]).inverse() @ group(poses[1:])).log()
+    n_controls = max((len(step["control"] or ()) for step in steps[:-1]), default=0)
+    columns: dict[str, list[Any]] = {"time_s": [], "pose": [], "control": [], "reduced_state": []}
+    columns["origin"] = [0.0, 0.0]
+    for k, (step, arc) in enumerate(zip(steps, arcs, strict=False)):
+        reach = max(np.hypot(arc[0], arc[1]) / FINEST_M, abs(arc[2]) / FINEST_RAD, 1.0)
+        shares = np.arange(np.ceil(reach)) / np.ceil(reach)
+        sampled = (group(poses[k]) @ group.exp(shares[:, None] * arc)).pose
+        columns["time_s"] += (time[k] + shares * (time[k + 1] - time[k])).tolist()
+        columns["pose"] += sampled.tolist()
+        columns["control"] += [step["control"] or [0.0] * n_controls] * shares.size
+        columns["reduced_state"] += [step.get("reduced_state") or []] * shares.size
+    for name, last in (("time_s", float(time[-1])), ("pose", poses[-1].tolist())):
+        columns[name].append(last)
+    for name in ("control", "reduced_state"):
+        columns[name] += columns[name][-1:]
+    return columns if len(steps) > 1 else {}
+
+
+# -- statistics
+
+
+class OutcomeEntry(TypedDict):
+    """How one closed loop went."""
+
+    seed: Whole
+    start: Numbers
+    reached: Flag
+    arrived_after_steps: Annotated[Whole | None, says("until the goal was first reached")]
+    stayed: Annotated[Flag, says("at the goal from then on")]
+    share_inside: Annotated[Number, says("of the steps after the first arrival")]
+    steps: Whole
+    cost: Number
+    first_value: Number
+    reason: str
+    broken_guarantees: list[BrokenEntry]
+    disturbed: NotRequired[list[BrokenEntry]]
+    solve_s: Numbers
+
+
+class StatisticsDocument(Document):
+    """Many closed loops in a few numbers each."""
+
+    loops_run: Whole
+    reached: Annotated[Number, says("share that reached the goal")]
+    stayed: Annotated[Number, says("share that reached it and stayed")]
+    steps_with_a_broken_guarantee: Whole
+    loops: Annotated[list[OutcomeEntry], Field(min_length=1)]
+
+
+def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bool = False) -> None:
+    """Write statistics.json in one step; `interrupted` by a signal it says so.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    head: dict[str, Any] = {
+        "schema": SCHEMA,
+        "version": package_version(),
+        "loops_run": len(statistics.outcomes),
+        "reached": statistics.reached,
+        "stayed": statistics.stayed,
+        "steps_with_a_broken_guarantee": statistics.broken,
+        **({"interrupted": True} if interrupted else {}),
+    }
+    rows: list[OutcomeEntry] = [
+        {
+            "seed": one.seed,
+            "start": one.start.tolist(),
+            "reached": one.reached,
+            "arrived_after_steps": one.arrived_after,
+            "stayed": one.stayed,
+            "share_inside": one.share_inside,
+            "steps": one.steps,
+            "cost": one.cost,
+            "first_value": one.first_value,
+            "reason": one.reason,
+            "broken_guarantees": entries_of(one.violations),
+            "disturbed": entries_of(one.disturbed),
+            "solve_s": one.solve_s.tolist(),
+        }
+        for one in statistics.outcomes
+    ]
+    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
+    loops = ",\n".join(f"    {json.dumps(row, allow_nan=False)}" for row in rows)
+    lines.append(f'  "loops": [\n{loops}\n  ]')
+    write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+
+
+def load_statistics(path: Path | str) -> Statistics:
+    """The statistics of a statistics.json.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or is no statistics.json.
+    """
+    document = read_document(path, "statistics")
+    with told_of(path):
+        return Statistics(outcomes=tuple(map(_outcome_of, document["loops"])))
+
+
+def _outcome_of(row: Mapping[str, Any]) -> Outcome:
+    broken, disturbed = (
+        tuple((one["step"], _violation_of(one)) for one in row.get(key, ()))
+        for key in ("broken_guarantees", "disturbed")
+    )
+    failed = {step for step, one in broken if one.guarantee is Guarantee.NO_COLLISION}
+    same = ("seed", "reached", "stayed", "share_inside", "steps", "cost", "first_value", "reason")
+    return Outcome(
+        **{key: row[key] for key in same},
+        start=np.array(row["start"], dtype=np.float64),
+        arrived_after=row["arrived_after_steps"],
+        violations=broken,
+        disturbed=disturbed,
+        audits_failed=len(failed),
+        solve_s=np.array(row["solve_s"], dtype=np.float64),
     )

@@ -5,27 +5,58 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NotRequired
 
-from maneuver_automaton._files import relative
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import Closest, FleetProblem, FleetResult, FleetStatus
-from maneuver_automaton.formats.plan_json import (
+from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
+    ClearanceEntry,
+    ClosestEntry,
+    Document,
+    Known,
+    Number,
+    Pairs,
+    Whole,
+    number,
+    or_inf,
     package_version,
-    plan_to_dict,
-    read_fleet_document,
+    read_document,
+    says,
+    source_entry,
+    told_of,
     write_document,
 )
-from maneuver_automaton.formats.result_json import result_of_document
+from maneuver_automaton.formats.plan_json import PlanDocument, plan_to_dict, result_of
 
 TIMINGS = ("load", "automaton", "alone", "first_plan", "search", "audit")
 COUNTS = ("expansions", "queries", "rounds")
 MOST_SAID = 3  # vehicles whose reasons stand in the reason of the fleet
 
 
-def fleet_to_dict(result: FleetResult, *, name: str = "") -> dict[str, Any]:
+class FleetDocument(Document):
+    """The plans of several vehicles, and what holds of them together."""
+
+    kind: Literal["fleet"]
+    status: Annotated[str, says("found: all have plans; partial: some; no_plan")]
+    objective: NotRequired[Annotated[str, says("what was improved: sum or last")]]
+    cost: NotRequired[Annotated[Known, says("sum of the costs")]]
+    alone_cost: Annotated[Number, says("of the paths of all by themselves, as found")]
+    sum_s: NotRequired[Annotated[Number, says("sum of the times until each arrives")]]
+    last_s: NotRequired[Annotated[Number, says("when the last one arrives, on the clock of all")]]
+    lower_bound: Annotated[Number, says("no plans have less of the objective")]
+    gap: NotRequired[Annotated[Known, says("null if someone has no plan")]]
+    clearance_m: ClearanceEntry
+    closest: Annotated[list[ClosestEntry], says("pairs that come near, the nearest first")]
+    order: Annotated[list[str], says("in which the vehicles that meet were planned")]
+    improvements: Annotated[Pairs, says("[[s, objective]]")]
+    timing_s: NotRequired[dict[str, Known]]
+    counts: NotRequired[dict[str, Whole]]
+    vehicles: Annotated[dict[str, PlanDocument], says("by name, as one vehicle's plan.json")]
+
+
+def fleet_to_dict(result: FleetResult, *, name: str = "") -> FleetDocument:
     """The content of plan.json for several vehicles, as plain values.
 
     Examples
@@ -57,19 +88,21 @@ def fleet_to_dict(result: FleetResult, *, name: str = "") -> dict[str, Any]:
         "sum_s": float(result.sum_s),
         "last_s": float(result.last_s),
         "lower_bound": float(result.lower_bound),
-        "gap": None if result.gap is None else float(result.gap),
+        "gap": number(result.gap),
         "clearance_m": {
-            "between": finite_number(result.clearance_m),
-            "to_obstacles": finite_number(min(to_obstacles, default=math.inf)),
+            "between": number(result.clearance_m),
+            "to_obstacles": number(min(to_obstacles, default=math.inf)),
         },
         "closest": [closest_entry(one) for one in result.closest],
         "order": list(result.order),
-        "improvements": [[float(at), float(value)] for at, value in result.improvements],
+        "improvements": [(float(at), float(value)) for at, value in result.improvements],
         "timing_s": {**dict.fromkeys(TIMINGS), **{k: float(v) for k, v in result.timing_s.items()}},
         "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
         "vehicles": {
-            vehicle: plan_to_dict(one, name=vehicle)
-            | ({"reason": result.reasons[vehicle]} if vehicle in result.reasons else {})
+            vehicle: {
+                **plan_to_dict(one, name=vehicle),
+                "reason": result.reasons.get(vehicle, one.reason),
+            }
             for vehicle, one in result.results.items()
         },
     }
@@ -125,20 +158,17 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
     InvalidScenario
         If the file cannot be read, has other vehicles, or was planned with other libraries.
     """
-    document = read_fleet_document(path)
-    if document is None:
-        raise InvalidScenario(f"{path}: holds the plan of one vehicle, need those of several")
+    document = read_document(path, "fleet")
     stated = document["vehicles"]
     if set(stated) != set(fleet.names):
         raise InvalidScenario(
             f"{path}: vehicles: got {', '.join(stated)}, need {', '.join(fleet.names)}"
         )
     results = {
-        name: result_of_document(stated[name], problem, path=f"{path}: vehicles.{name}")
+        name: result_of(stated[name], problem, place=f"{path}: vehicles.{name}")
         for name, problem in zip(fleet.names, fleet.problems, strict=True)
     }
-    try:
-        between = document["clearance_m"]["between"]
+    with told_of(path):
         return FleetResult(
             problem=fleet,
             status=FleetStatus(document["status"]),
@@ -146,21 +176,18 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
             objective=document.get("objective", "sum"),
             lower_bound=float(document["lower_bound"]),
             alone_cost=float(document["alone_cost"]),
-            clearance_m=math.inf if between is None else float(between),
+            clearance_m=or_inf(document["clearance_m"]["between"]),
             closest=tuple(map(closest_of, document["closest"])),
             reasons={name: one.reason for name, one in results.items() if one.plan is None},
             order=tuple(document["order"]),
             improvements=tuple((float(s), float(v)) for s, v in document["improvements"]),
         )
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{path}: {said}") from error
 
 
-def closest_entry(one: Closest) -> dict[str, Any]:
+def closest_entry(one: Closest) -> ClosestEntry:
     """A pair of vehicles, and where they are nearest to each other."""
     return {
-        "pair": list(one.pair),
+        "pair": one.pair,
         "time_s": float(one.time_s),
         "distance_m": float(one.distance_m),
     }
@@ -170,16 +197,3 @@ def closest_of(entry: Mapping[str, Any]) -> Closest:
     """A pair of vehicles from its entry."""
     first, second = entry["pair"]
     return Closest((first, second), float(entry["time_s"]), float(entry["distance_m"]))
-
-
-def source_entry(source: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """The files that plans in the file `path` were made from, as seen from it."""
-    return {
-        key: relative(value, path.parent) if isinstance(value, Path) else value
-        for key, value in source.items()
-    }
-
-
-def finite_number(value: float) -> float | None:
-    """A number for strict JSON; None where there is none."""
-    return None if math.isinf(value) else float(value)

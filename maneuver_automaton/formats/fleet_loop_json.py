@@ -1,42 +1,190 @@
 """closed_loop.json of several vehicles: what each did, and what holds of them together.
 
-Strict JSON; numbers read back to the last bit. Names are those of one vehicle's closed_loop.json
-wherever they mean the same: under `vehicles` each has steps as that file has them.
+Names are those of one vehicle's closed_loop.json wherever they mean the same: under `vehicles` each
+has steps as that file has them.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from itertools import accumulate
+from collections.abc import Mapping, Sequence
+from itertools import accumulate, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, NotRequired, TypeAlias
 
 import numpy as np
+from pydantic import Discriminator, Field, Tag
+from typing_extensions import TypedDict
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.library import automaton_hash
-from maneuver_automaton.fleet import FleetLog, FleetStep, FleetViolation, Swap
+from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.fleet import (
+    FleetGuarantee,
+    FleetLog,
+    FleetProblem,
+    FleetStep,
+    FleetViolation,
+    Swap,
+)
 from maneuver_automaton.fleet.driven import DrivenVerdict
-from maneuver_automaton.formats.closed_loop_json import NOT_APPLIED
-from maneuver_automaton.formats.fleet_json import closest_entry, finite_number, source_entry
-from maneuver_automaton.formats.plan_json import (
+from maneuver_automaton.formats.closed_loop_json import (
+    Numbers,
+    tag_of,
+)
+from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
+    ClearanceEntry,
+    ClosestEntry,
+    Document,
+    Flag,
+    Known,
+    ModelEntry,
+    Number,
+    Whole,
+    document_if,
+    number,
+    or_inf,
     package_version,
+    read_document,
+    says,
+    source_entry,
+    told_of,
     vehicle_entry,
     write_document,
 )
-from maneuver_automaton.formats.word_json import plan_entries
+from maneuver_automaton.formats.fleet_json import closest_entry, closest_of
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.problem import Problem
 
-NOT_DECIDED = ("gap_m", "distance_m", "solve_s")  # of the last entry of `steps`
-LISTED = ("swaps", "asked", "void", "refused", "broken_guarantees")  # empty there
+Row: TypeAlias = Mapping[str, Any]  # an object of the file
 
 
-def fleet_loop_to_dict(log: FleetLog, driven: DrivenVerdict, *, name: str = "") -> dict[str, Any]:
+class SwapEntry(TypedDict):
+    """Plans exchanged for others, of one vehicle or of several at once."""
+
+    vehicles: list[str]
+    before: Annotated[Known, says("cost of what was left of their plans; null if not all arrived")]
+    after: Number
+    past: Annotated[dict[str, Whole], says("proven past the plan of this number")]
+    holds: dict[str, Whole]
+
+
+class FleetBrokenEntry(TypedDict):
+    """A guarantee that did not hold, of which vehicles, and why."""
+
+    step: NotRequired[Annotated[Whole, says("its number, where it is not that of the row")]]
+    guarantee: str
+    vehicles: list[str]
+    reason: str
+
+
+class FleetStepEntry(TypedDict):
+    """What holds of all vehicles in a step; in the last entry, where it ended."""
+
+    time_s: Number
+    value: Annotated[Known, says("cost of what is left; null if not all plans arrive")]
+    accumulated_cost: Number
+    number: NotRequired[Whole]
+    swaps: list[SwapEntry]
+    asked: Annotated[list[str], says("who looked for another plan")]
+    void: Annotated[list[str], says("whose plans were void, and planned anew")]
+    refused: Annotated[list[str], says("who has not been let in yet")]
+    arrived: list[str]
+    gap_m: Annotated[Known, says("any two keep it over the rest of the plans")]
+    distance_m: Annotated[Known, says("least of any two along what was driven")]
+    solve_s: Known
+    broken_guarantees: list[FleetBrokenEntry]
+
+
+class HeldEntry(TypedDict):
+    """A plan that is held from a step on, from where and when it began."""
+
+    time_s: Number
+    pose: Numbers
+    plan: list[Piece]
+
+
+class DroveEntry(TypedDict):
+    """A step of one vehicle."""
+
+    time_s: Number
+    pose: Numbers
+    value: Known
+    accumulated_cost: Number
+    control: Numbers | None
+    word: list[str]
+    plan: list[Piece]
+    replanned: Flag
+    number: Whole
+    vehicle_pose: Numbers
+    measured_pose: Numbers
+    arrival_s: Annotated[Known, says("when its plan arrives; null if it does not")]
+    off_plan_m: Number
+    plan_time_s: Number
+    held: Annotated[HeldEntry | None, says("the plan held from now on, if it is another one")]
+    driven: Annotated[list[Piece] | None, says("if it was not the begin of the plan")]
+
+
+class StoodEntry(TypedDict):
+    """Where a vehicle ended, or left."""
+
+    time_s: Number
+    pose: Numbers
+    value: Known
+    accumulated_cost: Number
+    control: None
+    word: None
+    plan: None
+    replanned: None
+    solve_s: None
+    vehicle_pose: Numbers
+
+
+VehicleStep = Annotated[
+    Annotated[DroveEntry, Tag("<DroveEntry>")] | Annotated[StoodEntry, Tag("<StoodEntry>")],
+    Discriminator(lambda row: tag_of(row, "<DroveEntry>", "<StoodEntry>")),
+]
+
+
+class VehicleLoopEntry(TypedDict):
+    """What one vehicle did."""
+
+    vehicle: ModelEntry
+    automaton_hash: str
+    status: Annotated[str, says("arrived, under_way, broken_down or not_there")]
+    reached: Flag
+    arrived_s: Known
+    cost: Number
+    steps: Annotated[list[VehicleStep], Field(min_length=1)]
+
+
+class FleetLoopDocument(Document):
+    """What a closed loop of several vehicles did."""
+
+    kind: Literal["fleet"]
+    status: Annotated[str, says("reached or steps_spent")]
+    reached: NotRequired[Flag]
+    cost: Annotated[Number, says("of all that was driven")]
+    duration_s: NotRequired[Number]
+    step_s: Number
+    sum_s: NotRequired[Number]
+    last_s: NotRequired[Number]
+    clearance_m: NotRequired[ClearanceEntry]
+    closest: list[ClosestEntry]
+    collisions: NotRequired[list[str]]
+    broken_guarantees: NotRequired[list[FleetBrokenEntry]]
+    counts: dict[str, Whole]
+    vehicles: dict[str, VehicleLoopEntry]
+    steps: Annotated[list[FleetStepEntry], Field(min_length=1)]
+
+
+def fleet_loop_to_dict(
+    log: FleetLog, driven: DrivenVerdict, *, name: str = ""
+) -> FleetLoopDocument:
     """The content of closed_loop.json for several vehicles, as plain values.
 
     Parameters
@@ -80,8 +228,8 @@ def fleet_loop_to_dict(log: FleetLog, driven: DrivenVerdict, *, name: str = "") 
         "sum_s": float(log.sum_s),
         "last_s": float(log.last_s),
         "clearance_m": {
-            "between": finite_number(driven.distance_m),
-            "to_obstacles": finite_number(driven.clearance_m),
+            "between": number(driven.distance_m),
+            "to_obstacles": number(driven.clearance_m),
         },
         "closest": [closest_entry(one) for one in driven.closest],
         "collisions": list(driven.collisions),
@@ -133,11 +281,11 @@ def save_fleet_loop(
 # -- all together
 
 
-def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[FleetStepEntry]:
     """What holds of all vehicles in each step, and where it ended."""
     spent = {name: {e["time_s"]: e for e in one["steps"]} for name, one in vehicles.items()}
     known = dict.fromkeys(vehicles, 0.0)
-    rows = []
+    rows: list[FleetStepEntry] = []
     for step, value in zip(log.steps, log.values.tolist(), strict=True):
         for name, entries in spent.items():
             if step.time in entries:
@@ -145,7 +293,7 @@ def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[dict[str, Any]]:
         rows.append(
             {
                 "time_s": float(step.time),
-                "value": finite_number(value),
+                "value": number(value),
                 "accumulated_cost": math.fsum(known.values()),
                 "number": step.number,
                 "swaps": [_swap(one) for one in step.swaps],
@@ -153,8 +301,8 @@ def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[dict[str, Any]]:
                 "void": list(step.void),
                 "refused": list(step.refused),
                 "arrived": list(step.arrived),
-                "gap_m": finite_number(step.gap_m),
-                "distance_m": finite_number(step.distance_m),
+                "gap_m": number(step.gap_m),
+                "distance_m": number(step.distance_m),
                 "solve_s": float(step.solve_s),
                 "broken_guarantees": [_broken(one) for one in step.violations],
             }
@@ -162,7 +310,7 @@ def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[dict[str, Any]]:
     return [*rows, _ended(log, vehicles)]
 
 
-def _ended(log: FleetLog, vehicles: Mapping[str, Any]) -> dict[str, Any]:
+def _ended(log: FleetLog, vehicles: Mapping[str, Any]) -> FleetStepEntry:
     last = [one["steps"][-1] for one in vehicles.values()]
     values = [
         one["steps"][-1]["value"] for name, one in vehicles.items() if name not in log.broken_down
@@ -172,22 +320,28 @@ def _ended(log: FleetLog, vehicles: Mapping[str, Any]) -> dict[str, Any]:
         "value": None if None in values else math.fsum(values),
         "accumulated_cost": math.fsum(one["accumulated_cost"] for one in last),
         "arrived": sorted(log.arrived_s),
-        **{key: [] for key in LISTED},
-        **dict.fromkeys(NOT_DECIDED),
+        "swaps": [],
+        "asked": [],
+        "void": [],
+        "refused": [],
+        "broken_guarantees": [],
+        "gap_m": None,
+        "distance_m": None,
+        "solve_s": None,
     }
 
 
-def _swap(swap: Swap) -> dict[str, Any]:
+def _swap(swap: Swap) -> SwapEntry:
     return {
         "vehicles": list(swap.names),
-        "before": finite_number(swap.before),
+        "before": number(swap.before),
         "after": float(swap.after),
         "past": {name: int(version) for name, version in swap.past},
         "holds": {name: int(version) for name, version in swap.holds},
     }
 
 
-def _broken(violation: FleetViolation) -> dict[str, Any]:
+def _broken(violation: FleetViolation) -> FleetBrokenEntry:
     return {
         "guarantee": violation.guarantee.value,
         "vehicles": list(violation.names),
@@ -198,11 +352,12 @@ def _broken(violation: FleetViolation) -> dict[str, Any]:
 # -- one vehicle
 
 
-def _vehicle(log: FleetLog, name: str, problem: Problem) -> dict[str, Any]:
+def _vehicle(log: FleetLog, name: str, problem: Problem) -> VehicleLoopEntry:
     """What one vehicle did, as closed_loop.json of one vehicle says it."""
     automaton, pieces = problem.automaton, log.pieces_of(name)
     spent = list(accumulate(log.costs_of(name).values(), initial=0.0))
-    rows, held = [], None
+    rows: list[DroveEntry] = []
+    held = None
     for cost, (k, piece) in zip(spent, pieces.items(), strict=False):
         step = log.steps[k]
         rows.append(_row(step, name, piece, cost, held, problem))
@@ -222,36 +377,36 @@ def _vehicle(log: FleetLog, name: str, problem: Problem) -> dict[str, Any]:
 
 def _row(
     step: FleetStep, name: str, piece: Plan, cost: float, held: Plan | None, problem: Problem
-) -> dict[str, Any]:
+) -> DroveEntry:
     plan, automaton = step.driven[name], problem.automaton
     now, control = step.plans[name], step.control_of(name)
     exchanged = {one for swap in step.swaps for one in swap.names} | set(step.void)
     return {
         "time_s": float(step.time),
         "pose": plan.start.tolist(),
-        "value": finite_number(step.values[name]),
+        "value": number(step.values[name]),
         "accumulated_cost": cost,
         "control": None if control is None else control.tolist(),
         "word": list(plan.word),
-        "plan": plan_entries(plan, automaton),
+        "plan": words_of(plan, automaton),
         "replanned": name in exchanged,
         "number": step.number,
         "vehicle_pose": piece.start.tolist(),
         "measured_pose": step.poses[name].tolist(),
-        "arrival_s": finite_number(step.arrivals[name]),
+        "arrival_s": number(step.arrivals[name]),
         "off_plan_m": float(step.off_plan[name]),
         "plan_time_s": float(plan.start_time),
         "held": None if now is held else _held(now, automaton),
-        "driven": plan_entries(piece, automaton) if _is_other(piece, plan) else None,
+        "driven": words_of(piece, automaton) if _is_other(piece, plan) else None,
     }
 
 
-def _held(plan: Plan, automaton: Automaton) -> dict[str, Any]:
+def _held(plan: Plan, automaton: Automaton) -> HeldEntry:
     """The plan that is held from a step on, from where and when it began."""
     return {
         "time_s": float(plan.start_time),
         "pose": plan.start.tolist(),
-        "plan": plan_entries(plan, automaton),
+        "plan": words_of(plan, automaton),
     }
 
 
@@ -263,15 +418,19 @@ def _is_other(piece: Plan, plan: Plan) -> bool:
     )
 
 
-def _last_row(log: FleetLog, name: str, problem: Problem, cost: float) -> dict[str, Any]:
+def _last_row(log: FleetLog, name: str, problem: Problem, cost: float) -> StoodEntry:
     """Where a vehicle ended: at the end of the loop, or where it left."""
     when, pose, value = _end_of(log, name, problem)
     return {
         "time_s": when,
         "pose": pose.tolist(),
-        "value": finite_number(value),
+        "value": number(value),
         "accumulated_cost": cost,
-        **dict.fromkeys(NOT_APPLIED),
+        "control": None,
+        "word": None,
+        "plan": None,
+        "replanned": None,
+        "solve_s": None,
         "vehicle_pose": pose.tolist(),
     }
 
@@ -287,3 +446,155 @@ def _end_of(log: FleetLog, name: str, problem: Problem) -> tuple[float, Array, f
         return float(gone.time), gone.poses[name], 0.0
     value = 0.0 if name in log.arrived_s else log.steps[k].values[name] - log.costs_of(name)[k]
     return float(log.times[k + 1]), piece.end, max(value, 0.0)
+
+
+# -- reading
+
+
+def read_fleet_loop_document(path: Path | str) -> dict[str, Any] | None:
+    """The content of a closed_loop.json of several vehicles; None if the file is none."""
+    return document_if(path, "fleet-loop")
+
+
+def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
+    """The loop of a closed_loop.json, in the world that it was driven in.
+
+    What the file claims is not proven again; `verify_driven` does that.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, has other vehicles, or was driven with other libraries.
+    """
+    document = read_document(path, "fleet-loop")
+    stated = document["vehicles"]
+    if set(stated) != set(fleet.names):
+        raise InvalidScenario(
+            f"{path}: vehicles: got {', '.join(stated)}, need {', '.join(fleet.names)}"
+        )
+    problems = dict(zip(fleet.names, fleet.problems, strict=True))
+    for name, problem in problems.items():
+        if stated[name]["automaton_hash"] != automaton_hash(problem.automaton):
+            raise InvalidScenario(
+                f"{path}: vehicles.{name}.automaton_hash: this loop was driven with another library"
+            )
+    step_s, did, pieces = float(document["step_s"]), {}, {}
+    for name, problem in problems.items():
+        with told_of(f"{path}: vehicles.{name}"):
+            did[name] = _did(stated[name]["steps"][:-1], problem.automaton)
+    with told_of(path):
+        steps = [_step_of(k, row, did) for k, row in enumerate(document["steps"][:-1])]
+        _check_times(steps)
+    for name, problem in problems.items():
+        with told_of(f"{path}: vehicles.{name}"):
+            pieces[name] = tuple(
+                _piece(steps[number], name, row, step_s, problem.automaton)
+                for number, (row, _, _) in did[name].items()
+            )
+    with told_of(path):
+        closest = [closest_of(one) for one in document["closest"]]
+        return FleetLog(
+            problem=fleet,
+            step=step_s,
+            steps=tuple(steps),
+            driven=pieces,
+            arrived_s={
+                name: float(one["arrived_s"]) for name, one in stated.items() if one["reached"]
+            },
+            broken_down=tuple(
+                sorted(name for name, one in stated.items() if one["status"] == "broken_down")
+            ),
+            closest=min(closest, key=lambda row: row.distance_m, default=None),
+            status=document["status"],
+            reason=document["reason"],
+            cost=float(document["cost"]),
+            counts=document["counts"],
+        )
+
+
+def _did(rows: Sequence[Row], automaton: Automaton) -> dict[int, tuple[Row, Plan, Plan]]:
+    """By step what a vehicle did, the plan that it held, and what it drove of it."""
+    found: dict[int, tuple[Row, Plan, Plan]] = {}
+    held: Plan | None = None
+    for row in rows:
+        if (it := row["held"]) is not None:
+            held = plan_of(_pose(it["pose"], automaton), float(it["time_s"]), it["plan"], automaton)
+        if held is None:
+            raise ValueError(f"steps: holds no plan at {row['time_s']:g} s")
+        start, time = _pose(row["pose"], automaton), float(row["plan_time_s"])
+        plan = plan_of(start, time, row["plan"], automaton)
+        found[int(row["number"])] = (row, held, plan)
+    return found
+
+
+def _pose(numbers: Any, automaton: Automaton) -> Array:
+    return as_array("steps: pose", numbers, last=automaton.model.group.dof)
+
+
+def _piece(step: FleetStep, name: str, row: Row, step_s: float, automaton: Automaton) -> Plan:
+    """What a vehicle drove in a step."""
+    pose = _pose(row["vehicle_pose"], automaton)
+    undisturbed = step.piece_of(name, pose, step.time + step_s, automaton.model)
+    if row["driven"] is None:
+        return undisturbed
+    return plan_of(pose, undisturbed.start_time, row["driven"], automaton)
+
+
+def _step_of(
+    number: int, row: Row, did: Mapping[str, Mapping[int, tuple[Row, Plan, Plan]]]
+) -> FleetStep:
+    """A step of all."""
+    if row["number"] != number:
+        raise ValueError(f"steps: number: got {row['number']}, need {number}")
+    here = {name: its[number] for name, its in did.items() if number in its}
+    own = {name: its for name, (its, _, _) in here.items()}
+    late = [name for name, its in own.items() if its["time_s"] != row["time_s"]]
+    if late:
+        raise ValueError(
+            f"vehicles.{late[0]}: step {number} is at {own[late[0]]['time_s']:g} s, "
+            f"need {row['time_s']:g} s"
+        )
+    return FleetStep(
+        number=number,
+        time=float(row["time_s"]),
+        poses={name: np.array(its["measured_pose"], dtype=float) for name, its in own.items()},
+        plans={name: held for name, (_, held, _) in here.items()},
+        driven={name: plan for name, (_, _, plan) in here.items()},
+        values={name: or_inf(its["value"]) for name, its in own.items()},
+        arrivals={name: or_inf(its["arrival_s"]) for name, its in own.items()},
+        off_plan={name: float(its["off_plan_m"]) for name, its in own.items()},
+        arrived=tuple(row["arrived"]),
+        swaps=tuple(_swap_of(k, one) for k, one in enumerate(row["swaps"])),
+        asked=tuple(row["asked"]),
+        void=tuple(row["void"]),
+        refused=tuple(row["refused"]),
+        gap_m=or_inf(row["gap_m"]),
+        violations=tuple(map(_violation_of, row["broken_guarantees"])),
+        solve_s=float(row["solve_s"]),
+        distance_m=or_inf(row["distance_m"]),
+    )
+
+
+def _swap_of(order: int, entry: Row) -> Swap:
+    return Swap(
+        names=tuple(entry["vehicles"]),
+        before=or_inf(entry["before"]),
+        after=float(entry["after"]),
+        past=tuple((name, int(version)) for name, version in entry["past"].items()),
+        holds=tuple((name, int(version)) for name, version in entry["holds"].items()),
+        order=order,
+    )
+
+
+def _violation_of(entry: Row) -> FleetViolation:
+    guarantee = FleetGuarantee(entry["guarantee"])
+    return FleetViolation(guarantee, tuple(entry["vehicles"]), str(entry["reason"]))
+
+
+def _check_times(steps: Sequence[FleetStep]) -> None:
+    for before, after in pairwise(steps):
+        if not after.time > before.time:
+            raise ValueError(
+                f"steps: step {after.number} is at {after.time:g} s, need more than "
+                f"{before.time:g} s"
+            )

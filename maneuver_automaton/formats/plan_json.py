@@ -1,54 +1,144 @@
 """plan.json: the answer to a problem as a file, and the plan back from it.
 
-Strict JSON; numbers read back to the last bit. Every key is always there: without a plan the
-numbers are null and the lists empty.
+Every key is always there: without a plan the numbers are null and the lists empty.
 """
 
 from __future__ import annotations
 
-import functools
-import json
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Annotated, Any, Literal, NotRequired
 
 import numpy as np
+from typing_extensions import TypedDict
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton._files import open_input, write_text_atomically
-from maneuver_automaton.audit import Audit, TerminalError
+from maneuver_automaton.audit import TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.documents import (
+    FLEET,
+    SCHEMA,
+    Document,
+    Flag,
+    Known,
+    ModelEntry,
+    Number,
+    Pairs,
+    Whole,
+    checked,
+    kind_of,
+    number,
+    package_version,
+    parsed,
+    read_document,
+    says,
+    told_of,
+    vehicle_entry,
+    write_document,
+)
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.planning import Alternative, LowerBound, PlanResult
+from maneuver_automaton.planning import Alternative, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.problem import Problem
 
-if TYPE_CHECKING:
-    from maneuver_automaton.bounds import Narrowest
-
-SCHEMA = 1
 FAR = 1e6  # [m] from here on poses are written relative to the start
 TIMINGS = ("load", "automaton", "search", "first_plan", "refine", "audit")
 COUNTS = ("expansions", "collision_queries")
-TRAJECTORY = ("origin", "time_s", "pose", "reduced_state", "control")
-LISTS = (
-    "primitives",
-    "stop",
-    "alternatives",
-    "steps",
-    "broken_guarantees",
-    "closest",
-)  # of objects
-FLEET = "fleet"  # the kind of a file with plans of several vehicles
 TIME_TOLERANCE = 1e-9  # [s], relative to the duration, between a switch and its sample
 
 
-def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
+class NarrowestEntry(TypedDict):
+    """The passage that is too narrow."""
+
+    place: tuple[Number, Number]
+    missing_m: Number
+
+
+class BoundEntry(TypedDict):
+    """What proves the lower bound."""
+
+    value: Number
+    kind: Annotated[str, says("of bound that won")]
+    history: Annotated[Pairs, says("[[s, value]]")]
+
+
+class PrimitiveEntry(TypedDict):
+    """A trim or a maneuver."""
+
+    kind: Literal["trim", "maneuver"]
+    name: str
+    control: NotRequired[Annotated[list[Number] | None, says("of a trim, in the model's units")]]
+    duration_s: Number
+    source: NotRequired[Annotated[str, says("of a maneuver: the trim that it begins in")]]
+    target: NotRequired[Annotated[str, says("of a maneuver: the trim that it ends in")]]
+
+
+class TerminalErrorEntry(TypedDict):
+    """How far the end is from the goal, headings modulo a full turn."""
+
+    position_m: Known
+    heading_rad: Known
+
+
+class TrajectoryEntry(TypedDict):
+    """Samples at every switch, and at most 0.05 m and 0.05 rad apart."""
+
+    origin: Annotated[list[Number], says("to be added to x, y; zero unless one exceeds 1e6 m")]
+    time_s: list[Number]
+    pose: Annotated[list[list[Number]], says("[[x, y, heading(, z)]]; headings are continuous")]
+    reduced_state: list[list[Number]]
+    control: Annotated[list[list[Number]], says("control[i] holds from time i to i + 1")]
+
+
+class AuditEntry(TypedDict):
+    """What the audit found."""
+
+    passed: Flag | None
+    max_dynamics_defect: Known
+    min_clearance_m: Known
+    terminal_position_m: Known
+    terminal_heading_rad: Known
+
+
+class AlternativeEntry(TypedDict):
+    """A costlier plan."""
+
+    cost: Number
+    duration_s: Number
+    word: list[str]
+    primitives: list[PrimitiveEntry]
+    terminal_error: TerminalErrorEntry
+
+
+class PlanDocument(Document):
+    """The answer to a problem."""
+
+    vehicle: NotRequired[ModelEntry | None]
+    automaton_hash: NotRequired[Annotated[str, says("what the library was")]]
+    status: Annotated[str, says("how planning ended")]
+    narrowest: NotRequired[Annotated[NarrowestEntry | None, says("only where one is known")]]
+    cost: NotRequired[Known]
+    duration_s: NotRequired[Known]
+    lower_bound: NotRequired[Annotated[Known, says("no plan costs less")]]
+    gap: NotRequired[Annotated[Known, says("(cost - lower_bound) / cost")]]
+    bound: NotRequired[BoundEntry | None]
+    certificate: NotRequired[Annotated[Known, says("smallest reduced cost over the library")]]
+    primitives: Annotated[list[PrimitiveEntry], says("they add up to duration_s")]
+    terminal_error: NotRequired[TerminalErrorEntry | None]
+    clearance_m: NotRequired[Annotated[Known, says("least distance to an obstacle")]]
+    trajectory: TrajectoryEntry
+    audit: NotRequired[AuditEntry | None]
+    alternatives: NotRequired[Annotated[list[AlternativeEntry], says("costlier plans, by cost")]]
+    improvements: NotRequired[Annotated[Pairs, says("[[s, cost]] of the plans found")]]
+    timing_s: NotRequired[Annotated[dict[str, Known], says("what took how long")]]
+    counts: NotRequired[Annotated[dict[str, Whole], says("expansions, gains, plans refused, ...")]]
+
+
+def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
     """The content of plan.json, as plain values; `name` is that of the scenario.
 
     Examples
@@ -68,8 +158,8 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
     >>> document["status"], document["cost"], document["primitives"]
     ('unreachable', None, [])
     """
-    plan = result.plan
-    return {
+    plan, narrow, bound, audit = result.plan, result.narrowest, result.bound, result.audit
+    document: PlanDocument = {
         "schema": SCHEMA,
         "version": package_version(),
         "name": name,
@@ -78,46 +168,56 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> dict[str, Any]:
         "status": result.status.value,
         "reason": result.reason,
         "notes": list(result.notes),
-        **_narrowest(result.narrowest),
-        "cost": _number(result.cost),
+        "narrowest": None
+        if narrow is None
+        else {"place": narrow.place, "missing_m": narrow.missing},
+        "cost": number(result.cost),
         "duration_s": None if plan is None else plan.duration,
-        "lower_bound": _number(result.lower_bound),
-        "gap": _number(result.gap),
-        "bound": _bound(result.bound),
-        "certificate": _number(result.certificate),
+        "lower_bound": number(result.lower_bound),
+        "gap": number(result.gap),
+        "bound": None
+        if bound is None
+        else {
+            "value": float(bound.value),
+            "kind": bound.kind,
+            "history": [(float(at), float(value)) for at, value in bound.history],
+        },
+        "certificate": number(result.certificate),
         "primitives": primitive_entries(plan),
         "terminal_error": _terminal_error(result.terminal_error),
-        "clearance_m": _number(result.clearance_m),
+        "clearance_m": number(result.clearance_m),
         "trajectory": trajectory_entry(plan),
-        "audit": _audit(result.audit),
-        "alternatives": [_alternative(one) for one in result.alternatives],
-        "improvements": [[float(at), float(cost)] for at, cost in result.improvements],
-        "timing_s": {**dict.fromkeys(TIMINGS), **_floats(result.timing_s)},
+        "audit": {
+            "passed": None if audit is None else bool(audit.passed),
+            "max_dynamics_defect": None if audit is None else number(audit.max_dynamics_defect),
+            "min_clearance_m": None if audit is None else number(audit.min_clearance_m),
+            "terminal_position_m": None if audit is None else number(audit.terminal_position_m),
+            "terminal_heading_rad": None if audit is None else number(audit.terminal_heading_rad),
+        },
+        "alternatives": [
+            {
+                "cost": float(one.cost),
+                "duration_s": one.plan.duration,
+                "word": list(one.plan.word),
+                "primitives": primitive_entries(one.plan),
+                "terminal_error": _terminal_error(one.terminal_error),
+            }
+            for one in result.alternatives
+        ],
+        "improvements": [(float(at), float(cost)) for at, cost in result.improvements],
+        "timing_s": {**dict.fromkeys(TIMINGS), **{k: float(v) for k, v in result.timing_s.items()}},
         "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
     }
+    if narrow is None:
+        del document["narrowest"]
+    return document
 
 
-def vehicle_entry(model: Model) -> dict[str, Any]:
-    """The vehicle by name, and what the columns of a trajectory are."""
+def _terminal_error(error: TerminalError | None) -> TerminalErrorEntry:
     return {
-        "model": model.name,
-        "reduced_state": list(model.reduced_names),
-        "control": list(model.control_names),
+        "position_m": None if error is None else float(error.position_m),
+        "heading_rad": None if error is None else float(error.heading_rad),
     }
-
-
-def _bound(bound: LowerBound | None) -> dict[str, Any] | None:
-    if bound is None:
-        return None
-    history = [[float(at), float(value)] for at, value in bound.history]
-    return {"value": float(bound.value), "kind": bound.kind, "history": history}
-
-
-def _narrowest(passage: Narrowest | None) -> dict[str, Any]:
-    """The passage that is too narrow, where one is known."""
-    if passage is None:
-        return {}
-    return {"narrowest": {"place": list(passage.place), "missing_m": passage.missing}}
 
 
 def save_plan(
@@ -135,20 +235,45 @@ def save_plan(
     write_document(plan_to_dict(result, name=name), path, interrupted=interrupted)
 
 
-def write_document(
-    document: Mapping[str, Any], path: Path | str, *, interrupted: bool = False
-) -> None:
-    """Write a plan.json or closed_loop.json in one step: strict JSON, long lists entry by entry.
+def trajectory_entry(plan: Plan | None) -> TrajectoryEntry:
+    """Samples of a plan; far from the origin sampled from (0, 0), so that no digit is lost."""
+    if plan is None:
+        return {"origin": [], "time_s": [], "pose": [], "reduced_state": [], "control": []}
+    origin = np.zeros(2)
+    samples = plan.sample()
+    if np.abs(samples.pose[:, :2]).max() > FAR:
+        origin = plan.start[:2]
+        start = np.concatenate([np.zeros(2), plan.start[2:]])
+        samples = replace(plan, start=start).sample()
+    return {
+        "origin": origin.tolist(),
+        "time_s": samples.time.tolist(),
+        "pose": samples.pose.tolist(),
+        "reduced_state": samples.reduced_state.tolist(),
+        "control": samples.control.tolist(),
+    }
 
-    Where a signal came before the work was done, the key `interrupted` says so.
 
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
-    said = {**document, "interrupted": True} if interrupted else document
-    write_text_atomically(Path(path), _object(said, "") + "\n")
+def primitive_entries(plan: Plan | None) -> list[PrimitiveEntry]:
+    """Trims and maneuvers in order; a maneuver has no control of its own, but two ends."""
+    entries: list[PrimitiveEntry] = []
+    if plan is None:
+        return entries
+    for primitive, duration in zip(plan.primitives, plan.primitive_durations, strict=True):
+        trim = primitive if isinstance(primitive, Trim) else None
+        entry: PrimitiveEntry = {
+            "kind": "maneuver" if trim is None else "trim",
+            "name": primitive.name,
+            "control": None if trim is None else trim.control.tolist(),
+            "duration_s": float(duration),
+        }
+        if isinstance(primitive, Maneuver):
+            entry |= {"source": primitive.source, "target": primitive.target}
+        entries.append(entry)
+    return entries
+
+
+# -- reading
 
 
 def read_plan_document(path: Path | str) -> dict[str, Any]:
@@ -159,13 +284,13 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
     InvalidScenario
         If the file cannot be read, or is no plan.json.
     """
-    document = _parsed(Path(path), "plan")
-    if _is_of_fleet(document):
-        names = ", ".join(map(str, document.get("vehicles") or ())) or "none"
+    value = parsed(path)
+    if isinstance(value, dict) and value.get("kind") == FLEET:
+        names = ", ".join(map(str, value.get("vehicles") or ())) or "none"
         raise InvalidScenario(
             f"{path}: holds plans of several vehicles ({names}), need that of one; see load_plans"
         )
-    return _checked(document, path, ("schema", "status", "primitives", "trajectory"), "plan")
+    return checked("road-plan" if kind_of(value) == "road-plan" else "plan", value, path)
 
 
 def read_fleet_document(path: Path | str) -> dict[str, Any] | None:
@@ -176,61 +301,10 @@ def read_fleet_document(path: Path | str) -> dict[str, Any] | None:
     InvalidScenario
         If the file cannot be read, or misses what plans of several vehicles have.
     """
-    document = _parsed(Path(path), "plan")
-    if not _is_of_fleet(document):
+    value = parsed(path)
+    if not isinstance(value, dict) or value.get("kind") != FLEET:
         return None
-    found = _checked(document, path, ("schema", "status", "vehicles"), "plan")
-    if not isinstance(found["vehicles"], dict):
-        raise InvalidScenario(f"{path}: vehicles: need an object with a plan for each name")
-    return found
-
-
-def _is_of_fleet(document: Any) -> bool:
-    return isinstance(document, dict) and document.get("kind") == FLEET
-
-
-def read_json(path: Path | str, *, needed: Sequence[str], kind: str) -> dict[str, Any]:
-    """The object of a strict JSON file of our `SCHEMA` that has the keys `needed`.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, or is no such object; `kind` is what it should be.
-    """
-    return _checked(_parsed(Path(path), kind), path, needed, kind)
-
-
-def _parsed(path: Path, kind: str) -> Any:
-    """The value of a strict JSON file; or InvalidScenario."""
-    try:
-        with open_input(path) as stream:
-            text = stream.read().decode("utf-8")
-        return json.loads(text, parse_constant=_refuse_constant)
-    except FileNotFoundError as error:
-        raise InvalidScenario(f"{path}: no such file") from error
-    except IsADirectoryError as error:
-        raise InvalidScenario(f"{path}: is a folder, need a {_file_name(kind)}") from error
-    except OSError as error:
-        raise InvalidScenario(f"{path}: cannot be read: {error.strerror}") from error
-    except json.JSONDecodeError as error:
-        raise InvalidScenario(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
-    except (ValueError, RecursionError) as error:
-        raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
-
-
-def _checked(document: Any, path: Path | str, needed: Sequence[str], kind: str) -> dict[str, Any]:
-    """The object that a file holds, of our `SCHEMA`, with the keys `needed`."""
-    if not isinstance(document, dict) or any(key not in document for key in needed):
-        raise InvalidScenario(
-            f"{path}: is no {_file_name(kind)}, need an object with {', '.join(needed)}"
-        )
-    if document["schema"] != SCHEMA:
-        raise InvalidScenario(f"{path}: schema: got {document['schema']!r}, need {SCHEMA}")
-    return document
-
-
-def _file_name(kind: str) -> str:
-    return f"{kind.replace(' ', '_')}.json"
+    return checked(kind_of(value), value, path)
 
 
 def load_plan(path: Path | str, *, vehicle: str | None = None, model: Model | None = None) -> Plan:
@@ -255,8 +329,7 @@ def load_plan(path: Path | str, *, vehicle: str | None = None, model: Model | No
     """
     if vehicle is None:
         return _plan_of_file(read_plan_document(path), str(path), model)
-    document = read_fleet_document(path)
-    vehicles = {} if document is None else document["vehicles"]
+    vehicles = (read_fleet_document(path) or {}).get("vehicles", {})
     if vehicle not in vehicles:
         names = ", ".join(vehicles) or "one vehicle without a name"
         raise InvalidScenario(f"{path}: holds no vehicle {vehicle!r}, but {names}")
@@ -283,134 +356,89 @@ def load_plans(path: Path | str) -> dict[str, Plan]:
 
 def _plan_of_file(document: Any, place: str, model: Model | None = None) -> Plan:
     """The plan of a document at a place of a file; or InvalidScenario."""
-    try:
+    with told_of(place):
         if document["status"] != "found":
             raise InvalidScenario(f"{place}: holds no plan, its status is {document['status']!r}")
         return plan_of_document(document, model)
-    except InvalidScenario:
-        raise
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{place}: {said}") from error
 
 
-@functools.cache
-def package_version() -> str:
-    """The version of this package; "0" where it is not installed."""
-    try:
-        return metadata.version("maneuver-automaton")
-    except metadata.PackageNotFoundError:
-        return "0"
+def load_result(path: Path | str, problem: Problem) -> PlanResult:
+    """The result of a plan.json; the file states neither body nor obstacles, the `problem` does.
+
+    Alternatives with maneuvers are left out: the file does not say how they move.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, or was planned with another library.
+    """
+    return result_of(read_document(path, "plan"), problem, place=str(path))
 
 
-def trajectory_entry(plan: Plan | None) -> dict[str, Any]:
-    """Samples of a plan; far from the origin sampled from (0, 0), so that no digit is lost."""
-    if plan is None:
-        return {key: [] for key in TRAJECTORY}
-    origin = np.zeros(2)
-    samples = plan.sample()
-    if np.abs(samples.pose[:, :2]).max() > FAR:
-        origin = plan.start[:2]
-        start = np.concatenate([np.zeros(2), plan.start[2:]])
-        samples = replace(plan, start=start).sample()
-    return {
-        "origin": origin.tolist(),
-        "time_s": samples.time.tolist(),
-        "pose": samples.pose.tolist(),
-        "reduced_state": samples.reduced_state.tolist(),
-        "control": samples.control.tolist(),
-    }
+def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> PlanResult:
+    """The result of a document that is read already; `place` is where it stands, for messages.
+
+    Raises
+    ------
+    InvalidScenario
+        If it was planned with another library, or its samples make no plan.
+    """
+    from maneuver_automaton.bounds import Narrowest  # with kernels
+
+    if document.get("automaton_hash") != automaton_hash(problem.automaton):
+        raise InvalidScenario(f"{place}: automaton_hash: this was planned with another library")
+    passage, bound = document.get("narrowest"), document.get("bound")
+    with told_of(place):
+        status = PlanStatus(document["status"])
+        found = status is PlanStatus.FOUND
+        others = (_alternative(one, problem) for one in document.get("alternatives") or ())
+        return PlanResult(
+            problem=problem,
+            status=status,
+            reason=document.get("reason", ""),
+            plan=plan_of_document(document, problem.automaton.model) if found else None,
+            bound=bound and LowerBound(**bound | {"history": _pairs(bound["history"])}),
+            terminal_error=_error(document.get("terminal_error")),
+            alternatives=tuple(one for one in others if one is not None),
+            improvements=_pairs(document.get("improvements", ())),
+            narrowest=passage
+            and Narrowest(place=tuple(passage["place"]), missing=passage["missing_m"]),
+            notes=tuple(document.get("notes", ())),
+            cost=document.get("cost"),
+            lower_bound=document.get("lower_bound"),
+            gap=document.get("gap"),
+            certificate=document.get("certificate"),
+            clearance_m=document.get("clearance_m"),
+        )
 
 
-def primitive_entries(plan: Plan | None) -> list[dict[str, Any]]:
-    """Trims and maneuvers in order; a maneuver has no control of its own, but two ends."""
-    entries: list[dict[str, Any]] = []
-    if plan is None:
-        return entries
-    for primitive, duration in zip(plan.primitives, plan.primitive_durations, strict=True):
-        trim = primitive if isinstance(primitive, Trim) else None
-        entry: dict[str, Any] = {
-            "kind": "maneuver" if trim is None else "trim",
-            "name": primitive.name,
-            "control": None if trim is None else trim.control.tolist(),
-            "duration_s": float(duration),
-        }
-        if isinstance(primitive, Maneuver):
-            entry |= {"source": primitive.source, "target": primitive.target}
-        entries.append(entry)
-    return entries
-
-
-def _alternative(one: Alternative) -> dict[str, Any]:
-    return {
-        "cost": float(one.cost),
-        "duration_s": one.plan.duration,
-        "word": list(one.plan.word),
-        "primitives": primitive_entries(one.plan),
-        "terminal_error": _terminal_error(one.terminal_error),
-    }
-
-
-def _terminal_error(error: TerminalError | None) -> dict[str, float | None]:
-    return {
-        "position_m": None if error is None else float(error.position_m),
-        "heading_rad": None if error is None else float(error.heading_rad),
-    }
-
-
-def _audit(audit: Audit | None) -> dict[str, bool | float | None]:
-    if audit is None:
-        keys = ("passed", "max_dynamics_defect", "min_clearance_m")
-        return dict.fromkeys((*keys, "terminal_position_m", "terminal_heading_rad"))
-    return {
-        "passed": bool(audit.passed),
-        "max_dynamics_defect": float(audit.max_dynamics_defect),
-        "min_clearance_m": _number(audit.min_clearance_m),
-        "terminal_position_m": float(audit.terminal_position_m),
-        "terminal_heading_rad": float(audit.terminal_heading_rad),
-    }
-
-
-def _number(value: float | None) -> float | None:
-    """A number, or null where there is none or no limit."""
-    return None if value is None or math.isinf(value) else float(value)
-
-
-def _floats(values: Mapping[str, float]) -> dict[str, float]:
-    return {key: float(value) for key, value in values.items()}
-
-
-def _object(document: Mapping[str, Any], left: str) -> str:
-    """An object, a key a line, `left` of which that many spaces stand."""
-    inside = left + "  "
-    rows = (
-        f"{inside}{json.dumps(key)}: {_json(key, value, inside)}" for key, value in document.items()
+def _alternative(entry: AlternativeEntry, problem: Problem) -> Alternative | None:
+    """A costlier plan of trims; None where it has maneuvers."""
+    automaton, error, parts = (
+        problem.automaton,
+        _error(entry["terminal_error"]),
+        entry["primitives"],
     )
-    return "{\n" + ",\n".join(rows) + f"\n{left}}}"
+    known = all(one["kind"] == "trim" and one["name"] in automaton.trim_names for one in parts)
+    if not known or error is None:
+        return None
+    plan = Plan(
+        problem.start,
+        [automaton[one["name"]] for one in parts],
+        durations=[one["duration_s"] for one in parts],
+        start_time=problem.start_time,
+    )
+    return Alternative(plan=plan, cost=entry["cost"], terminal_error=error)
 
 
-def _json(key: str, value: Any, left: str = "") -> str:
-    """A value of the file in one line, but lists of objects one object a line, and vehicles."""
-    if key in LISTS and value:
-        rows = ",\n".join(f"{left}  {_json('', row)}" for row in value)
-        return f"[\n{rows}\n{left}]"
-    if key == "trajectory":
-        rows = ",\n".join(
-            f"{left}  {json.dumps(name)}: {_json('', row)}" for name, row in value.items()
-        )
-        return "{\n" + rows + f"\n{left}}}"
-    if key == "vehicles":
-        inside = left + "  "
-        rows = ",\n".join(
-            f"{inside}{json.dumps(name, ensure_ascii=False)}: {_object(row, inside)}"
-            for name, row in value.items()
-        )
-        return "{\n" + rows + f"\n{left}}}"
-    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+def _error(entry: TerminalErrorEntry | None) -> TerminalError | None:
+    if entry is None or entry["position_m"] is None or entry["heading_rad"] is None:
+        return None
+    return TerminalError(position_m=entry["position_m"], heading_rad=entry["heading_rad"])
 
 
-def _refuse_constant(word: str) -> float:
-    raise ValueError(f"{word} is no JSON")
+def _pairs(rows: Sequence[Any]) -> tuple[tuple[float, float], ...]:
+    return tuple((float(at), float(value)) for at, value in rows)
 
 
 def plan_of_document(document: Mapping[str, Any], model: Model | None = None) -> Plan:

@@ -8,18 +8,34 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Literal, NotRequired
 
 import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.formats.plan_json import (
+from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
+    ClearanceEntry,
+    ClosestEntry,
+    Document,
+    Flag,
+    Known,
+    ModelEntry,
+    Number,
+    Whole,
+    number,
     package_version,
+    says,
+    vehicle_entry,
+)
+from maneuver_automaton.formats.plan_json import (
+    PlanDocument,
+    PrimitiveEntry,
     primitive_entries,
     trajectory_entry,
-    vehicle_entry,
 )
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.roads import (
@@ -37,7 +53,102 @@ from maneuver_automaton.roads.library import RoadLibrary
 GUARANTEES = {"touched": "no collision", "off_road": "on the road", "undrivable": "drivable"}
 
 
-def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
+class RoadAuditEntry(TypedDict):
+    """What the judge found."""
+
+    passed: Flag
+    max_dynamics_defect: Number
+    min_clearance_m: Annotated[Known, says("to any road user")]
+    min_edge_m: Annotated[Known, says("of the body to the edge of the road")]
+    off_road: Annotated[Whole, says("1 if the road was left")]
+    pieces: NotRequired[Annotated[Whole, says("of a drive: steps")]]
+    failed: NotRequired[Annotated[Whole, says("of a drive: faults")]]
+
+
+class RoadPlanDocument(PlanDocument):
+    """A plan on a road."""
+
+    audit: RoadAuditEntry | None  # type: ignore[misc]
+    stop: Annotated[list[PrimitiveEntry], says("how it stops where it cannot go on")]
+
+
+class DriveBrokenEntry(TypedDict):
+    """What a drive did that it must not."""
+
+    step: Whole | None
+    guarantee: str
+    reason: str
+
+
+class DriveStepEntry(TypedDict):
+    """A step of a drive; in the last entry, where it ended, the plan is null."""
+
+    time_s: Number
+    pose: Annotated[list[Number], says("of the rear axle")]
+    reduced_state: Annotated[list[Number], says("speed and steering")]
+    value: Number
+    accumulated_cost: Number
+    control: list[Number] | None
+    word: list[str] | None
+    plan: list[PrimitiveEntry] | None
+    replanned: Flag | None
+    solve_s: Known
+    number: NotRequired[Whole]
+    reaches: NotRequired[Annotated[Flag, says("the plan leads to a goal")]]
+    lasting_s: NotRequired[Number]
+    stops: NotRequired[Annotated[Flag, says("the plan stops on the way")]]
+
+
+class DriveDocument(Document):
+    """A drive on a road."""
+
+    vehicle: NotRequired[ModelEntry | None]
+    automaton_hash: NotRequired[str]
+    status: NotRequired[str]
+    reached: Flag
+    cost: NotRequired[Number]
+    duration_s: NotRequired[Number]
+    step_s: Number
+    steps_bound: NotRequired[None]
+    planned_before_s: NotRequired[Annotated[Known, says("the search before the start")]]
+    audit: NotRequired[RoadAuditEntry]
+    min_clearance_m: NotRequired[Known]
+    collisions: NotRequired[Whole]
+    broken_guarantees: NotRequired[list[DriveBrokenEntry]]
+    steps: Annotated[list[DriveStepEntry], Field(min_length=1)]
+
+
+class SeveralEntry(Document):
+    """What files of several vehicles on one road have."""
+
+    kind: Literal["fleet"]
+    status: str
+    cost: NotRequired[Annotated[Known, says("sum of the costs")]]
+    last_s: NotRequired[Annotated[Number, says("when the last one arrives")]]
+    clearance_m: NotRequired[ClearanceEntry]
+    closest: NotRequired[list[ClosestEntry]]
+
+
+class RoadFleetDocument(SeveralEntry):
+    """Plans of several vehicles on one road."""
+
+    sum_s: NotRequired[Number]
+    order: NotRequired[Annotated[list[str], says("in which they were planned")]]
+    timing_s: NotRequired[dict[str, Known]]
+    vehicles: dict[str, RoadPlanDocument]
+
+
+class RoadFleetDriveDocument(SeveralEntry):
+    """Drives of several vehicles on one road."""
+
+    reached: Flag
+    duration_s: NotRequired[Number]
+    planned_before_s: NotRequired[Known]
+    collisions: NotRequired[Whole]
+    vehicles: dict[str, DriveDocument]
+
+
+def road_plan_to_dict(result: RoadPlanResult) -> RoadPlanDocument:
     """The content of plan.json; without a plan the numbers are null and the lists empty."""
     plan, verdict = result.plan, result.verdict
     return {
@@ -57,7 +168,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
         "primitives": _primitives(plan),
         "stop": _primitives(result.stop),
         "terminal_error": None,
-        "clearance_m": None if verdict is None else _number(verdict.clearance_m),
+        "clearance_m": None if verdict is None else number(verdict.clearance_m),
         "trajectory": trajectory_entry(plan),
         "audit": None if verdict is None else _audit(verdict),
         "alternatives": [],
@@ -68,7 +179,7 @@ def road_plan_to_dict(result: RoadPlanResult) -> dict[str, Any]:
     }
 
 
-def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> dict[str, Any]:
+def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> RoadFleetDocument:
     """The content of plan.json for several vehicles on one road."""
     plans = result.plans.values()
     verdicts = [one.verdict for one in result.results.values() if one.verdict is not None]
@@ -83,23 +194,25 @@ def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> 
         "sum_s": math.fsum(plan.duration for plan in plans),
         "last_s": max((plan.start_time + plan.duration for plan in plans), default=0.0),
         "clearance_m": {
-            "between": _number(result.distance_m),
-            "to_obstacles": _number(min((one.clearance_m for one in verdicts), default=math.inf)),
+            "between": number(result.distance_m),
+            "to_obstacles": number(min((one.clearance_m for one in verdicts), default=math.inf)),
         },
         "closest": _closest(result.pairs),
         "order": list(result.order),
         "timing_s": {"search": result.search_s},
         "notes": joint_notes(result),
         "vehicles": {
-            name: road_plan_to_dict(one) | {"name": name} for name, one in result.results.items()
+            name: {**road_plan_to_dict(one), "name": name} for name, one in result.results.items()
         },
     }
 
 
-def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> dict[str, Any]:
+def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> RoadFleetDriveDocument:
     """The content of closed_loop.json for several vehicles on one road."""
     vehicles = {
-        name: road_drive_to_dict(one, before=drive.before.results[name]) | {"name": name}
+        name: DriveDocument(
+            **{**road_drive_to_dict(one, before=drive.before.results[name]), "name": name}
+        )
         for name, one in drive.results.items()
     }
     driven = drive.plans.values()
@@ -117,8 +230,8 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> dict[str, Any]:
         "last_s": max((plan.start_time + plan.duration for plan in driven), default=0.0),
         "planned_before_s": drive.before.search_s,
         "clearance_m": {
-            "between": _number(drive.distance_m),
-            "to_obstacles": _number(min(one.verdict.clearance_m for one in rows)),
+            "between": number(drive.distance_m),
+            "to_obstacles": number(min(one.verdict.clearance_m for one in rows)),
         },
         "closest": _closest(drive.pairs),
         "collisions": sum(one.verdict.collisions for one in rows),
@@ -137,7 +250,7 @@ def joint_notes(fleet: RoadFleetResult | RoadFleetDrive) -> list[str]:
     return list(dict.fromkeys(said))
 
 
-def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> dict[str, Any]:
+def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> DriveDocument:
     """The content of closed_loop.json; `before` is the search that was made before the start."""
     spent = np.concatenate([[0.0], np.cumsum([step.applied_cost for step in drive.steps])])
     verdict, driven = drive.verdict, drive.driven
@@ -156,7 +269,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
         "steps_bound": None,
         "planned_before_s": None if before is None else before.search_s,
         "audit": {**_audit(verdict), "pieces": len(drive.steps), "failed": len(verdict.faults)},
-        "min_clearance_m": _number(verdict.clearance_m),
+        "min_clearance_m": number(verdict.clearance_m),
         "collisions": verdict.collisions,
         "broken_guarantees": [
             {"step": None, "guarantee": GUARANTEES[what], "reason": reason}
@@ -174,20 +287,21 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
                 "reduced_state": driven.trims[-1].reduced_state.tolist(),
                 "value": 0.0,
                 "accumulated_cost": float(spent[-1]),
-                **dict.fromkeys(("control", "word", "plan", "replanned", "solve_s")),
+                "control": None,
+                "word": None,
+                "plan": None,
+                "replanned": None,
+                "solve_s": None,
             },
         ],
     }
 
 
-def _closest(pairs: Sequence[RoadPair]) -> list[dict[str, Any]]:
-    return [
-        {"pair": list(one.pair), "time_s": one.time_s, "distance_m": one.distance_m}
-        for one in pairs
-    ]
+def _closest(pairs: Sequence[RoadPair]) -> list[ClosestEntry]:
+    return [{"pair": one.pair, "time_s": one.time_s, "distance_m": one.distance_m} for one in pairs]
 
 
-def _primitives(plan: Plan | None) -> list[dict[str, Any]]:
+def _primitives(plan: Plan | None) -> list[PrimitiveEntry]:
     """Trims and maneuvers in order; a maneuver on roads has one control throughout."""
     entries = primitive_entries(plan)
     for entry, one in zip(entries, () if plan is None else plan.primitives, strict=True):
@@ -204,7 +318,7 @@ def library_hash(library: RoadLibrary) -> str:
     return digest.hexdigest()
 
 
-def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> dict[str, Any]:
+def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> DriveStepEntry:
     decision = step.decision
     plan = _primitives(planner.plan_of(step.state, decision.controls, tick=step.number))
     return {
@@ -225,15 +339,11 @@ def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> dict[str, Any]:
     }
 
 
-def _audit(verdict: RoadVerdict) -> dict[str, Any]:
+def _audit(verdict: RoadVerdict) -> RoadAuditEntry:
     return {
         "passed": verdict.clean,
         "max_dynamics_defect": verdict.audit.max_dynamics_defect,
-        "min_clearance_m": _number(verdict.clearance_m),
-        "min_edge_m": _number(verdict.edge_m),
+        "min_clearance_m": number(verdict.clearance_m),
+        "min_edge_m": number(verdict.edge_m),
         "off_road": int(verdict.off_road),
     }
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

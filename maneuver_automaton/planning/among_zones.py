@@ -38,8 +38,7 @@ from maneuver_automaton.planning.polishing import (
     polish_plans,
     why_not_polished,
 )
-from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus, Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 from maneuver_automaton.problem import Goal, Problem

@@ -21,12 +21,12 @@ from maneuver_automaton.collision.fcl_checker import Course, FclChecker
 from maneuver_automaton.collision.heights import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
-from maneuver_automaton.planning.workspace import Workspace, workspace_of
+from maneuver_automaton.planning.result import Workspace, workspace_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.trajectory import Trajectory
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
-from maneuver_automaton.search.inside import stays_inside
+from maneuver_automaton.search.limits import stays_inside
 from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too

@@ -12,15 +12,12 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.checking import Condition
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
-from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus, Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.choose import search_goal
-from maneuver_automaton.search.insertion import insertion_stages
-from maneuver_automaton.search.inside import outside
-from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.search.choose import insertion_stages, search_goal
+from maneuver_automaton.search.limits import outside, why_impossible
 from maneuver_automaton.search.result import InsertionTask, SearchResult, plan_of
 from maneuver_automaton.words.word import Word, word_of_plan
 

@@ -29,10 +29,9 @@ from maneuver_automaton.planning.lattice_words import (
     search_lattice,
 )
 from maneuver_automaton.planning.polishing import Aimed, guess_along, polish_found
-from maneuver_automaton.planning.result import PlanResult, PlanStatus
+from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
 from maneuver_automaton.planning.steps import Steps, steps_of
 from maneuver_automaton.planning.tracking import Tracked, track
-from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
 from maneuver_automaton.refinement.path_guesses import path_guesses

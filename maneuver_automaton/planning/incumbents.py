@@ -19,17 +19,19 @@ from maneuver_automaton.planning.result import (
     LowerBound,
     PlanResult,
     PlanStatus,
+    Workspace,
 )
-from maneuver_automaton.planning.workspace import Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import (
+    COSTLIER,
     fitted_plans,
+    has_short_coasts,
     nearly_met,
     padded,
     with_lasting_coasts,
 )
-from maneuver_automaton.search.inside import stays_inside
+from maneuver_automaton.search.limits import stays_inside
 
 ROUNDING = 1e-12  # relative, of sums of costs
 CHEAPER = 1e-7  # share of a cost that closing the end of a plan may change it by
@@ -51,11 +53,17 @@ class Accepted:
     cost: float
     audit: Audit
     offered: float  # its cost before short trims were left out
+    short: bool = False  # whether it has trims so short that one without them may cost a bit more
+
+    @property
+    def price(self) -> float:
+        """What others are compared with: its cost, or what it may cost without short trims."""
+        return self.cost * (1.0 + COSTLIER) if self.short else self.cost
 
     @property
     def rank(self) -> tuple[float, int]:
-        """Its place among others: by cost but for rounding, then by the number of its trims."""
-        return float(f"{self.cost:.10g}"), len(self.plan.trims)
+        """Its place among others: by price but for rounding, then by the number of its trims."""
+        return float(f"{self.price:.10g}"), len(self.plan.trims)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -231,13 +239,18 @@ class Incumbents:
         late = 0
         for one in candidates:
             most = one.cost + CHEAPER * abs(one.cost)
-            known = [other.plan for other in self.plans if other.offered <= most]
+            known = [
+                other.plan
+                for other in self.plans
+                if (other.price if other.short else other.offered) <= most
+            ]
             if len(known) > self.alternatives or not self.may_check:
                 return
             over = late >= LATE or self.for_checks.left_to_check == 0.0
             if late and (self.plans or over):
                 return
             plan = one.plan()
+            known += [other.plan for other in self.plans if other.plan.word == plan.word]
             if is_new(plan, known, self.likeness):
                 self.offer(plan, one.goal_index, proven=one.proven)
             late += self.budget.is_over
@@ -276,8 +289,16 @@ class Incumbents:
                 self.misfits.append((plan, goal_index))
             return False
         offered, cost = cost, self.problem.cost_of(plan)
+        # What is shown is final but for cheaper plans: of those with short trims only the first is,
+        # and takes no other's place to be.
+        shown = self.budget.shows is not None and not self.plans
         one = Accepted(
-            plan=plan, goal_index=goal_index, cost=cost, audit=checked.audit, offered=offered
+            plan=plan,
+            goal_index=goal_index,
+            cost=cost,
+            audit=checked.audit,
+            offered=offered,
+            short=not shown and has_short_coasts(self.problem, plan),
         )
         same = [other for other in self.plans if same_motion(plan, other.plan, self.likeness)]
         if not any(other.rank <= one.rank for other in same):
@@ -287,7 +308,7 @@ class Incumbents:
                 self.least_cost = cost
                 self.improvements.append((self.budget.elapsed, cost))
                 self._tell(cost)
-            if self.plans[0] is one and self.budget.shows is not None:
+            if self.plans[0] is one and not one.short and self.budget.shows is not None:
                 self.budget.shows(self.found)
         return True
 
@@ -313,7 +334,8 @@ class Incumbents:
 
         The search lasted until `searched` [s], or until the first plan.
         """
-        best, *others = self.plans[: self.alternatives + 1]
+        best, *others = self.plans
+        others = [one for one in others if one.cost >= best.cost][: self.alternatives]
         # the search adds the same terms up in another order
         value = bound.value if bound.value < best.cost * (1.0 - ROUNDING) else best.cost
         bound = replace(bound, value=value, optimal=bound.optimal or value == best.cost)
@@ -336,7 +358,7 @@ class Incumbents:
                 Alternative(
                     plan=other.plan, cost=other.cost, terminal_error=self._terminal_error(other)
                 )
-                for other in others
+                for other in sorted(others, key=lambda one: one.cost)
             ),
             timing_s=self._timing(first if searched is None else searched) | {"first_plan": first},
             counts=dict(self.counts),

@@ -20,10 +20,9 @@ from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import load_checks
-from maneuver_automaton.planning.free_path import along_free_path
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
-from maneuver_automaton.planning.no_way import before_proof
+from maneuver_automaton.planning.no_way import along_free_path, before_proof
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import Problem, moves

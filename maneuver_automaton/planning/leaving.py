@@ -22,7 +22,7 @@ from maneuver_automaton.planning.checking import Checked, Condition, check_plan
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.search.inside import outside
+from maneuver_automaton.search.limits import outside
 
 LEAST = 1e-3  # [s] that are left to plan in, or to drive
 EVERY = 5  # samples of a first trim after which a second one is tried

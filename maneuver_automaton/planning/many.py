@@ -9,9 +9,9 @@ import math
 import os
 import pickle
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,9 +21,6 @@ from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.planning.plan import plan
 from maneuver_automaton.planning.result import PlanResult
 from maneuver_automaton.problem import Goal, Problem
-
-if TYPE_CHECKING:
-    from maneuver_automaton.planning.planner import Planner
 
 CHUNK = 64  # queries that a process is given at a time, at most
 CHUNKS = 16  # for each process, at least, so that all end at about the same time
@@ -37,11 +34,22 @@ Goals = ArrayLike | Sequence[Goal]
 Queries = list[Problem] | tuple[Array, list[Any]]  # problems; or starts and goals of a planner
 
 
+class Prepared(Protocol):
+    """A `Planner`, as far as queries are asked with it."""
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What it is made of, by the names of its arguments."""
+
+    def plan(self, start: ArrayLike, goals: Any, /, *, time_limit: float) -> PlanResult:
+        """The answer to one query."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Asked:
     """Everything that is asked, and how to answer it."""
 
-    planner: Planner | None
+    planner: Prepared | None
     queries: Queries
     time_limit: float
     take: Take | None
@@ -127,7 +135,7 @@ def plan_many(
 
 
 def plan_many_on(
-    planner: Planner,
+    planner: Prepared,
     starts: ArrayLike,
     goals: Goals,
     *,
@@ -143,9 +151,9 @@ def plan_many_on(
     return _answers(asked, jobs, scheduler, journal, progress)
 
 
-def _queries(planner: Planner, starts: ArrayLike, goals: Goals) -> tuple[Array, list[Any]]:
+def _queries(planner: Prepared, starts: ArrayLike, goals: Goals) -> tuple[Array, list[Any]]:
     """Starts (n, dof) and as many goals; one start or one goal serves all."""
-    dof = planner.automaton.model.group.dof
+    dof = planner.stated["automaton"].model.group.dof
     places = np.atleast_2d(as_array("starts", starts, last=dof))
     aims: list[Any]
     if isinstance(goals, Goal):
@@ -180,7 +188,7 @@ def _answers(
     parts = [asked.part(wanted[k : k + size]) for k in range(0, len(wanted), size)]
     if jobs == 1 and scheduler is None:
         return _told(kept, in_parallel(asked.answers, parts), len(asked), journal, progress)
-    common = _dumped(asked.planner and _fields_of(asked.planner))
+    common = _dumped(asked.planner)
     rest = (asked.time_limit, asked.take)
     pieces = [(common, _dumped(part), *rest) for part in parts]
     sent = in_parallel(_answered_apart, pieces, jobs=jobs, scheduler=scheduler)
@@ -220,19 +228,12 @@ def _answered_apart(piece: tuple[bytes, bytes, float, Take | None]) -> bytes:
 
 
 @functools.lru_cache(maxsize=KNOWN_PLANNERS)
-def _planner_of(common: bytes) -> Planner | None:
-    from maneuver_automaton.planning.planner import Planner
-
-    given = pickle.loads(common)
-    return None if given is None else Planner(**given)
+def _planner_of(common: bytes) -> Prepared | None:
+    planner: Prepared | None = pickle.loads(common)
+    return planner
 
 
-def _fields_of(planner: Planner) -> dict[str, Any]:
-    """What a planner is made of, by the names of its arguments."""
-    return {one.name: getattr(planner, one.name) for one in fields(planner) if one.init}
-
-
-def _parts_of(one: Planner | Problem | None) -> list[object]:
+def _parts_of(one: Any) -> list[object]:
     """The values of a planner or a problem that its answers name."""
     if one is None:
         return []
@@ -295,7 +296,7 @@ def _digest(asked: _Asked) -> str:
     import joblib
 
     try:
-        return str(joblib.hash((asked.planner and _fields_of(asked.planner), asked.queries)))
+        return str(joblib.hash((asked.planner and asked.planner.stated, asked.queries)))
     except Exception as error:
         raise ValueError(
             f"journal: the queries cannot be told from others: {error}; need a model of the "

@@ -1,16 +1,36 @@
-"""The proof that no plan exists, for a problem whose search has ended without one."""
+"""Where a search ends without a plan: the proof that there is none, or words along a free path.
+
+Boxes of poses say whether start and goal are connected at all. If they are, the path that keeps
+farthest from everything is followed: the search leads from a pose on it to one further along, as
+far as it gets at once, and half as far where it gets nowhere. A vehicle that can turn and shift on
+the spot by changes of direction gets along any path that has room on every side.
+
+Source: Laumond, Jacobs, Taïx, Murray (1994), *A motion planner for nonholonomic mobile robots*.
+"""
 
 from __future__ import annotations
 
 import functools
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search.cost_to_go import CostTable
+from maneuver_automaton.search.distance_grid import distance_grid
+from maneuver_automaton.search.lattice import FirstPlan
+from maneuver_automaton.search.lattice_memory import give_back
+from maneuver_automaton.search.lattice_pass import pass_of
+from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery
+from maneuver_automaton.search.lattice_task import Resolution, back_off_of
+from maneuver_automaton.words.transitions import SWITCH
 
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
@@ -113,3 +133,137 @@ def load_proof() -> None:
     problem = Problem(robot, [0, 0, 0], [4, 0, 0], obstacles=walls, footprint=Box([1.0, 0.5]))
     separation(problem, most_boxes=5_000)
     pose_scene(problem).states(np.zeros((1, 6)))
+
+
+WIDE = 25.0  # times the lattice's distance before contact, that the path keeps if there is room
+KEPT = 0.6  # share of what the path keeps that its chords keep
+PROVEN = 0.05  # share of that which words keep for certain
+SHARE = 0.5  # of the time left
+STEP = Resolution(scale=0.24, durations=0.25, truncated=True)
+EXPANSIONS = 16  # from a pose to the next, at most
+AROUND = 2.0  # length scales that such a search looks around
+SHORTEST = 1e-7  # share of the path below which no step is tried
+FIRST_SAMPLES, MOST_SAMPLES = 16, 1 << 16  # of a chord
+
+
+def along_free_path(query: LatticeQuery, table: CostTable) -> Callable[[Budget], FirstPlan] | None:
+    """What follows a free path within a budget; None where the vehicle cannot follow any path.
+
+    The answer is `exhausted` if it is proven that there is no path.
+    """
+    able = query.library.at_will and query.problem.start.size == 3 and query.most_trims == 0
+    if not able or query.moves or query.world.arrays.field.distance.size == 0:
+        return None
+    return functools.partial(_followed, query, table)
+
+
+def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPlan:
+    """The word along the widest path of boxes, or none."""
+    from maneuver_automaton.bounds import Connection, widest_path
+
+    left = SHARE * budget.left
+    load_proof()  # the compiler's time is not the budget's
+    budget = replace(budget, deadline=budget.clock() + left)
+    answer, poses, apart = widest_path(
+        query.problem,
+        first=WIDE * back_off_of(query.library),
+        most_boxes=MOST_BOXES,
+        deadline=budget.deadline,
+    )
+    word, expansions, queries = None, 0, 0
+    if answer is Connection.CONNECTED:
+        path, goal = _path_of(query, poses, KEPT * apart)
+        steps, expansions, queries = _steps_along(query, table, path, KEPT * apart, budget)
+        word = query.word_of(steps, goal) if steps else None
+    late = word is not None and word.duration > query.most_time
+    return FirstPlan(
+        word=None if late else word,
+        expansions=expansions,
+        queries=queries,
+        exhausted=answer is Connection.SEPARATED,
+        enclosed="",
+        nearest=(math.inf, math.inf),
+    )
+
+
+def _path_of(query: LatticeQuery, poses: Array, apart: float) -> tuple[Array, int]:
+    """Corners (n, 3) of a path with as long chords as stay `apart`, and the goal it leads to."""
+    poses = query.world.into(poses)
+    goal = int(np.hypot(*(query.goals[:, :2] - poses[-1, :2]).T).argmin())
+    end = query.goals[goal, :3].copy()
+    end[2] = poses[-1, 2] if query.free_heading[goal] else end[2]
+    path = np.concatenate([query.start[None, :3], poses, end[None]])
+    path[:, 2] = np.unwrap(path[:, 2])
+    kept, last = [0], len(path) - 1
+    while (here := kept[-1]) < last:
+        step, ahead = last - here, here + 1
+        while step:
+            there = min(ahead + step, last)
+            if there > ahead and _stays_apart(query, path[[here, there]], apart):
+                ahead = there
+            else:
+                step //= 2
+        kept.append(ahead)
+    return path[kept], goal
+
+
+def _stays_apart(query: LatticeQuery, chord: Array, apart: float) -> bool:
+    """Whether a chord (2, 3) keeps half of `apart` [m], as samples that are dense enough show."""
+    length, n = float(_lengths(query, chord)[0]), FIRST_SAMPLES
+    while n <= MOST_SAMPLES:
+        poses = chord[0] + np.linspace(0.0, 1.0, n)[:, None] * (chord[1] - chord[0])
+        clear = clearances(query.world, poses) - query.problem.margin
+        if clear.min() < apart:
+            return False
+        if clear.min() - 0.5 * apart >= 0.5 * length / (n - 1):
+            return True
+        n *= 4
+    return False
+
+
+def _lengths(query: LatticeQuery, path: Array) -> Array:
+    """How far the body moves at most between the poses (n, 3) of a path, (n - 1,) [m]."""
+    body, steps = query.world.body, np.diff(path, axis=0)
+    arm = math.hypot(body.middle_x, body.middle_y) + body.reach
+    return np.asarray(np.hypot(steps[:, 0], steps[:, 1]) + arm * np.abs(steps[:, 2]))
+
+
+def _steps_along(
+    query: LatticeQuery, table: CostTable, path: Array, apart: float, budget: Budget
+) -> tuple[list[tuple[int, int, float]], int, int]:
+    """Steps of a word along a path, none if it gets stuck; expansions, and collision queries."""
+    places = np.append(0.0, np.cumsum(_lengths(query, path)))
+    scene = query.scene(max(min(query.margin, PROVEN * apart), LEAST_MARGIN))
+    length = step = float(places[-1])
+    steps, expansions, queries, here, at = list[tuple[int, int, float]](), 0, 0, 0.0, query.start
+    while here < length:
+        most = EXPANSIONS if budget.expansions is None else budget.expansions - expansions
+        if budget.is_over or most <= 0 or step < SHORTEST * length:
+            return [], expansions, queries
+        there = min(here + step, length)
+        to = np.append([np.interp(there, places, column) for column in path.T], query.start[3])
+        ends = np.array([at, to])[:, :2]
+        around = AROUND * query.library.radius
+        leg = replace(
+            query,
+            around=scene,
+            start=at,
+            goals=to[None],
+            goal_trims=query.goal_trims[:1],
+            free_heading=np.zeros(1, dtype=np.bool_),
+            box=np.append(ends.min(axis=0) - around, ends.max(axis=0) + around),
+        )
+        grid = distance_grid(
+            leg.plane, leg.box, leg.goals, leg.start, coarse=True, prepared=leg.prepared
+        )
+        search = pass_of(leg, STEP, grid=grid, table=table)
+        word = search.run(min(EXPANSIONS, most), math.inf, budget=budget)
+        expansions, queries = expansions + search.expansions, queries + search.queries
+        give_back(leg.prepared, leg.library, search.arrays)
+        if word is None:
+            step = 0.5 * min(step, length - here)
+            continue
+        pairs = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
+        steps += [(SWITCH, trim, duration) for trim, duration in pairs]
+        here, at, step = there, to, 2.0 * step
+    return steps, expansions, queries

@@ -10,8 +10,7 @@ from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents
-from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus, Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice import in_frame_of_problem
 from maneuver_automaton.search.lattice_task import WEIGHT

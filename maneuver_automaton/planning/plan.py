@@ -17,8 +17,7 @@ from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
 from maneuver_automaton.planning.free_space import plan_by_words
 from maneuver_automaton.planning.needs import has_inertia, has_tolerance, uses_lattice
 from maneuver_automaton.planning.no_way import with_proof
-from maneuver_automaton.planning.result import LowerBound, PlanResult
-from maneuver_automaton.planning.workspace import Workspace, workspace_of
+from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace, workspace_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.beginning import Begun, begin, end, prepare_bench
 from maneuver_automaton.search.choose import load_search

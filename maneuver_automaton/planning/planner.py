@@ -27,8 +27,7 @@ from maneuver_automaton.collision import (
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.planning.many import plan_many_on
 from maneuver_automaton.planning.plan import plan_in, prepare
-from maneuver_automaton.planning.result import PlanResult
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import PlanResult, Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 
 
@@ -106,8 +105,12 @@ class Planner:
 
     def __reduce__(self) -> tuple[Callable[[], Planner], tuple[()]]:
         """What makes the like of it: what is prepared is made again, in another process too."""
-        stated = {one.name: getattr(self, one.name) for one in fields(self) if one.init}
-        return functools.partial(Planner, **stated), ()
+        return functools.partial(Planner, **self.stated), ()
+
+    @property
+    def stated(self) -> dict[str, Any]:
+        """What it is made of, by the names of its arguments."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.init}
 
     def problem(
         self,

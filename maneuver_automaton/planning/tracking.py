@@ -16,7 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.blocked import open_goals
-from maneuver_automaton.planning.free_path import along_free_path
+from maneuver_automaton.planning.no_way import along_free_path
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice

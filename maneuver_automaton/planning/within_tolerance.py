@@ -22,8 +22,7 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.no_way import proven_blocked
-from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus, Workspace
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.lattice_goals import nodes_within

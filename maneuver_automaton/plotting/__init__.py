@@ -32,16 +32,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
     from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
-    from maneuver_automaton.plotting.effort import draw_efforts as draw_efforts
-    from maneuver_automaton.plotting.effort import draw_node_efforts as draw_node_efforts
-    from maneuver_automaton.plotting.effort import save_retiming_figure as save_retiming_figure
-    from maneuver_automaton.plotting.effort import (
-        save_uniform_effort_figure as save_uniform_effort_figure,
-    )
     from maneuver_automaton.plotting.factors import draw_factor as draw_factor
     from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
-    from maneuver_automaton.plotting.feasible import draw_feasible_slice as draw_feasible_slice
-    from maneuver_automaton.plotting.feasible import save_feasible_figure as save_feasible_figure
     from maneuver_automaton.plotting.fleet import draw_fleet as draw_fleet
     from maneuver_automaton.plotting.fleet import save_fleet_figure as save_fleet_figure
     from maneuver_automaton.plotting.fleet_animation import animate_fleet as animate_fleet
@@ -54,8 +46,6 @@ if TYPE_CHECKING:
     )
     from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
     from maneuver_automaton.plotting.labels import control_labels as control_labels
-    from maneuver_automaton.plotting.lessons import figure_shift as figure_shift
-    from maneuver_automaton.plotting.lessons import figure_symmetry as figure_symmetry
     from maneuver_automaton.plotting.look import Look as Look
     from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
@@ -85,14 +75,6 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.space import draw_space as draw_space
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
     from maneuver_automaton.plotting.space import save_space_figure as save_space_figure
-    from maneuver_automaton.plotting.stability import CertificateCurve as CertificateCurve
-    from maneuver_automaton.plotting.stability import DrivenLoop as DrivenLoop
-    from maneuver_automaton.plotting.stability import draw_distances as draw_distances
-    from maneuver_automaton.plotting.stability import draw_growth as draw_growth
-    from maneuver_automaton.plotting.stability import draw_indices as draw_indices
-    from maneuver_automaton.plotting.stability import draw_loops as draw_loops
-    from maneuver_automaton.plotting.stability import save_stability_figure as save_stability_figure
-    from maneuver_automaton.plotting.turnpike import save_turnpike_figure as save_turnpike_figure
 
 _HOMES = {
     "draw_alternatives": "alternatives",
@@ -109,14 +91,8 @@ _HOMES = {
     "trim_colors": "colors",
     "draw_altitude": "controls",
     "draw_controls": "controls",
-    "draw_efforts": "effort",
-    "draw_node_efforts": "effort",
-    "save_retiming_figure": "effort",
-    "save_uniform_effort_figure": "effort",
     "draw_factor": "factors",
     "save_factor_figure": "factors",
-    "draw_feasible_slice": "feasible",
-    "save_feasible_figure": "feasible",
     "draw_fleet": "fleet",
     "save_fleet_figure": "fleet",
     "animate_fleet": "fleet_animation",
@@ -125,8 +101,6 @@ _HOMES = {
     "animate_fleet_loop": "fleet_loop_animation",
     "footprint_polygons": "footprint",
     "control_labels": "labels",
-    "figure_shift": "lessons",
-    "figure_symmetry": "lessons",
     "Look": "look",
     "draw_maneuvers": "maneuvers",
     "save_maneuvers_figure": "maneuvers",
@@ -150,13 +124,5 @@ _HOMES = {
     "draw_space": "space",
     "flies_among_heights": "space",
     "save_space_figure": "space",
-    "CertificateCurve": "stability",
-    "DrivenLoop": "stability",
-    "draw_distances": "stability",
-    "draw_growth": "stability",
-    "draw_indices": "stability",
-    "draw_loops": "stability",
-    "save_stability_figure": "stability",
-    "save_turnpike_figure": "turnpike",
 }
 __getattr__, __dir__ = lazily(__name__, _HOMES)

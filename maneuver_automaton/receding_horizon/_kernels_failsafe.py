@@ -23,20 +23,18 @@ from, to within the cell.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.search._kernels_cells import enter
 from maneuver_automaton.search._kernels_coast import coast_inside, coast_proven, coasted
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import IntArray
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 
 FULL_TURN = 2.0 * math.pi
 X, Y, HEADING, Z, CLOCK, LASTING, SAFE, HOPE = range(8)

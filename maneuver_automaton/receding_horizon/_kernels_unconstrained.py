@@ -7,15 +7,13 @@ same wherever it begins, so the nodes of its quadrature are displacements made o
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 
 class IntervalTables(NamedTuple):

@@ -29,8 +29,7 @@ from maneuver_automaton.receding_horizon.mitigation import Mitigation, mitigate
 from maneuver_automaton.receding_horizon.shifting import moves_on
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.improve import Patience
-from maneuver_automaton.search.inside import outside
-from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.search.limits import closed_bound, outside
 
 SEARCHING = 0.6  # share of a step's budget after which no plan to the goal is searched
 LATE = 0.8  # after which no path to the goal is; the rest is for a fail-safe trajectory

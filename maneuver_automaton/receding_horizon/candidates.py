@@ -19,7 +19,7 @@ from maneuver_automaton.receding_horizon.shifting import (
     moving_pieces,
     rest_of,
 )
-from maneuver_automaton.search.inside import outside, stays_inside
+from maneuver_automaton.search.limits import outside, stays_inside
 from maneuver_automaton.search.result import TIE
 
 

@@ -244,7 +244,7 @@ def _coast(
 @functools.cache
 def load_fail_safe() -> None:
     """Have the kernels ready before the clock runs."""
-    from maneuver_automaton.search.ready import smallest_lattice_query
+    from maneuver_automaton.search.choose import smallest_lattice_query
 
     problem = smallest_lattice_query().problem
     stands_free(problem, search_fail_safe(problem, until=1.0).plan.end, time=1.0, duration=1.0)

@@ -33,7 +33,7 @@ from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, 
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import priced_library

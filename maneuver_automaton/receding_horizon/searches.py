@@ -19,9 +19,9 @@ from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search as load_words
+from maneuver_automaton.search.choose import load_times_kernels
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.linked_words import load_linked_words
-from maneuver_automaton.search.ready import load_times_kernels
 
 
 def started(

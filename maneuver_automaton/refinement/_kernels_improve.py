@@ -9,8 +9,9 @@ via-point between; `one` and `two`, the candidates of the first and of the secon
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.refinement._kernels_word import (
     GAIN,
@@ -30,16 +31,13 @@ from maneuver_automaton.refinement._kernels_word import (
     unroll,
     word_cost,
 )
+from maneuver_automaton.refinement.arrays import ImproveTask, Work
 from maneuver_automaton.search._kernels_connection import free_candidate
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import NO_TRIM
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.refinement.work import ImproveTask, Work
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
-    from maneuver_automaton.words.library import Scratch
+from maneuver_automaton.words.library import Scratch
 
 
 @bare_inner_kernel

@@ -15,8 +15,8 @@ before, or by a connection from any earlier one. Arrays of `work.Work` with a ro
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.refinement._kernels_word import (
     GAIN,
@@ -34,15 +34,12 @@ from maneuver_automaton.refinement._kernels_word import (
     unroll,
     word_cost,
 )
+from maneuver_automaton.refinement.arrays import ImproveTask, Work
 from maneuver_automaton.search._kernels_connection import free_candidate
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
 from maneuver_automaton.words._kernels_library import NO_TRIM
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.refinement.work import ImproveTask, Work
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
 
 X, Y, HEADING, Z, TIME = range(5)  # columns of the points
 

@@ -11,18 +11,14 @@ begins, and when it ends; `times[n]` is the duration of the word. `new_trims`, `
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton.refinement.arrays import ImproveTask, Work
 from maneuver_automaton.search._kernels_coast import coast_free, coasted, is_still, may_stay
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_proven
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_library import class_of
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.refinement.work import ImproveTask, Work
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
 
 AT_WILL = -1  # edge of a switch
 GAIN = 1e-9  # relative; a word that is cheaper by less is no gain

@@ -5,7 +5,7 @@ whichever trim of the whole library pays most, where it pays most, as `search.fr
 it. What comes out takes the place of the section if it is proven free and the word is cheaper. Most
 sections have a via-point, which moves a little: so a word slides along an obstacle.
 
-The searches of the lattice use a few trims (`search.trim_choice`). They take as long as those of a
+The searches of the lattice use few trims (`search.lattice_trims`). They take as long as those of a
 small library, and know nothing of the words found here, whose trims they lack.
 """
 
@@ -27,12 +27,13 @@ from maneuver_automaton.refinement.conditions import TIME_TOLERANCE
 from maneuver_automaton.refinement.work import SNAP, VIA
 from maneuver_automaton.search.lattice_library import library_with
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.lattice_trims import Chosen, stands_for_more
-from maneuver_automaton.search.trim_choice import (
+from maneuver_automaton.search.lattice_trims import (
+    Chosen,
     at_two_paces,
     coarse_trims,
     paced_trims,
     paying_trims,
+    stands_for_more,
 )
 from maneuver_automaton.search.waiting import is_free
 from maneuver_automaton.words.library import MovingTrims, four_columns, moving_trims

@@ -199,7 +199,7 @@ def with_lasting_coasts(
     >>> with_lasting_coasts(problem, plan, problem.goals[0], is_free=bool).durations.tolist()
     [2.0]
     """
-    if not isinstance(problem.horizon.min_coast, Unstated):
+    if not has_short_coasts(problem, plan):
         return plan
     most, failed = problem.cost_of(plan) * (1.0 + COSTLIER), 0
     while failed < min(len(short := _short(plan)), LOOKED_AT // max(len(plan.trims), 1)):
@@ -219,6 +219,11 @@ def with_lasting_coasts(
                 break
         failed += 1
     return plan
+
+
+def has_short_coasts(problem: Problem, plan: Plan) -> bool:
+    """Whether a plan has trims of less than 20 ms, and no horizon that says whether it may."""
+    return isinstance(problem.horizon.min_coast, Unstated) and bool(_short(plan))
 
 
 def _short(plan: Plan) -> list[int]:

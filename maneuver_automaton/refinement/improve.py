@@ -20,10 +20,9 @@ from maneuver_automaton.refinement._kernels_improve import attempt_all
 from maneuver_automaton.refinement.clear_insertion import Whole
 from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
+from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
-from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice import distance_grids
-from maneuver_automaton.search.lattice_memory import SearchArrays
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution

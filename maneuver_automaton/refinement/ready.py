@@ -16,9 +16,9 @@ from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
+from maneuver_automaton.search.choose import smallest_lattice_query
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.ready import smallest_lattice_query
 from maneuver_automaton.search.waiting import with_waits
 
 EXPANSIONS = 20

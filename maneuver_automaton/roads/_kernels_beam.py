@@ -10,35 +10,25 @@ when it is made: of some sixty children of a node one or two are ever popped.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
 
-import numpy as np
-
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.groups._kernels import compose, nearest_turn
 from maneuver_automaton.roads._kernels_costs import (
-    StaticObstacles,
-    Weights,
     cost_to_go,
-    rate_at,
-    stage_rate,
-)
-from maneuver_automaton.roads._kernels_free import Clearing, free_tick
-from maneuver_automaton.roads._kernels_goals import GoalArrays, goal_at
-from maneuver_automaton.roads._kernels_library import Limits, Maneuvers, Trims
-from maneuver_automaton.roads._kernels_motion import one_tick
-from maneuver_automaton.roads._kernels_route import (
-    RouteArrays,
+    goal_at,
+    is_too_fast,
+    limit_at,
     nearest_of_all,
     nearest_point,
     on_route,
+    rate_at,
+    stage_rate,
 )
-from maneuver_automaton.roads._kernels_stops import first_free_stop
+from maneuver_automaton.roads._kernels_motion import first_free_stop, free_tick, one_tick
+from maneuver_automaton.roads.arrays import BeamArrays, Horizon, HorizonTask, Maneuvers
 from maneuver_automaton.search._kernels_cells import EMPTY, enter
 from maneuver_automaton.search._kernels_distance import pop, push
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 PARENT, MANEUVER, TRIM, NEAR = range(4)  # columns of `links`
 N_NODES, HEAP, KEPT, CHECKS, N_CHILDREN = range(5)  # places of `state`
@@ -46,62 +36,6 @@ STOPPING, UNSAFE = range(2)  # rows of `reached`
 COST, NODE, TICK = range(3)  # columns of `reached`
 STRIP = 1.0  # [m] width of a strip along the route
 TRIES = 16  # nodes of a level from which a fail-safe stop is looked for
-
-
-class HorizonTask(NamedTuple):
-    """Where the vehicle is, and how far to look."""
-
-    x: float
-    y: float
-    heading: float
-    speed: float
-    steering: float
-    tick: int
-    until: int  # no plan goes on after this tick
-    cell: float  # [m] of equal nodes
-    turn_cell: float  # [rad]
-    speed_cell: float  # [m/s]
-    width: int  # nodes of a level that go on at most
-    abreast: int  # of these, in one strip along the route
-    greed: float  # weight of the cost-to-go
-    below: float  # a plan to a goal as dear as this is not looked for
-
-
-class BeamArrays(NamedTuple):
-    """Nodes and their queue: room that is made once and used in every step."""
-
-    # The start, the ends of the two plans in `reached`, and all nodes that were kept: a word is
-    # read backwards along the parents. After them the children of one level, which the next level
-    # writes over. A row of `pose`: x, y, heading, cost to come.
-    pose: np.ndarray  # (3 + levels W + C, 4)
-    links: np.ndarray  # (N, 4) parent, maneuver that led here, trim, nearest point of the route
-    # What was kept of each level, best first: the search goes on from these, and if no goal is
-    # reached, the plan is to one of the last of them.
-    kept: np.ndarray  # (levels, W) nodes
-    counts: np.ndarray  # (levels,) how many of them
-    # Of the level at hand. Strips keep nodes on either side of an obstacle in the beam, where the
-    # cheaper side alone would fill it.
-    strips: np.ndarray  # (n,) how many in each strip, the first and last without an end
-    cells: np.ndarray  # (4 W,) keys of cells that are taken, EMPTY for none
-    # A binary heap of the level at hand: cost plus weighted cost-to-go, and the node.
-    heap_key: np.ndarray  # (C,)
-    heap_node: np.ndarray  # (C,)
-    # Plans to a goal, those with a stop after them and those without: cost, node, tick.
-    reached: np.ndarray  # (2, 3)
-    state: np.ndarray  # (5,) end of the nodes, size of the heap, nodes kept, edges proven, children
-
-
-class Horizon(NamedTuple):
-    """Everything that stays the same from step to step."""
-
-    clearing: Clearing
-    limits: Limits
-    trims: Trims
-    maneuvers: Maneuvers
-    route: RouteArrays
-    goals: GoalArrays
-    obstacles: StaticObstacles
-    weights: Weights
 
 
 @bare_inner_kernel
@@ -127,6 +61,12 @@ def strip_of(horizon: Horizon, search: BeamArrays, node: int) -> int:
 
 
 @bare_inner_kernel
+def speed_of(task: HorizonTask, horizon: Horizon, search: BeamArrays, node: int) -> float:
+    """Speed at a node [m/s]: of its trim, or, at the start, that of the vehicle."""
+    return task.speed if node == 0 else float(horizon.trims.speed[search.links[node, TRIM]])
+
+
+@bare_inner_kernel
 def add_children(
     task: HorizonTask,
     horizon: Horizon,
@@ -145,6 +85,7 @@ def add_children(
     limits, ahead = horizon.limits, horizon.clearing.car.ahead
     duration, last = limits.tick * limits.ticks, limits.ticks - 1
     x, y, heading, come = pose[node, 0], pose[node, 1], pose[node, 2], pose[node, 3]
+    before = speed_of(task, horizon, search, node)
     c, s = math.cos(heading), math.sin(heading)
     for e in range(low, high):
         child = pose.shape[0] - search.heap_key.shape[0] + state[N_CHILDREN]
@@ -160,8 +101,11 @@ def add_children(
         guess = links[node, NEAR] + int(d_x / horizon.route.spacing)
         near = nearest_point(horizon.route, m_x, m_y, guess)
         station, offset = on_route(horizon.route, m_x, m_y, near)
+        limit = limit_at(horizon.route, near, offset)
+        if is_too_fast(horizon.route, limit, before, speed, duration):
+            continue
         turned = nearest_turn(n_heading - horizon.route.heading[near])
-        rate = stage_rate(horizon.weights, horizon.route.limit[near], offset, turned, speed)
+        rate = stage_rate(horizon.weights, limit, offset, turned, speed)
         cost = come + maneuvers.effort[e] + duration * rate
         if cost >= search.reached[STOPPING, COST]:
             continue
@@ -186,21 +130,21 @@ def prove_edge(
     """Prove the edge into a node from `tick` on: whether it is free; tick of a goal on it or -1."""
     pose, links, limits = search.pose, search.links, horizon.limits
     parent, e = links[node, PARENT], links[node, MANEUVER]
-    speed = task.speed if parent == 0 else horizon.trims.speed[links[parent, TRIM]]
+    speed = speed_of(task, horizon, search, parent)
     x, y, heading = pose[parent, 0], pose[parent, 1], pose[parent, 2]
-    p_x, p_y, p_heading = x, y, heading
+    before = (x, y, heading)
     for k in range(limits.ticks):
         if tick + k >= task.until:
             return True, -1
         d_x, d_y, turn = maneuvers.pose[e, k, 0], maneuvers.pose[e, k, 1], maneuvers.pose[e, k, 2]
-        n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, turn)
-        if not free_tick(horizon.clearing, p_x, p_y, p_heading, n_x, n_y, n_heading, tick + k):
+        after = compose(x, y, heading, d_x, d_y, turn)
+        if not free_tick(horizon.clearing, before, after, tick + k):
             return False, -1
         faster = speed + maneuvers.control[e, 0] * limits.tick * (k + 1)
         # A goal counts at every tick of the edge, and what follows it need not be free.
-        if goal_at(horizon, n_x, n_y, n_heading, faster, tick + k + 1) >= 0:
+        if goal_at(horizon, after[0], after[1], after[2], faster, tick + k + 1) >= 0:
             return True, tick + k + 1
-        p_x, p_y, p_heading = n_x, n_y, n_heading
+        before = after
     return True, -1
 
 
@@ -213,17 +157,19 @@ def cost_along(
     node: int,
     ticks: int,
 ) -> float:
-    """Cost to come of a node after so many ticks of the edge into it, the rate taken at each."""
+    """Cost to come of a node after so many ticks of the edge into it; inf beyond a speed limit."""
     pose, links, limits = search.pose, search.links, horizon.limits
     parent, e = links[node, PARENT], links[node, MANEUVER]
-    speed = task.speed if parent == 0 else horizon.trims.speed[links[parent, TRIM]]
+    speed = speed_of(task, horizon, search, parent)
     x, y, heading, near = pose[parent, 0], pose[parent, 1], pose[parent, 2], links[parent, NEAR]
     cost = pose[parent, 3] + maneuvers.effort[e] * ticks / limits.ticks
     for k in range(ticks):
         d_x, d_y, turn = maneuvers.pose[e, k, 0], maneuvers.pose[e, k, 1], maneuvers.pose[e, k, 2]
         n_x, n_y, n_heading = compose(x, y, heading, d_x, d_y, turn)
-        speed += maneuvers.control[e, 0] * limits.tick
-        rate, near = rate_at(horizon, n_x, n_y, n_heading, speed, near)
+        before, speed = speed, speed + maneuvers.control[e, 0] * limits.tick
+        rate, near, limit = rate_at(horizon, n_x, n_y, n_heading, speed, near)
+        if is_too_fast(horizon.route, limit, before, speed, limits.tick):
+            return math.inf
         cost += limits.tick * rate
     return cost
 
@@ -274,22 +220,10 @@ def finish(
     limits = horizon.limits
     n = word_to(search, first, horizon.maneuvers, node, limits.ticks, controls)
     n = min(n, last - task.tick)
-    x, y, heading, speed, steering = task.x, task.y, task.heading, task.speed, task.steering
+    state = (task.x, task.y, task.heading, task.speed, task.steering)
     for k in range(n):
-        x, y, heading, speed, steering = one_tick(
-            limits.wheelbase,
-            limits.tick,
-            x,
-            y,
-            heading,
-            speed,
-            steering,
-            controls[k, 0],
-            controls[k, 1],
-        )
-    more = first_free_stop(
-        horizon, x, y, heading, speed, steering, task.tick + n, shares, controls, n, rests
-    )
+        state = one_tick(limits.wheelbase, limits.tick, state, controls[k, 0], controls[k, 1])
+    more = first_free_stop(horizon, state, task.tick + n, shares, controls, n, rests)
     return n, (-1 if more < 0 else n + more)
 
 
@@ -343,19 +277,8 @@ def furthest(
                 n, whole = finish(task, horizon, search, first, node, last, shares, controls, rests)
                 if whole >= 0:
                     return n, whole
-        whole = first_free_stop(
-            horizon,
-            task.x,
-            task.y,
-            task.heading,
-            task.speed,
-            task.steering,
-            task.tick,
-            shares,
-            controls,
-            0,
-            rests,
-        )
+        start = (task.x, task.y, task.heading, task.speed, task.steering)
+        whole = first_free_stop(horizon, start, task.tick, shares, controls, 0, rests)
         if whole >= 0:
             break
     return 0, whole
@@ -425,6 +348,8 @@ def search_beam(
             # Of a node that goes on, the cost is known as exactly as that of a whole plan.
             driven = min(goal_tick if goal_tick >= 0 else tick + ticks, task.until) - tick
             pose[node, 3] = cost_along(task, horizon, search, maneuvers, node, driven)
+            if pose[node, 3] == math.inf:
+                continue
             if goal_tick >= 0:
                 note_goal(task, horizon, search, first, node, goal_tick, shares, controls)
             elif pose[node, 3] < reached[STOPPING, COST]:

@@ -8,42 +8,17 @@ follows is displaced, so it is priced, and proven free, once more, the stop afte
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, kernel
-from maneuver_automaton.roads._kernels_costs import cost_of_tick
-from maneuver_automaton.roads._kernels_free import free_tick
-from maneuver_automaton.roads._kernels_goals import goal_at
-from maneuver_automaton.roads._kernels_library import admitted
-from maneuver_automaton.roads._kernels_motion import drive_tick
-from maneuver_automaton.roads._kernels_route import nearest_of_all
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.roads._kernels_beam import Horizon
+from maneuver_automaton.roads._kernels_costs import cost_of_tick, goal_at, nearest_of_all
+from maneuver_automaton.roads._kernels_motion import admitted, drive_tick, free_from
+from maneuver_automaton.roads.arrays import Course, Horizon, Moves
 
 GAIN = 1e-6  # share of the cost that a move has to save
 LONG = 64  # ticks of a plan from which on a pass leaves places out
-
-
-class Moves(NamedTuple):
-    """What is tried: patterns, by sizes, one pair of them in a pass."""
-
-    pattern: np.ndarray  # (P, blocks) weights of the blocks of a move, no further than 1 from zero
-    blocks: np.ndarray  # (P,) how many of them
-    size: np.ndarray  # (S, 2) of acceleration [m/s^2] and steering rate [rad/s]
-
-
-class Course(NamedTuple):
-    """A plan tick by tick, the stop after it included."""
-
-    states: np.ndarray  # (m + 1, 5)
-    controls: np.ndarray  # (m, 2)
-    # Of the plan alone, up to each state: what a move leaves as it is needs no second look.
-    cost: np.ndarray  # (m + 1,)
-    near: np.ndarray  # (m + 1,) nearest point of the route
 
 
 @bare_inner_kernel
@@ -53,40 +28,24 @@ def drive_on(horizon: Horizon, course: Course, begin: int, lasting: int, most: f
     Costs only rise, so the drive ends where they reach `most`.
     """
     limits, states, controls = horizon.limits, course.states, course.controls
+    kept = True
     for k in range(begin, controls.shape[0]):
         drive_tick(limits.wheelbase, limits.tick, states, controls, k)
         if k >= lasting:
             continue  # the stop keeps its speeds and angles, and costs nothing
-        speed, steering = states[k + 1, 3], states[k + 1, 4]
-        if speed < 0.0 or abs(steering) > limits.sharpest:
-            return False
-        possible, _, _, _ = admitted(
-            limits, limits.tick, states[k, 3], states[k, 4], speed, steering
+        before, after = (states[k, 3], states[k, 4]), (states[k + 1, 3], states[k + 1, 4])
+        if after[0] < 0.0 or abs(after[1]) > limits.sharpest:
+            kept = False
+        possible, _, _, _ = admitted(limits, limits.tick, before, after)
+        cost, course.near[k + 1], obeyed = cost_of_tick(
+            horizon, states, controls, k, course.near[k]
         )
-        cost, course.near[k + 1] = cost_of_tick(horizon, states, controls, k, course.near[k])
         course.cost[k + 1] = course.cost[k] + cost
-        if not possible or course.cost[k + 1] >= most:
+        kept = kept and possible and obeyed
+        # A course that is only to be laid out, at any cost, is driven to its end.
+        if most < math.inf and (not kept or course.cost[k + 1] >= most):
             return False
-    return True
-
-
-@bare_inner_kernel
-def still_free(horizon: Horizon, course: Course, begin: int, tick: int) -> bool:
-    """Whether a course that starts at a tick is free from its tick `begin` on."""
-    states = course.states
-    for k in range(begin, course.controls.shape[0]):
-        if not free_tick(
-            horizon.clearing,
-            states[k, 0],
-            states[k, 1],
-            states[k, 2],
-            states[k + 1, 0],
-            states[k + 1, 1],
-            states[k + 1, 2],
-            tick + k,
-        ):
-            return False
-    return True
+    return kept
 
 
 @bare_inner_kernel
@@ -110,7 +69,7 @@ def is_better(
     x, y, heading = trial.states[lasting, 0], trial.states[lasting, 1], trial.states[lasting, 2]
     if goal_at(horizon, x, y, heading, trial.states[lasting, 3], tick + lasting) < 0:
         return False
-    return still_free(horizon, trial, begin, tick)
+    return free_from(horizon.clearing, trial.states, begin, tick) == trial.controls.shape[0]
 
 
 @bare_inner_kernel

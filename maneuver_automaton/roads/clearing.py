@@ -8,7 +8,7 @@ from typing import Any
 from maneuver_automaton.collision import Disc, Obstacle, Shape
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.world import world_of
-from maneuver_automaton.roads._kernels_free import CarArrays, Clearing
+from maneuver_automaton.roads.arrays import CarArrays, Clearing
 from maneuver_automaton.roads.land import obstacles_in
 from maneuver_automaton.roads.lanelets import Lanelet, drivable_area
 from maneuver_automaton.roads.scene import TIME_TOLERANCE, RoadScene, presence_of

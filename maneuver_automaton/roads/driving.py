@@ -13,6 +13,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Player, picture, player_frame, player_page
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.roads.decision import AT_REST, RoadDecision
@@ -120,11 +121,16 @@ class Driver:
     """A vehicle along its drive: where it is, and what it does next if nothing better is found."""
 
     def __init__(
-        self, planner: RoadPlanner, first: RoadDecision | None, steps: int | None = None
+        self,
+        planner: RoadPlanner,
+        first: RoadDecision | None,
+        steps: int | None = None,
+        others: Sequence[Obstacle] = (),
     ) -> None:
+        """`others` are there at the start, besides the traffic that the planner knows."""
         last = planner.last_tick
         self.planner = planner
-        self.hopeless = planner.hopeless()
+        self.hopeless = planner.hopeless(others)
         self.limit = 0 if self.hopeless else min(last if steps is None else steps, last)
         self.state = planner.start_state
         self.tail = first

@@ -21,14 +21,15 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.models import SecondOrderCar
-from maneuver_automaton.roads import _kernels_library
-from maneuver_automaton.roads._kernels_library import Limits, Maneuvers, Trims
+from maneuver_automaton.roads import _kernels_motion
+from maneuver_automaton.roads.arrays import Limits, Maneuvers, Trims
 from maneuver_automaton.roads.plans import ramps, trim_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 LONGEST_TICK = 0.1  # [s] the proof between two ticks is for motions this short
 DURATION = 0.5  # [s] of a maneuver, or the nearest number of ticks
 SPEED_STEP = 1.0  # [m/s]
+FASTER = 0.2  # [m/s] than a speed of the grid
 SHARES = (0.0, 0.05, 0.16, 0.36, 0.66, 1.0)  # of the sharpest angle, to either side
 MOST_STEPS = 4  # of speed that a maneuver spans
 SAMPLES = 0.5  # [m] between those of courses: a fine library takes 230 MB
@@ -88,8 +89,11 @@ def road_library(
     top_speed: float,
     tick: float = LONGEST_TICK,
     within: Sequence[tuple[float, float]] = (),
+    at: Sequence[float] = (),
 ) -> RoadLibrary:
-    """Trims of speeds up to `top_speed`, some `within` each interval [m/s]; all maneuvers of them.
+    """Trims of speeds up to `top_speed`, and all maneuvers of them.
+
+    Some are `within` each interval, and some `at` each speed of a list [m/s].
 
     Examples
     --------
@@ -105,7 +109,9 @@ def road_library(
         for low, high in within
         if low > 0.0 and high < grid[-1] and not ((grid >= low) & (grid <= high)).any()
     ]
-    speeds = np.union1d(grid, np.mean(np.reshape(more, (-1, 2)), axis=1))
+    # What is hardly faster than one of the grid is not worth a trim.
+    exact = [one for one in at if one < grid[-1] and one % SPEED_STEP > FASTER]
+    speeds = np.union1d(grid, [*np.mean(np.reshape(more, (-1, 2)), axis=1), *exact])
     most_steps = MOST_STEPS + len(speeds) - len(grid)
     ticks = max(round(DURATION / tick), 1)
     angles = [
@@ -139,7 +145,7 @@ def road_library(
     return RoadLibrary(
         limits=limits,
         trims=trims,
-        maneuvers=_kernels_library.maneuvers_between(limits, trims, most),
+        maneuvers=_kernels_motion.maneuvers_between(limits, trims, most),
     )
 
 

@@ -18,14 +18,15 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import (
     _kernels_beam,
     _kernels_costs,
-    _kernels_free,
-    _kernels_goals,
-    _kernels_library,
     _kernels_motion,
 )
-from maneuver_automaton.roads._kernels_beam import BeamArrays, Horizon, HorizonTask
-from maneuver_automaton.roads._kernels_free import Clearing
-from maneuver_automaton.roads._kernels_goals import GoalArrays
+from maneuver_automaton.roads.arrays import (
+    BeamArrays,
+    Clearing,
+    GoalArrays,
+    Horizon,
+    HorizonTask,
+)
 from maneuver_automaton.roads.clearing import clearing_of
 from maneuver_automaton.roads.decision import AT_REST, RoadDecision, RoadSettings
 from maneuver_automaton.roads.judge import hopeless
@@ -37,6 +38,7 @@ from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
+    closed_lines,
     goal_arrays,
     route_arrays,
     static_obstacles,
@@ -114,10 +116,14 @@ class RoadPlanner:
             for goal in self.local.goals
         )
 
-    def hopeless(self) -> tuple[str, str] | None:
-        """Status and words of what lets every drive from the start fail, if anything does."""
+    def hopeless(self, others: Sequence[Obstacle] = ()) -> tuple[str, str] | None:
+        """Status and words of what lets every drive from the start fail, if anything does.
+
+        `others` are there at the start besides the traffic of the scene.
+        """
         there = self.plan_of(self.start_state, np.zeros((0, 2)))
-        return hopeless(self.scene, self.vehicle, there)
+        scene = replace(self.scene, traffic=(*self.scene.traffic, *others))
+        return hopeless(scene, self.vehicle, there)
 
     def wider(self, width: int, *, horizon_s: float) -> RoadPlanner:
         """A planner like this one that searches another width, and another time ahead [s]."""
@@ -158,7 +164,15 @@ class RoadPlanner:
             self.horizon.goals,
             tick=self.tick,
         )
-        return replace(self, horizon=self.horizon._replace(clearing=clearing))
+        lines = closed_lines(
+            self.barriers,
+            self.route,
+            self.vehicle,
+            self.local.start.time,
+            self.settings.off_traffic_m,
+        )
+        route = self.horizon.route._replace(closed=lines)
+        return replace(self, horizon=self.horizon._replace(clearing=clearing, route=route))
 
     def waits(self, state: Array, *, tick: int) -> str:
         """Which line is closed ahead of a state (5,) at a tick, as the end of a sentence."""
@@ -282,7 +296,7 @@ class RoadPlanner:
             greed=settings.greed,
             below=below,
         )
-        first = _kernels_library.maneuvers_from(library.limits, library.trims, speed, steering)
+        first = _kernels_motion.maneuvers_from(library.limits, library.trims, speed, steering)
         stop = math.ceil(LONGEST_STOP / self.tick)
         controls = np.zeros((until - tick + library.limits.ticks + stop, 2))
         reaches, n, whole = _kernels_beam.search_beam(
@@ -295,7 +309,9 @@ class RoadPlanner:
         )
         if whole == 0:
             standing = self._standing(state, tick)
-            free = _kernels_free.free_ticks(self.horizon.clearing, np.array(standing.states), tick)
+            free = _kernels_motion.free_ticks(
+                self.horizon.clearing, np.array(standing.states), tick
+            )
             return standing if free else None
         if whole < 0:
             return None
@@ -323,10 +339,10 @@ class RoadPlanner:
         controls = np.concatenate([plan.controls, np.zeros((rest, 2))])
         on = self.of_controls(plan.states[0], plan.tick, controls, plan.lasting, reaches=True)
         states, tick = np.array(on.states), plan.tick + plan.lasting
-        met = _kernels_goals.first_goal(self.horizon, states[plan.lasting :], tick)
+        met = _kernels_costs.first_goal(self.horizon, states[plan.lasting :], tick)
         n = plan.lasting + met
         clearing = self.horizon.clearing
-        if met < 0 or _kernels_free.free_ticks(clearing, states[: n + 1], plan.tick) < n:
+        if met < 0 or _kernels_motion.free_ticks(clearing, states[: n + 1], plan.tick) < n:
             return plan
         lasting = max(n, len(plan.controls))
         return self.of_controls(plan.states[0], plan.tick, controls[:lasting], n, reaches=True)
@@ -345,7 +361,7 @@ class RoadPlanner:
             plan = self.of_controls(state, tail.tick, controls, plan.lasting, reaches=True)
         if plan.reaches:
             until = np.array(plan.states[: plan.lasting + 1])
-            if _kernels_goals.first_goal(self.horizon, until, plan.tick) < 0:
+            if _kernels_costs.first_goal(self.horizon, until, plan.tick) < 0:
                 return None
         return plan
 
@@ -354,7 +370,7 @@ class RoadPlanner:
         clearing = self.horizon.clearing
         if self.kind:
             clearing = clearing._replace(off_traffic=clearing.off_traffic - SEEN_OTHERWISE)
-        free = int(_kernels_free.free_ticks(clearing, np.array(states), tick))
+        free = int(_kernels_motion.free_ticks(clearing, np.array(states), tick))
         for k, state in enumerate(states[: free + 1] if free < len(states) - 1 else ()):
             if (opened := self.opened(state)) is not self:
                 return k + opened._free_ticks(states[k:], tick + k)
@@ -377,7 +393,7 @@ class RoadPlanner:
         """Whether nobody comes where a plan stops, until the goals are over."""
         tick = plan.tick + len(plan.controls)
         still = np.repeat(plan.states[-1:], max(self.last_tick - tick, 0) + 1, axis=0)
-        return _kernels_free.free_ticks(self.horizon.clearing, still, tick) == len(still) - 1
+        return _kernels_motion.free_ticks(self.horizon.clearing, still, tick) == len(still) - 1
 
     def price(self, plan: RoadDecision, *, ticks: int | None = None) -> float:
         """Cost of a plan, or of its first ticks, its stop left out."""
@@ -409,10 +425,12 @@ def road_planner(
     top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
     tick = tick_of(scene.step)
     wanted = [one.speed for one in scene.goals if one.speed is not None]
-    library = road_library(vehicle, top_speed=top, tick=tick, within=wanted)
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)
+    stated = {one.number: one.speed_limit for one in local.lanelets}
+    limits = {limit for k in route.lanelets if (limit := stated[k]) is not None}
+    library = road_library(vehicle, top_speed=top, tick=tick, within=wanted, at=sorted(limits))
     goals = goal_arrays(local, route, tick=tick)
     until = local.start.time + _last_tick(goals, settings, tick) * tick
     closed = tuple(
@@ -425,7 +443,9 @@ def road_planner(
         limits=library.limits,
         trims=library.trims,
         maneuvers=library.maneuvers,
-        route=route_arrays(route),
+        route=route_arrays(local, route)._replace(
+            closed=closed_lines(closed, route, vehicle, local.start.time, settings.off_traffic_m)
+        ),
         goals=goals,
         obstacles=static_obstacles(local, route, vehicle),
         weights=weights_of(scene, vehicle),

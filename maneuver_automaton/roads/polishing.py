@@ -6,7 +6,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.roads import _kernels_polish
-from maneuver_automaton.roads._kernels_beam import Horizon
+from maneuver_automaton.roads.arrays import Horizon, Moves
 from maneuver_automaton.roads.decision import RoadDecision
 
 # Weights of the blocks of a move. All keep the speed, or the steering angle, after it; of the
@@ -15,7 +15,7 @@ PATTERNS = ((1.0, -1.0), (0.5, -1.0, 0.5), (1.0, -1.0, -1.0, 1.0), (1 / 3, -1.0,
 SIZES = ((1.0, 0.2), (0.3, 0.06), (0.1, 0.02))  # [m/s^2], [rad/s]
 ROUND = len(PATTERNS) * len(SIZES)  # passes in which every pattern has every size
 ROUNDS = 40  # at most
-MOVES = _kernels_polish.Moves(
+MOVES = Moves(
     pattern=np.array([[*row, *np.zeros(4 - len(row))] for row in PATTERNS]),
     blocks=np.array([len(row) for row in PATTERNS]),
     size=np.array(SIZES),

@@ -20,7 +20,10 @@ SPACING = 1.0  # [m] of the points of the line
 LONGEST = 1e5  # [m] of a route, and of the outline of a goal
 BEFORE, BEYOND = 60.0, 300.0  # [m] the line goes on straight before its first point, after its last
 LANE_CHANGE = 10.0  # [m] that a lane change counts when routes are compared
-BRAKING = 4.0  # [m/s^2] before a lower limit
+ASIDE, COLUMNS = 0.5, 24  # [m] between offsets at which limits are known, how many to either side
+# [m/s^2] before a lower limit; of whoever is beyond a limit, more; and after a lower limit. The
+# difference of the first two is what keeps a limit in sight from being out of reach.
+BRAKING, SLOWING, GAINING = 3.0, 3.5, 3.0
 SHARE = 0.3  # of the smaller of two areas, common to a lanelet and a goal in it
 
 
@@ -31,7 +34,10 @@ class Route:
     lanelets: tuple[int, ...]  # numbers, in order
     points: Array  # (n, 2) equally spaced [m]
     heading: Array  # (n,) direction of travel, not wrapped [rad]
-    limit: Array  # (n,) [m/s] the speed limit there and before it, inf where there is none
+    # [m/s] at offsets `ASIDE` apart, from right to left: the limit there, and no more than what
+    # braking to those ahead leaves; inf where there is none.
+    limit: Array  # (n, 2 `COLUMNS` + 1)
+    fastest: Array  # (n,) [m/s] the greatest limit at each point, whatever is ahead
     extents: Array  # (goals, 4) least and greatest station, least and greatest offset of each
 
 
@@ -55,11 +61,19 @@ def route_of(scene: RoadScene) -> Route:
     targets = [k for goal in scene.goals for k in lanelets_of_goal(scene.lanelets, goal)]
     path = _path(lanelets, sources, targets)
     line, limits = _line([lanelets[k] for k in path], lanelets)
-    points, heading, limit = _spaced(line, limits)
+    points, heading, own = _spaced(line, limits)
+    limit, fastest = _limits_around(scene.lanelets, points, heading, own)
     # A route that returns to where it starts passes a goal there at its end.
     here = int(np.argmin(np.hypot(*(points - scene.start.middle[:2]).T)))
     extents = np.array([_extent_of(goal, points, heading, here) for goal in scene.goals])
-    return Route(lanelets=tuple(path), points=points, heading=heading, limit=limit, extents=extents)
+    return Route(
+        lanelets=tuple(path),
+        points=points,
+        heading=heading,
+        limit=limit,
+        fastest=fastest,
+        extents=extents,
+    )
 
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:
@@ -191,10 +205,70 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
     steps = np.gradient(points, axis=0)
     heading = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     limit = limits[np.searchsorted(station[1:-1], at).clip(0, len(limits) - 1)]
-    limit[:-1] = np.minimum(limit[:-1], limit[1:])  # a point stands for what is around it
-    for k in range(len(limit) - 2, -1, -1):  # so fast that braking keeps the limits ahead
-        limit[k] = min(limit[k], np.sqrt(limit[k + 1] ** 2 + 2.0 * BRAKING * SPACING))
     return points, heading, limit
+
+
+def _limits_around(
+    lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array
+) -> tuple[Array, Array]:
+    """`Route.limit` and `Route.fastest`: of lanelets that overlap the greatest limit holds.
+
+    Beside all lanelets it is that of the route's `own` one (n,).
+    """
+    import shapely
+
+    offsets = ASIDE * np.arange(-COLUMNS, COLUMNS + 1)
+    limit = np.full((len(points), len(offsets)), -np.inf)
+    if all(one.speed_limit is None for one in lanelets):
+        return np.full_like(limit, np.inf), np.full(len(points), np.inf)
+    aside = np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
+    places = points[:, None] + offsets[:, None] * aside[:, None]
+    tree = shapely.STRtree(shapely.points(places.reshape(-1, 2)))
+    for one in lanelets:
+        piece = shapely.make_valid(shapely.Polygon(one.ring))
+        inside = np.unravel_index(tree.query(piece, predicate="intersects"), limit.shape)
+        allowed = np.inf if one.speed_limit is None else one.speed_limit
+        limit[inside] = np.maximum(limit[inside], allowed)
+    limit = np.where(np.isfinite(limit) | (limit > 0.0), limit, own[:, None])
+    fastest = limit.max(axis=1)
+    for axis in range(2):  # a point stands for what is around it
+        padded = np.pad(limit, [(1, 1) if k == axis else (0, 0) for k in range(2)], mode="edge")
+        limit = np.lib.stride_tricks.sliding_window_view(padded, 3, axis=axis).min(axis=-1)
+    limit = np.array(limit)
+    for k in range(len(limit) - 2, -1, -1):  # so fast that braking keeps the limits ahead
+        limit[k] = np.minimum(limit[k], np.sqrt(limit[k + 1] ** 2 + 2.0 * BRAKING * SPACING))
+    return limit, fastest
+
+
+def limits_allow(route: Route, scene: RoadScene) -> bool:
+    """Whether limits of speed leave a goal that can be reached, as far as its time and speed show.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Box
+    >>> from maneuver_automaton.roads import RoadStart
+    >>> lane = Lanelet(1, [[0, 2], [90, 2]], [[0, -2], [90, -2]], speed_limit=8.0)
+    >>> def allowed(last):
+    ...     goal = GoalRegion(places=(Box([4, 4], [70, 0]),), time=(0.0, last))
+    ...     scene = RoadScene(name="lane", lanelets=(lane,), goals=(goal,),
+    ...                       start=RoadStart(middle=[5.0, 0.0, 0.0], speed=8.0))
+    ...     return limits_allow(route_of(scene), scene)
+    >>> allowed(9.0), allowed(6.0)
+    (True, False)
+    """
+    start, last = scene.start, len(route.points) - 1
+    here = int(np.argmin(np.hypot(*(route.points - start.middle[:2]).T)))
+    driven = np.cumsum(np.append(0.0, SPACING / route.fastest))
+    over = max(start.speed - float(route.fastest[here]), 0.0)
+    braked = 0.0 if not over else 0.5 * over**2 / BRAKING / float(route.fastest[here])
+    for goal, extent in zip(scene.goals, route.extents, strict=True):
+        anywhere = not np.isfinite(extent[0])
+        begin, end = (0, last) if anywhere else np.clip((extent[:2] / SPACING).astype(int), 0, last)
+        lasts = 0.0 if anywhere else float(driven[begin] - driven[min(here + 1, begin)]) - braked
+        slowest = goal.speed[0] if goal.speed else -np.inf
+        if lasts <= goal.time[1] - start.time and slowest <= route.fastest[begin : end + 1].max():
+            return True
+    return False
 
 
 def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:

@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.roads._kernels_beam import BeamArrays
-from maneuver_automaton.roads._kernels_costs import StaticObstacles, Weights
-from maneuver_automaton.roads._kernels_goals import GoalArrays
-from maneuver_automaton.roads._kernels_route import RouteArrays
+from maneuver_automaton.roads.arrays import (
+    BeamArrays,
+    GoalArrays,
+    RouteArrays,
+    StaticObstacles,
+    Weights,
+)
 from maneuver_automaton.roads.decision import RoadSettings
 from maneuver_automaton.roads.goal_region import EXACT, GoalRegion, outlines_of
 from maneuver_automaton.roads.lanelets import drivable_area
 from maneuver_automaton.roads.library import RoadLibrary
-from maneuver_automaton.roads.route import SPACING, Route, extent_on
+from maneuver_automaton.roads.route import (
+    ASIDE,
+    COLUMNS,
+    GAINING,
+    SLOWING,
+    SPACING,
+    Route,
+    extent_on,
+    limits_allow,
+)
+from maneuver_automaton.roads.rules import Barrier
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -23,15 +37,36 @@ STRIPS = 17  # along the route, side by side
 LONGEST = 60.0  # [s] that is looked ahead from its begin on to a goal without a last time
 
 
-def route_arrays(route: Route) -> RouteArrays:
-    """The route for the kernels."""
+def route_arrays(scene: RoadScene, route: Route) -> RouteArrays:
+    """The route for the kernels, no line closed; limits that no goal allows have a price only."""
+    speed = np.array(route.limit[:, COLUMNS])
+    kept = limits_allow(route, scene)
+    for k in range(1, len(speed)):
+        speed[k] = min(speed[k], math.sqrt(speed[k - 1] ** 2 + 2.0 * GAINING * SPACING))
     return RouteArrays(
         point=np.array(route.points),
         heading=np.array(route.heading),
         direction=np.stack([np.cos(route.heading), np.sin(route.heading)], axis=-1),
         limit=np.array(route.limit),
+        time=np.cumsum(SPACING / speed) if kept else np.zeros(len(speed)),
+        closed=np.zeros((0, 3)),
+        slowing=SLOWING if kept else -math.inf,
         spacing=SPACING,
+        aside=ASIDE,
     )
+
+
+def closed_lines(
+    closed: Sequence[Barrier], route: Route, vehicle: RoadVehicle, begin: float, keep: float
+) -> Array:
+    """`RouteArrays.closed` of what closes lines, where it `keep`s a distance [m] from them."""
+    rows = list[tuple[float, float, float]]()
+    for one in closed:
+        low, _, right, left = extent_on((one.strip.corners,), route).tolist()
+        if right <= 0.0 <= left:
+            opens = one.time[1] - begin if one.stop_line.phases else math.inf
+            rows.append((low - 0.5 * vehicle.length - keep, one.time[0] - begin, opens))
+    return np.array(sorted(rows, key=lambda row: row[1])).reshape(-1, 3)
 
 
 def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:

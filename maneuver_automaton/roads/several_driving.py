@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -134,16 +134,25 @@ def drive_roads(
     before = plan_roads(scenes, vehicle, name=name, time_limit=time_limit)
     planners = {one: road_planner(scene, vehicle, settings) for one, scene in scenes.items()}
     first = {one: found.decision for one, found in before.results.items() if found.plan is not None}
-    drivers = {one: Driver(planner, first.get(one), steps) for one, planner in planners.items()}
+    starts = {
+        one: driving(vehicle, planner.plan_of(planner.start_state, np.zeros((1, 2))), one)
+        for one, planner in planners.items()
+    }
+    drivers = {
+        one: Driver(planner, first.get(one), steps, _others(starts, one))
+        for one, planner in planners.items()
+    }
     with patient():
         for planner in planners.values():
             planner.warm()
         _drive(drivers, progress)
     there = {one: driving(vehicle, driver.driven, one) for one, driver in drivers.items()}
     there = {one: body for one, body in there.items() if drivers[one].done}
+    # Who does not set off, as it touches another at the start, is there all the same.
+    there |= {one: starts[one] for one, driver in drivers.items() if driver.hopeless}
     drives = {
         one: driver.drive(
-            planners[one].past([body for other, body in there.items() if other != one]).scene
+            replace(scenes[one], traffic=(*scenes[one].traffic, *_others(there, one)))
         )
         for one, driver in drivers.items()
     }
@@ -151,6 +160,10 @@ def drive_roads(
     return RoadFleetDrive(
         name=name, results=drives, pairs=nearest_pairs(vehicle, driven), before=before
     )
+
+
+def _others(bodies: Mapping[str, Obstacle], name: str) -> list[Obstacle]:
+    return [body for other, body in bodies.items() if other != name]
 
 
 def _drive(drivers: Mapping[str, Driver], progress: Callable[[], None] | None) -> None:
@@ -188,8 +201,8 @@ def _held(name: str, driver: Driver, last: float) -> Obstacle | None:
     Where its plan does not lead to a goal it stands at the end of its stop.
     """
     decision, planner = driver.tail, driver.planner
-    if driver.reached or (decision is None and not driver.done):
-        return None  # it is gone, or has no plan and has not begun
+    if driver.reached or driver.hopeless or (decision is None and not driver.done):
+        return None  # it is gone, does not set off, or has no plan and has not begun
     if decision is None or not len(decision.controls):
         states, reaches = driver.state[None], False
     else:

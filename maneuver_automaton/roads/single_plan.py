@@ -86,8 +86,11 @@ def plan_road(
     return replace(best, search_s=time.perf_counter() - begin)
 
 
-def _widened(planner: RoadPlanner, deadline: float) -> RoadPlanResult:
-    """The better one of the first search that finds a plan, and of the next wider one."""
+def _widened(planner: RoadPlanner, deadline: float, *, loop: bool = True) -> RoadPlanResult:
+    """The better one of the first search that finds a plan, and of the next wider one.
+
+    Without `loop` nothing is driven in closed loop, which is what comes next anyway.
+    """
     if (why := planner.hopeless()) is not None:
         return _without(planner, why[1])
     best, driven = _without(planner, ""), ""
@@ -98,7 +101,7 @@ def _widened(planner: RoadPlanner, deadline: float) -> RoadPlanResult:
         if width:
             horizon = planner.last_tick * planner.tick
             found = _searched(planner.wider(width, horizon_s=horizon))
-        elif cost is None:
+        elif cost is None and loop:
             found, driven = _driven(planner, deadline)
         else:
             continue
@@ -202,12 +205,12 @@ def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanRe
     time_limit : float
         No search begins after it [s].
     """
-    first = planner.search(planner.start_state, tick=0)
+    first = None if planner.hopeless() else planner.search(planner.start_state, tick=0)
     if first is not None and first.reaches:
         return None
     begin = time.perf_counter()
     with patient():
-        best = _widened(planner, begin + time_limit)
+        best = _widened(planner, begin + time_limit, loop=False)
     return replace(best, search_s=time.perf_counter() - begin)
 
 

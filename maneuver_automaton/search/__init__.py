@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
-    from maneuver_automaton.search.insertion import search_insertion as search_insertion
+    from maneuver_automaton.search.choose import search_insertion as search_insertion
     from maneuver_automaton.search.result import SearchResult as SearchResult
     from maneuver_automaton.search.result import SearchStatus as SearchStatus
     from maneuver_automaton.search.words import search_words as search_words
 
 _HOMES = {
-    "search_insertion": "insertion",
+    "search_insertion": "choose",
     "SearchResult": "result",
     "SearchStatus": "result",
     "search_words": "words",

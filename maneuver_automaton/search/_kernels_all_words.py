@@ -6,15 +6,11 @@ clock is worth, calls from Python would take most of the time.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.search._kernels_polish import polish_all
+from maneuver_automaton.search._kernels_problem import Candidates, Found, Links, WordProblem
 from maneuver_automaton.search._kernels_words import propose_flat_words, propose_words
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, Found, Links, WordProblem
 
 
 @inner_kernel

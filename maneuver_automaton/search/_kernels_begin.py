@@ -9,26 +9,20 @@ query that goes on: those are its references.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision.world import HALF_TURN, SHARE
 from maneuver_automaton.search._kernels_distance import detour_of, grid_layout, sow
 from maneuver_automaton.search._kernels_lattice import expanded
 from maneuver_automaton.search._kernels_nodes import GENERATION, cells_along
-from maneuver_automaton.search.distance_grid import DistanceGrid
-from maneuver_automaton.search.lattice_task import Task
+from maneuver_automaton.search.arrays import Desk, DistanceGrid, SearchArrays, Task
+from maneuver_automaton.search.cost_to_go import CostTable
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
 from maneuver_automaton.search.scene import Scene
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.search.beginning import Desk
-    from maneuver_automaton.search.cost_to_go import CostTable
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.lattice_memory import SearchArrays
 
 NOT_BEGUN = -1  # in place of whether a search may go on
 

@@ -10,43 +10,40 @@ upper bound has no solution that counts, and a word all of whose cells are such 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel
 from maneuver_automaton.search._kernels_cell_turns import (
     TINY,
+    Four,
+    Three,
     after_straight,
     before_straight,
     on_line_and_circle,
     straight_between,
     three_turns,
 )
+from maneuver_automaton.search._kernels_problem import WordProblem
 from maneuver_automaton.words._kernels_steering import phase, unit
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Ways = tuple[complex, complex, complex]
 
-    from maneuver_automaton._arrays import IntArray
-    from maneuver_automaton.search._kernels_cell_turns import Four, Three
-    from maneuver_automaton.search._kernels_problem import WordProblem
-
-    Ways = tuple[complex, complex, complex]
-    # The position of the free trim among the triple, and the goal's heading; the free trim; the
-    # turn rates and velocities of the triple; at_1, at_2; d without the free trim, and its centre
-    # and arm where that turns; the price of the free trim and of the triple; phases and lengths of
-    # at_1 and at_2.
-    ClosedForm = tuple[
-        tuple[int, float],
-        tuple[complex, float],
-        Three,
-        Ways,
-        tuple[complex, complex],
-        Ways,
-        Four,
-        Four,
-    ]
+# The position of the free trim among the triple, and the goal's heading; the free trim; the
+# turn rates and velocities of the triple; at_1, at_2; d without the free trim, and its centre
+# and arm where that turns; the price of the free trim and of the triple; phases and lengths of
+# at_1 and at_2.
+ClosedForm = tuple[
+    tuple[int, float],
+    tuple[complex, float],
+    Three,
+    Ways,
+    tuple[complex, complex],
+    Ways,
+    Four,
+    Four,
+]
 
 COARSE = 2  # stretches of all cells of a word, which are looked at first
 PARTS = 8  # of a cell, for which bounds are computed in the end

@@ -8,14 +8,13 @@ the intervals are widened: so the bounds hold as they are computed, too.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.words._kernels_steering import phase
 
-if TYPE_CHECKING:
-    Three = tuple[float, float, float]
-    Four = tuple[float, float, float, float]
+Three = tuple[float, float, float]
+
+Four = tuple[float, float, float, float]
 
 ROUNDING = 1e-7  # [rad] by which an angle may be off: arc cosines lose half of the digits
 TINY = 1e-9  # relative, of lengths and costs

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import IntArray
 
 EMPTY = -1  # no key, in a set of keys
 

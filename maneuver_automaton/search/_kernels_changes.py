@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel
 from maneuver_automaton.words._kernels_solve import solve_from
 from maneuver_automaton.words._kernels_times import (
@@ -15,9 +14,6 @@ from maneuver_automaton.words._kernels_times import (
     least_squares,
     newton_feasible,
 )
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 
 @inner_kernel

@@ -7,18 +7,15 @@ better.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_changes import simplify, solve_word
 from maneuver_automaton.search._kernels_price import price_of_row, price_positions, word_multipliers
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 
 @inner_kernel

@@ -6,7 +6,6 @@ The world is one plane or several, one above the other. One body in one plane is
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
@@ -15,12 +14,10 @@ from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_parts import part_body, part_coast
 from maneuver_automaton.search._kernels_window import inside_window
+from maneuver_automaton.search.arrays import Task
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_library import NO_TRIM
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.lattice_task import Task
-    from maneuver_automaton.search.scene import Scene
 
 
 @inlined_kernel

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
 from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_library import class_of
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
-    from maneuver_automaton.words.library import Scratch
+from maneuver_automaton.words.library import Scratch
 
 
 @bare_inner_kernel

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel, kernel
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.collision.world import Field
-    from maneuver_automaton.search.distance_grid import DistanceGrid
+from maneuver_automaton.collision.arrays import Field
+from maneuver_automaton.search.arrays import DistanceGrid
 
 BLOCKED, SETTLED, REACHED = 1, 2, 3  # marks of a cell; 0 is one that nothing is known of
 STRAIGHT, DIAGONAL = 29, 41  # a step to a neighbour, in units: 41 / 29 is 0.03 % below sqrt(2)

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton.collision.arrays import Field
 from maneuver_automaton.search._kernels_distance import distance_at
 from maneuver_automaton.search._kernels_nodes import FULL_TURN
-
-if TYPE_CHECKING:
-    from maneuver_automaton.collision.world import Field
-    from maneuver_automaton.search.cost_to_go import CostTable
-    from maneuver_automaton.search.distance_grid import DistanceGrid
-    from maneuver_automaton.search.lattice_task import Task
+from maneuver_automaton.search.arrays import DistanceGrid, Task
+from maneuver_automaton.search.cost_to_go import CostTable
 
 
 @inlined_kernel

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import may_stay, too_short
 from maneuver_automaton.search._kernels_connection import free_candidate
@@ -28,14 +28,10 @@ from maneuver_automaton.search._kernels_nodes import (
     Y,
     Z,
 )
+from maneuver_automaton.search.arrays import SearchArrays, Task
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_candidates import candidates, trim_and_gear
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import IntArray
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.lattice_memory import SearchArrays
-    from maneuver_automaton.search.lattice_task import Task
-    from maneuver_automaton.search.scene import Scene
 
 
 @inlined_kernel

@@ -6,10 +6,9 @@ solved again, until nothing pays.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.search._kernels_changes import (
     insert_at,
@@ -20,9 +19,6 @@ from maneuver_automaton.search._kernels_changes import (
 )
 from maneuver_automaton.search._kernels_chatter import replace_runs
 from maneuver_automaton.search._kernels_price import price_positions, word_multipliers
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 
 @kernel

@@ -11,7 +11,6 @@ trim is a class of its own has one trim to coast in. Nothing else tells them apa
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.search._kernels_distance import push
@@ -40,14 +39,10 @@ from maneuver_automaton.search._kernels_nodes import (
     slot_of,
 )
 from maneuver_automaton.search._kernels_relax import relax_coasts, relax_maneuvers
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.cost_to_go import CostTable
-    from maneuver_automaton.search.distance_grid import DistanceGrid
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.lattice_memory import SearchArrays
-    from maneuver_automaton.search.lattice_task import Task
-    from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays, Task
+from maneuver_automaton.search.cost_to_go import CostTable
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 
 
 @bare_kernel

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.groups._kernels import compose
 from maneuver_automaton.search._kernels_parts import part_piece
 from maneuver_automaton.search._kernels_window import inside_window
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 
 
 @bare_inner_kernel

@@ -28,18 +28,14 @@ of one connection.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_cells import first_slot
 from maneuver_automaton.search._kernels_distance import pop, push
+from maneuver_automaton.search.arrays import SearchArrays, Task
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
 from maneuver_automaton.words._kernels_library import class_of
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import IntArray
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.lattice_memory import SearchArrays
-    from maneuver_automaton.search.lattice_task import Task
 
 FULL_TURN = 2.0 * math.pi
 MOST_SIDES = 1 << 15  # cells along a side that have numbers of their own

@@ -7,18 +7,14 @@ calls free is free between the poses that it looks at, too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.collision.arrays import WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.collision.world import WorldArrays
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.part_motion import BodyArrays
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.part_motion import BodyArrays
 
 
 @bare_inner_kernel

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, kernel
+from maneuver_automaton.collision.arrays import Field
 from maneuver_automaton.search._kernels_distance import blocked_cell, pop, push
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
-    from maneuver_automaton.collision.world import Field
-    from maneuver_automaton.search.distance_grid import DistanceGrid
+from maneuver_automaton.search.arrays import DistanceGrid
 
 
 @bare_inner_kernel

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.search._kernels_problem import (
+    Candidates,
+    Found,
+    Links,
+    WordProblem,
     look,
     look_ahead,
     room_for,
@@ -21,10 +24,6 @@ from maneuver_automaton.words._kernels_times import (
     newton_feasible,
     newton_stationary,
 )
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, Found, Links, WordProblem
 
 NEXT = 0.01  # relative, by which the cost of a start with one time free may be off
 MOMENT = 1e-6  # of the whole time: shorter trims may be due to rounding

@@ -10,16 +10,13 @@ along a straight. That is Pontryagin's condition over the whole library and all 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.words._kernels_times import assign, end_and_columns, jacobian, multipliers
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 SLACK = 1e-12  # relative, of prices
 

@@ -12,15 +12,13 @@ Source: ``D exp(xi) = exp(Ad(D) xi) D``; Solà, Deray, Atchuthan (2018), Eq. (30
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel
 from maneuver_automaton.groups._kernels import back_from, compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 PARALLEL = 1e-9  # sine of the angle between twists below which they span one line
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import field_bound
@@ -41,15 +40,11 @@ from maneuver_automaton.search._kernels_nodes import (
     node_in,
     slot_of,
 )
+from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays, Task
+from maneuver_automaton.search.cost_to_go import CostTable
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words._kernels_library import class_of, price_of_switch
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.cost_to_go import CostTable
-    from maneuver_automaton.search.distance_grid import DistanceGrid
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.lattice_memory import SearchArrays
-    from maneuver_automaton.search.lattice_task import Task
-    from maneuver_automaton.search.scene import Scene
 
 
 @inlined_kernel

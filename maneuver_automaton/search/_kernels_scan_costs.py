@@ -7,25 +7,23 @@ where a time that is to be met is not nearly met.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_problem import (
     AIM,
     FIRST,
     FOLLOWING,
+    Candidates,
+    WordProblem,
     condition,
     time_left,
     word_extra,
 )
 from maneuver_automaton.search._kernels_triple import solve_triple
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
 
 NONE_LEFT = 1e-9  # [m] that only rounding leaves
 

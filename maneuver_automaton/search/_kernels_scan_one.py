@@ -8,19 +8,25 @@ are continuous, so a change of sign is a root.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
 from maneuver_automaton.search._kernels_cell_costs import (
+    ClosedForm,
     closed_form,
     has_bounds,
     least_costs,
     mark_cheap_cells,
 )
 from maneuver_automaton.search._kernels_cell_turns import TINY
-from maneuver_automaton.search._kernels_problem import condition, word_extra
+from maneuver_automaton.search._kernels_problem import (
+    Candidates,
+    WordProblem,
+    condition,
+    word_extra,
+)
 from maneuver_automaton.search._kernels_scan_costs import (
     affordable,
     coasting_cost,
@@ -35,11 +41,6 @@ from maneuver_automaton.search._kernels_triple import (
 )
 from maneuver_automaton.search._kernels_turns import levels, unwrap
 from maneuver_automaton.words._kernels_times import assign
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_cell_costs import ClosedForm
-    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
 
 
 @inner_kernel

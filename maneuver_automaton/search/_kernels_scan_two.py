@@ -7,22 +7,17 @@ looked for between the corners of a cell; Newton refines it later.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel
-from maneuver_automaton.search._kernels_problem import condition, time_left
+from maneuver_automaton.search._kernels_problem import Candidates, WordProblem, condition, time_left
 from maneuver_automaton.search._kernels_scan_costs import affordable
 from maneuver_automaton.search._kernels_triple import scratch_for, solve_triple, take_branch
 from maneuver_automaton.search._kernels_turns import levels, unwrap
 from maneuver_automaton.words._kernels_times import assign
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
 
 
 @inner_kernel

@@ -31,19 +31,15 @@ RSS, for lazy A*; Likhachev, Ferguson (2009) for costs without obstacles as a bo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_maneuver import edge_inside, edge_proven
 from maneuver_automaton.search._kernels_nodes import node_in, slot_of
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search.free_costs import FreeCosts
-    from maneuver_automaton.search.state_lattice import Aims, GraphArrays, StateLattice, Tested
+from maneuver_automaton.search.arrays import Aims, FreeCosts, GraphArrays, StateLattice, Tested
 
 ROW_BITS = 32  # of the number of a place; its column is above them
 ITEM_BITS = 32  # of an entry of the open list: its edge; above them its node

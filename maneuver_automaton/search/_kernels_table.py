@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import inlined_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_distance import pop, push
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from maneuver_automaton._arrays import Array
 
 FULL_TURN = 2.0 * math.pi
 

@@ -7,18 +7,14 @@ says at which positions; both branches of the closed form are continuous in the 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
-from maneuver_automaton.search._kernels_problem import is_straight
+from maneuver_automaton.search._kernels_problem import Candidates, WordProblem, is_straight
 from maneuver_automaton.words._kernels_steering import steer, unit
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
 
 
 @bare_inner_kernel

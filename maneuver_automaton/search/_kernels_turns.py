@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel
-from maneuver_automaton.search._kernels_problem import propose, time_left
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, WordProblem
+from maneuver_automaton.search._kernels_problem import Candidates, WordProblem, propose, time_left
 
 
 @bare_inner_kernel

@@ -8,16 +8,13 @@ waiting does not (safe intervals, Phillips and Likhachev 2011).
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coast_proven, may_stay
 from maneuver_automaton.search._kernels_distance import pop, push
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.lattice_arrays import LatticeArrays
-    from maneuver_automaton.search.scene import Scene
-    from maneuver_automaton.search.waiting import PathArrays
+from maneuver_automaton.search.arrays import PathArrays
+from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.scene import Scene
 
 HALVINGS = 10  # of a tick, for the time at which the way is free again
 PATIENT = 16  # departures that are blocked before ticks become longer

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
 
 
 @bare_inner_kernel

@@ -7,15 +7,18 @@ form, longer ones are scanned; words that cannot span the plane have closed form
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
 from maneuver_automaton.search._kernels_problem import (
     COST,
     DISTANCE,
     TURN,
+    Candidates,
+    Links,
+    WordProblem,
     condition,
     is_straight,
     look,
@@ -35,10 +38,6 @@ from maneuver_automaton.search._kernels_triple import choose_triple, solve_tripl
 from maneuver_automaton.search._kernels_turns import levels
 from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.search._kernels_problem import Candidates, Links, WordProblem
 
 SAME_PRICE = 1e-9  # relative: chains of transitions of one price are one
 NONE_LEFT = 1e-9  # [m, s] of a linear condition: transitions leave no more than rounding

@@ -9,20 +9,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bound
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search.arrays import Desk, DistanceGrid, SearchArrays, Task
 from maneuver_automaton.search.cost_to_go import NO_TABLE
-from maneuver_automaton.search.distance_grid import DistanceGrid, laid_grid, with_cells
-from maneuver_automaton.search.lattice_memory import SearchArrays, search_arrays, with_room
+from maneuver_automaton.search.distance_grid import laid_grid, with_cells
+from maneuver_automaton.search.lattice_memory import search_arrays, with_room
 from maneuver_automaton.search.lattice_pass import Pass, first_steps, first_takes
 from maneuver_automaton.search.lattice_query import (
     LEAST_MARGIN,
@@ -32,7 +31,6 @@ from maneuver_automaton.search.lattice_query import (
 )
 from maneuver_automaton.search.lattice_task import (
     Resolution,
-    Task,
     back_off_of,
     first_resolutions,
     numbers_of_cells,
@@ -44,30 +42,6 @@ from maneuver_automaton.search.scene import Scene
 
 SPARE = 1.5  # times the cells of the first query, of which there is memory
 MOST_CELLS = 1 << 18  # of which there is memory: on larger maps nobody waits for the begin
-
-
-class Desk(NamedTuple):
-    """Where a query lays down its poses, and where its call leaves what it has found out."""
-
-    poses: Array  # (1 + n, 3) start and goals as the problem sees them
-    seen: Array  # (1 + n, 4) as the search does
-    clear: Array  # (1 + n,) [m] clearance there
-    margin: Array  # (1,) [m] proven clearance
-    window_box: Array  # (4,) of the window in the world's frame
-    asked: IntArray  # (1,) how many expansions
-    frame: tuple[float, float, float, float, float]  # the world's: x, y, heading, cosine, sine of -
-    box: tuple[float, float, float, float]  # of what stands
-    pad: float  # [m] around it and the ends
-    bounded: bool  # whether the window is that of the bounds
-    low_x: float  # bounds of the pose [m]
-    low_y: float
-    high_x: float
-    high_y: float
-    clearly: float  # [m]
-    usual: float  # [m] proven clearance, if the ends allow it
-    least: float  # [m]
-    back_off: float  # [m] as in the task, as far as the margin does not ask for more
-    others: int  # numbers that layers, headings and so on of cells need
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import plain
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
 from maneuver_automaton.search._kernels_distance import BUCKETS
+from maneuver_automaton.search.arrays import DistanceGrid
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
@@ -20,33 +19,6 @@ OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over 
 COARSER = 3  # field cells along a side of a coarse cell
 TOUCHING = 1e-6  # [m] what is less deep in an obstacle may pass: checks and places are rounded
 COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed radius, at most
-
-
-class DistanceGrid(NamedTuple):
-    """The grid as the kernels see it; its cells coincide with those of the world's field."""
-
-    value: IntArray  # (cells,) [units] length of the path that ranks first, where one is known
-    rank: IntArray  # (cells,) [units] that length with a detour for every cell a wall may cut
-    mark: NDArray[np.uint8]  # (cells,) 0 nothing is known, 1 blocked, 2 settled, 3 reached
-    keys: Array  # (8 cells + 8,) of the part of the open list that is far away, a binary heap
-    items: IntArray  # its cells; from the other end on those of the rest of the open list
-    links: IntArray  # the places before them in their bucket, plus 1; 0: none
-    heads: IntArray  # (BUCKETS,) the last place of each bucket, plus 1
-    state: IntArray  # (6,) as numbered by the kernels
-    origin_x: float
-    origin_y: float
-    cell: float
-    columns: int
-    rows: int
-    stride: int  # field cells a cell
-    shift_x: int  # field cell of cell (0, 0)
-    shift_y: int
-    inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
-    wanted: float  # [m] clearance of a cell's centre below which the vehicle cannot be there
-    cut: float  # [m] clearance of a cell's centre below which a wall may cut the cell; -inf: none
-    detour: int  # [units] how much longer a path is preferred to one through such a cell
-    aim_i: int  # cell towards which it grows first
-    aim_j: int
 
 
 def distance_grid(

@@ -12,30 +12,22 @@ from __future__ import annotations
 
 import math
 import threading
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.search import _kernels_state_lattice as kernels
+from maneuver_automaton.search.arrays import FreeCosts
 
 if TYPE_CHECKING:
-    from maneuver_automaton.search.state_lattice import StateLattice
+    from maneuver_automaton.search.arrays import StateLattice
 
 BEYOND = 1.25  # times the cost from the start, up to which costs are known
 WIDER = 1.5  # times the cost looked up to, where the start was not met
 MOST_ENTRIES = 1 << 23  # of a table, 64 MiB
 CHUNK = 1 << 14  # nodes that are settled between two looks at the clock
-
-
-class FreeCosts(NamedTuple):
-    """Least costs to the aims of a query without obstacles, as far as they are known."""
-
-    value: Array  # (columns, rows, S)
-    column: int  # of the first entry
-    row: int
-    most: float  # costs above it are not known, and no less
 
 
 UNKNOWN = FreeCosts(np.zeros((0, 0, 0)), 0, 0, 0.0)

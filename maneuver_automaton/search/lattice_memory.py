@@ -3,34 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search import _kernels_nodes as kernels
+from maneuver_automaton.search.arrays import SearchArrays
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.prepared import Prepared
-from maneuver_automaton.words.library import LibraryArrays, Scratch, scratch_of
+from maneuver_automaton.words.library import LibraryArrays, scratch_of
 
 SMALLEST = 2048  # nodes
 MOST_SPARE = 4  # searches of one library whose arrays are kept
 LARGEST_SPARE = 1 << 15  # nodes of such a search, some 5 MB
 GROWN_S = 2.5e-7  # [s] that room for one node takes, what there is moved there
-
-
-class SearchArrays(NamedTuple):
-    """Nodes, their hash table, the heap, and a few numbers, as in `_kernels_nodes`."""
-
-    nodes: Array  # (n, 9)
-    links: NDArray[np.int32]  # (n, 7)
-    table: IntArray  # (4 n, 2) key, generation and node
-    heap_key: Array
-    heap_node: IntArray
-    state: IntArray  # (13,)
-    found: Array  # (5,) cost, three durations and that of a climb
-    scratch: Scratch
 
 
 def search_arrays(library: LibraryArrays) -> SearchArrays:

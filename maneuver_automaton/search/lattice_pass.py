@@ -13,17 +13,12 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays, Task
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
-from maneuver_automaton.search.distance_grid import DistanceGrid
 from maneuver_automaton.search.lattice_arrays import LatticeArrays, coasts_of
-from maneuver_automaton.search.lattice_memory import (
-    SearchArrays,
-    arrays_for,
-    room_takes,
-    with_room,
-)
+from maneuver_automaton.search.lattice_memory import arrays_for, room_takes, with_room
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import Resolution, Task, goal_of_root, task_of
+from maneuver_automaton.search.lattice_task import Resolution, goal_of_root, task_of
 from maneuver_automaton.search.scene import Scene
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.transitions import SWITCH

@@ -14,6 +14,7 @@ from maneuver_automaton._compile import plain
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import SearchSettings
 from maneuver_automaton.search._kernels_nodes import cells_along
+from maneuver_automaton.search.arrays import Task
 from maneuver_automaton.search.distance_grid import OCTILE
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -54,53 +55,6 @@ class Resolution:
     backwards: bool = False  # from the goal
     ends_early: bool = False  # when the most promising node is not below the upper bound
     straight: bool = False  # whether estimates in the open are no longer than straight lines
-
-
-class Task(NamedTuple):
-    """One search from one end, as the kernels see it."""
-
-    sign: float  # 1: along time, -1: against it
-    roots: Array  # (R, 4)
-    root_trims: IntArray  # (R,) -1 where any will do
-    aims: Array  # (A, 4)
-    aim_trims: IntArray  # (A,)
-    aim_free: NDArray[np.bool_]  # (A,) whether any heading will do
-    lag: Array  # (m + 1,) least surplus of maneuvers from a trim to an aim's; the last of no trim
-    frame_x: float
-    frame_y: float
-    frame_heading: float
-    frame_cos: float
-    frame_sin: float
-    cell: float  # [m]
-    headings: int
-    fine_cell: float  # of truncated edges
-    fine_headings: int
-    rise: float  # [m] of altitude that makes another cell
-    tick: float  # [s] of the clock that makes another cell, 0 where it makes none
-    radix: tuple[int, int, int, int]  # cells along a side, headings, levels, ticks
-    weight: float  # of the estimate in the open list
-    per_metre: float  # least cost per metre
-    per_climb: float  # least cost per metre of altitude
-    per_interval: float  # cost to go for each expansion between two analytic expansions
-    least_interval: float  # expansions between two of them, at least ...
-    most_interval: float  # ... and at most
-    connection_factor: float  # a connection may cost so many times the estimate ...
-    connection_slack: float  # ... and so much more
-    tries: int  # candidates of one connection that are proven, at most
-    stop_at_first: bool  # connection
-    ends_early: bool  # when the most promising node is not below the upper bound
-    truncated: bool  # whether the part of an edge before a contact is kept
-    back_off: float  # [m]
-    shortest_truncated: float  # [m]
-    clock: float  # [s] time of the world at the start
-    most_time: float  # [s]
-    stay_until: float  # [s] time of the world until which the goal is kept
-    most_trims: int  # 0: no limit
-    least_coast: float  # [s]
-    checks_words: bool  # whether connections have limits of single words to keep
-    by_gear: bool  # whether cells know the gear, ...
-    by_trim: bool  # the trim, ...
-    by_count: bool  # and the number of trims
 
 
 def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -> Task:

@@ -14,7 +14,6 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.search.trim_choice import coarse_trims
 from maneuver_automaton.words.library import (
     NO_TRIM,
     STRAIGHT,
@@ -189,3 +188,187 @@ def _words(moving: IntArray, twists: Array) -> IntArray:
         (i, i, i) for i in every
     ]
     return np.array(words, dtype=np.int64).reshape(-1, 3)
+
+
+DIRECTIONS = 8  # straight, on the spot, and between the two, with both signs
+NEAR = 0.03  # [rad] from a direction, within which the cheapest trim stands for it
+LOOKS = 720  # directions in which the trims that pay are looked for
+SAME_PATH = 1e-12  # of the cosine between two twists that lead along one path
+PACES, STEPS = 8, 128  # prices of time that double, and how many are tried on either side
+PAYS = 1e-6  # relative price above the least one that counts as the least
+
+
+def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -> IntArray:
+    """Rows of the few trims that reach far: straight, sharpest and on the spot, each at its best.
+
+    In the plane of speed and turn rate, each divided by its greatest, some directions are taken;
+    for each the trim that is the cheapest for what it covers, of equal ones the nearest to the
+    direction, then the fastest. Where nothing turns on the spot, the sharpest turns too, and the
+    cheapest straight motions aside. Twists are (m, 3) or (m, 4), rates (m,) are costs per second,
+    and the number of directions is a multiple of eight.
+
+    Examples
+    --------
+    >>> speeds, turns = (-1.0, -0.5, 0.5, 1.0), (-0.5, -0.2, 0.0, 0.2, 0.5)
+    >>> grid = np.array([(v, 0.0, w) for v in speeds for w in turns])
+    >>> grid[coarse_trims(grid, np.ones(20))].tolist()[:3]
+    [[-1.0, 0.0, -0.5], [-1.0, 0.0, 0.0], [-1.0, 0.0, 0.5]]
+    """
+    aside = twists[:, 1] != 0.0
+    along = np.flatnonzero(~aside) if not aside.all() else np.arange(len(twists))
+    chosen: list[int] = []
+    plane = _plane(twists[along])
+    angles, sizes = np.arctan2(plane[:, 1], plane[:, 0]), np.hypot(*plane.T)
+    for k in range(directions):
+        angle = 2.0 * math.pi * k / directions
+        off = np.abs(np.remainder(angles - angle + math.pi, 2.0 * math.pi) - math.pi)
+        near = np.flatnonzero((off <= NEAR) & (sizes > 0.0))
+        covered = plane @ np.array([math.cos(angle), math.sin(angle)])
+        chosen += _cheapest(along, near, rates[along], covered, off)
+    drives = (plane[:, 0] != 0.0) & (plane[:, 1] != 0.0)
+    if not ((plane[:, 0] == 0.0) & (plane[:, 1] != 0.0)).any() and drives.any():
+        sharp = np.where(drives, np.abs(plane[:, 1]) / np.abs(plane[:, 0]).clip(min=1e-300), 0.0)
+        for gear in (1.0, -1.0):
+            for side in (1.0, -1.0):
+                turning = drives & (plane[:, 0] * gear > 0.0) & (plane[:, 1] * gear * side > 0.0)
+                most = float(sharp[turning].max(initial=0.0))
+                sharpest = np.flatnonzero(turning & (sharp >= most * (1.0 - 1e-9)))
+                chosen += _cheapest(along, sharpest, rates[along], np.abs(plane[:, 0]), -sizes)
+    for sign in (1.0, -1.0):
+        sideways = np.flatnonzero((sign * twists[:, 1] > 0.0) & (twists[:, 2] == 0.0))
+        off = np.abs(twists[:, 0])
+        straight = sideways[off[sideways] == off[sideways].min(initial=math.inf)]
+        every = np.arange(len(twists))
+        chosen += _cheapest(every, straight, rates, sign * twists[:, 1], -sign * twists[:, 1])
+    return np.array(sorted(set(chosen)), dtype=np.int64)
+
+
+def paying_trims(twists: Array, rates: Array) -> IntArray:
+    """Rows of the trims that some prices make pay where no other trim would pay more.
+
+    A trim of twist x and rate r pays at the momentum p where ``r + <p, x> < 0``, so where
+    ``<p, x / r> < -1``. If it does, a corner of the convex hull of all ``x / r`` pays, too: only
+    trims on the hull need be priced. They are found by looking in many directions, so that of many
+    corners next to each other some may be left out. A trim that costs nothing always counts.
+
+    Source: support functions; Boyd, Vandenberghe (2004), *Convex Optimization*, Sec. 2.5.2.
+
+    Examples
+    --------
+    >>> speeds = np.array([[0.5, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
+    >>> paying_trims(speeds, np.ones(4)).tolist()
+    [1, 2, 3]
+    """
+    if twists[:, 1].any() or twists[:, 3:].any() or not (rates > 0.0).all():
+        return np.arange(len(twists))
+    reach = _plane(twists) / rates[:, None]
+    angles = np.arange(LOOKS) * (2.0 * math.pi / LOOKS)
+    seen = reach @ np.stack([np.cos(angles), np.sin(angles)])
+    least = seen.max(axis=0)
+    pays = (seen >= least - PAYS * np.abs(least)).any(axis=1)
+    return np.flatnonzero(pays)
+
+
+def _plane(twists: Array) -> Array:
+    """Speed and turn rate (m, 2), each divided by the greatest."""
+    plane = twists[:, [0, 2]]
+    return np.asarray(plane / np.abs(plane).max(axis=0, initial=0.0).clip(min=1e-300))
+
+
+def _cheapest(
+    along: IntArray, members: IntArray, rates: Array, covered: Array, off: Array
+) -> list[int]:
+    """The cheapest of some trims for what it covers, then the least `off`, then the fastest."""
+    if not members.size:
+        return []
+    with np.errstate(divide="ignore"):
+        price = np.round(rates[members] / covered[members], 9)
+    order = np.lexsort((-covered[members], np.round(off[members], 9), price))
+    return [int(along[members[order[0]]])]
+
+
+def paced_trims(
+    twists: Array, rates: Array, word: IntArray, durations: Array, most_time: float
+) -> tuple[IntArray, IntArray]:
+    """Rows of the few trims at the two paces that suit a word which may last so long.
+
+    Time gets a price. The costlier it is, the faster are the `coarse_trims`; so there is a least
+    one at which the word, driven by those of its own directions, ends in time. The trims for the
+    step below, and those for it: between the two paces words fill the time. `word` (n,) are the
+    rows of the trims of a word that ends in time.
+
+    Examples
+    --------
+    >>> speeds = np.array([[v / 10, 0.0, 0.0] for v in range(1, 11)])
+    >>> slow, fast = paced_trims(speeds, speeds[:, 0] ** 2, np.array([9]), np.array([4.0]), 9.9)
+    >>> slow.tolist(), fast.tolist()
+    ([3], [4])
+    """
+    plane = _plane(twists)
+    sizes = np.hypot(*plane.T)
+    covered = sizes[word] * durations
+    scale = float(rates.max())
+
+    def chosen(step: int) -> IntArray:
+        return coarse_trims(twists, rates + scale * 2.0 ** (step / PACES))
+
+    def lasts(rows: IntArray) -> float:
+        return float(covered @ (1.0 / sizes[nearest_trims(twists, word, rows)]))
+
+    slow, fast = -STEPS, STEPS
+    if lasts(chosen(slow)) <= most_time:
+        return chosen(slow), chosen(slow)
+    while fast - slow > 1:
+        middle = (slow + fast) // 2
+        late = lasts(chosen(middle)) > most_time
+        slow, fast = (middle, fast) if late else (slow, middle)
+    return chosen(slow), chosen(fast)
+
+
+def nearest_trims(twists: Array, word: IntArray, rows: IntArray) -> IntArray:
+    """For each trim (n,) of a word the one of `rows` that leads in the most similar direction."""
+    plane = _plane(twists)
+    angles = np.arctan2(plane[:, 1], plane[:, 0])
+    off = angles[word][:, None] - angles[rows]
+    off = np.abs(np.remainder(off + math.pi, 2.0 * math.pi) - math.pi)
+    return np.asarray(rows[off.argmin(axis=1)], dtype=np.int64)
+
+
+def at_two_paces(
+    twists: Array,
+    word: IntArray,
+    durations: Array,
+    paces: tuple[IntArray, IntArray],
+    most_time: float,
+) -> list[tuple[int, float]] | None:
+    """A word driven along its path at a slow and a fast pace so that it lasts so long at most.
+
+    Slow ahead as long as the time allows, then fast. Rows of trims and how long they last [s]; None
+    where no trim of a pace leads along the path of one of the word, or the fast ones are too slow.
+    `word` (n,) and the two `paces` (k,), the slow one first, are rows of trims.
+
+    Examples
+    --------
+    >>> speeds = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    >>> paces = np.array([0]), np.array([1])
+    >>> at_two_paces(speeds, np.array([2]), np.array([1.0]), paces, 3.0)
+    [(0, 2.0), (1, 1.0)]
+    """
+    size = np.linalg.norm(twists, axis=1)
+    slow, fast = (nearest_trims(twists, word, rows) for rows in paces)
+    for rows in (slow, fast):
+        along = (twists[rows] * twists[word]).sum(axis=1)
+        if (along < size[rows] * size[word] * (1.0 - SAME_PATH)).any():
+            return None
+    slowly, quickly = (durations * size[word] / size[rows] for rows in (slow, fast))
+    spare = most_time - float(quickly.sum())
+    if spare < 0.0:
+        return None
+    driven: list[tuple[int, float]] = []
+    for k in range(len(word)):
+        later = float(slowly[k] - quickly[k])
+        share = 1.0 if later <= spare else spare / later
+        spare -= share * later
+        steps = ((slow[k], share * slowly[k]), (fast[k], (1.0 - share) * quickly[k]))
+        driven += [(int(row), float(t)) for row, t in steps if t > 0.0]
+    return driven

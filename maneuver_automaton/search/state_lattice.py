@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,15 +26,16 @@ from maneuver_automaton.models import OnLattice
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
-from maneuver_automaton.search.free_costs import UNKNOWN, FreeCosts, FreeTable
-from maneuver_automaton.search.lattice_arrays import LatticeArrays, LatticeLibrary
+from maneuver_automaton.search.arrays import Aims, FreeCosts, GraphArrays, StateLattice, Tested
+from maneuver_automaton.search.free_costs import UNKNOWN, FreeTable
+from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_goals import EXACT, at_headings, cells_within, facing
 from maneuver_automaton.search.lattice_library import library_of_trims
 from maneuver_automaton.search.lattice_memory import GROWN_S
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.prepared import Prepared
-from maneuver_automaton.search.scene import Scene, for_library
+from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
@@ -44,62 +45,15 @@ MOST_ROOTS = 1 << 16  # nodes at the goals that a search begins from
 MOST_STATES = 256  # at a place, which has room for all of them
 FIRST_CHUNK = 512  # motions
 SMALLEST = 2048  # nodes and places, and eight times as many motions
+ALIKE = 1.0001  # times the least cost of edges a quarter turn apart, that each of them may have
 MOST_TABLES = 64  # of costs without obstacles, of one library
 # Expansions after which costs without obstacles are looked up, and of how many nodes at most. To
 # know many takes as long as a search, so that they have to wait until it is long.
 STAGES = (1 << 10, 1 << 14), (1 << 12, 1 << 16), (1 << 14, 1 << 18)
 
 
-class StateLattice(NamedTuple):
-    """The graph of a library with S states and E edges, along time or against it."""
-
-    cell: float  # [m]
-    frame: tuple[float, float, float, float, float]  # x, y, heading, cos, sin in the world's frame
-    sign: int  # 1: along time, -1: against it
-    heading: Array  # (S,) [rad] in the frame of the lattice
-    first: IntArray  # (S + 1,) where the edges out of each state begin
-    target: IntArray  # (E,)
-    step: IntArray  # (E, 2) columns and rows
-    cost: Array  # (E,)
-    edge: IntArray  # (E,) in the arrays of the library
-    travel: Array  # (E,) [m] length of the path of the pose, or more
-    source: IntArray  # (E,)
-    into_first: IntArray  # (S + 1,) where the edges that lead to each state begin ...
-    into_edge: IntArray  # (E,) ... in this list of them
-    most_links: int  # edges of a state that lead away, or those that lead to it
-    roots: IntArray  # (R, 3) column, row, state
-
-
-class GraphArrays(NamedTuple):
-    """Arrays of a search, as in `_kernels_state_lattice`."""
-
-    table: IntArray  # (4 p, 2)
-    node: NDArray[np.int32]  # (p, S)
-    least: Array  # (p, S)
-    cost: Array  # (n,)
-    clearance: Array  # (n,)
-    links: NDArray[np.int32]  # (n, 5)
-    heap_key: Array  # (m,)
-    heap_item: IntArray  # (m,)
-    state: IntArray  # (7,)
-    found: Array  # (1,)
-
-
-class Aims(NamedTuple):
-    """Where a search leads: the nodes of some states within a distance of some places."""
-
-    place: Array  # (G, 2) [m] in the frame of the lattice
-    within: Array  # (G,) [m]
-    admits: NDArray[np.bool_]  # (G, S)
-    per_metre: float  # least cost of a displacement
-    surplus: Array  # (S,) least cost beyond that of the displacement, from a state to an aim's
-
-
-class Tested(NamedTuple):
-    """What motions are tested with: pieces of their courses, and a scene that knows these."""
-
-    lib: LatticeArrays
-    scene: Scene
+_Number = TypeVar("_Number", np.float64, np.int64)
+Frame: TypeAlias = tuple[StateLattice, IntArray]  # seen from it, and there the number of each state
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -112,6 +66,7 @@ class Graph:
     coarse: Tested
     fine: Tested
     goal_index: tuple[int, ...]  # (G,) which of the problem's goals the aims are
+    least: Array  # (E,) what an edge, or one a quarter turn from it, costs
     tables: dict[tuple[int, bytes], FreeTable]  # of costs without obstacles, by sign and aims
     surcharge: float  # that each edge has and a plan has once less: the price of a switch
 
@@ -158,7 +113,7 @@ class Graph:
             surplus=_surplus(lattice, aims.per_metre, admits),
         )
         goals = tuple(self.goal_index[g] for g in roots[:, 3])
-        return replace(self, lattice=lattice, aims=start, goal_index=goals)
+        return replace(self, lattice=lattice, aims=start, goal_index=goals, least=self.least[order])
 
 
 def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Graph | None:
@@ -186,14 +141,28 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
     states = prepared.once(_states, query.library, fine, problem.setting)
     if states is None:
         return None
-    lattice, of_trim, surcharge, tables = states
-    begun = query.start_trim
-    turn = float(query.start[2]) - float(lattice.heading[of_trim[begun][0]])
-    x, y = query.start[:2].tolist()
-    frame = (x, y, turn, math.cos(turn), math.sin(turn))
-    lattice = lattice._replace(frame=frame, roots=np.array([[0, 0, of_trim[begun][0]]]))
+    frames, least, surcharge, tables = states
+    lattice, state = frames[0]
+    begun = query.start_trim * (len(state) // len(query.library.trims))
+    turn = float(query.start[2] - lattice.heading[begun])
     world = SE2(problem.start) @ SE2(np.array([0.0, 0.0, turn - float(query.start[2])]))
     aims = _aims(problem, goals, world, lattice)
+    # Of frames a quarter turn apart the one whose costs without obstacles serve all of them.
+    to = begun if problem.search.backwards else int(aims.admits[0].argmax())
+    quarters = int(np.argmin([state[to] for _, state in frames]))
+    lattice, state = frames[quarters]
+    numbers = np.argsort(state)
+    aims = aims._replace(
+        place=_turned(aims.place, -quarters),
+        admits=aims.admits[:, numbers],
+        surplus=aims.surplus[numbers],
+    )
+    x, y = query.start[:2].tolist()
+    c, s = _turned(np.array([math.cos(turn), math.sin(turn)]), quarters).tolist()
+    lattice = lattice._replace(
+        frame=(x, y, turn + quarters * 0.5 * math.pi, c, s),
+        roots=np.array([[0, 0, state[begun]]]),
+    )
     margin = min(MARGIN, query.margin)
     scene = for_library(query.scene(margin), problem, fine)
     return Graph(
@@ -203,6 +172,7 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
         coarse=Tested(query.library.arrays, query.around),
         fine=Tested(fine.arrays, scene),
         goal_index=tuple(goals),
+        least=least,
         tables=tables,
         surcharge=surcharge,
     )
@@ -216,10 +186,10 @@ def _followed(library: LatticeLibrary, cost: Cost) -> LatticeLibrary:
 
 def _states(
     library: LatticeLibrary, fine: LatticeLibrary, problem: Problem
-) -> tuple[StateLattice, list[IntArray], float, dict[tuple[int, bytes], FreeTable]] | None:
-    """Graph (three states a heading where directions are priced), states of trims, switch price.
+) -> tuple[list[Frame], Array, float, dict[tuple[int, bytes], FreeTable]] | None:
+    """Graph (three states a heading where directions are priced) in its frames, switch price.
 
-    And where tables of costs without obstacles are kept.
+    Before the price the least costs of edges, and after it where tables of costs are kept.
     """
     arrays, automaton, cost = library.arrays, library.priced.automaton, problem.cost
     model = automaton.lattice
@@ -274,8 +244,48 @@ def _states(
         most_links=int(max(np.diff(first).max(), np.diff(into_first).max())),
         roots=np.zeros((0, 3), dtype=np.int64),
     )
-    of_trim = [np.arange(directed) + directed * k for k in range(len(heading))]
-    return lattice, of_trim, float(cost.switch), {}
+    return *_frames(lattice, directed), float(cost.switch), {}
+
+
+def _frames(lattice: StateLattice, directed: int) -> tuple[list[Frame], Array]:
+    """Frames a quarter turn apart in which the graph is the same, but for what its edges are.
+
+    And what each edge costs at least in one of them. Where the library has no such symmetry there
+    is one frame: each edge needs one of its step and its cost, turned.
+    """
+    frames = [(lattice, np.arange(len(lattice.heading)))]
+    heading = lattice.heading[::directed]
+    off = np.abs(wrapped(np.add.outer(heading + 0.5 * math.pi, -heading)))
+    left = off.argmin(axis=1)
+    if off.min(axis=1).max() > EXACT or len(np.unique(left)) < len(left):
+        return frames, lattice.cost
+    left = (
+        left[:, None] * directed + np.arange(directed)
+    ).ravel()  # of each state, what it becomes
+    edges = np.array([lattice.source, lattice.target, *lattice.step.T])
+    turned = np.array([*left[edges[:2]], *_turned(lattice.step, 1).T])
+    here, there = (np.lexsort((lattice.cost, *one)) for one in (edges, turned))
+    if not np.array_equal(edges[:, here], turned[:, there]):
+        return frames, lattice.cost
+    image = np.empty_like(here)
+    image[there] = here  # of each edge, what it becomes
+    for _ in range(3):
+        seen, state = frames[-1]
+        seen = seen._replace(
+            cost=seen.cost[image], edge=seen.edge[image], travel=seen.travel[image]
+        )
+        frames.append((seen, np.argsort(left)[state]))
+    least = np.min([seen.cost for seen, _ in frames], axis=0)
+    if (lattice.cost > least * ALIKE).any():
+        return frames[:1], lattice.cost
+    return frames, least
+
+
+def _turned(places: NDArray[_Number], quarters: int) -> NDArray[_Number]:
+    """Places (..., 2) turned to the left by some quarter turns, without rounding."""
+    for _ in range(quarters % 4):
+        places = np.stack([-places[..., 1], places[..., 0]], axis=-1)
+    return places
 
 
 def _by_state(state: IntArray, n: int) -> tuple[IntArray, IntArray]:
@@ -456,7 +466,8 @@ class GraphSearch:
         if key not in graph.tables:
             while len(graph.tables) >= MOST_TABLES:
                 graph.tables.pop(next(iter(graph.tables)), None)
-            graph.tables[key] = FreeTable(graph.lattice, sources, graph.aims.per_metre)
+            lattice = graph.lattice._replace(cost=graph.least)
+            graph.tables[key] = FreeTable(lattice, sources, graph.aims.per_metre)
         roots = graph.lattice.roots.copy()
         roots[:, :2] -= base
         self.free = graph.tables[key].around(roots, base, most, budget)

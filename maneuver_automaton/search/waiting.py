@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.chain import coasted
 from maneuver_automaton.search import _kernels_waiting as kernels
+from maneuver_automaton.search.arrays import PathArrays
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.words.transitions import SWITCH
@@ -19,20 +18,6 @@ MOST_PIECES = 60  # joints at which it may wait
 MOST_STATES = 4096  # of joints, each for a stretch of time
 TICK = 0.1  # [s] between departures that are tried
 SHORT_TURN = 0.2  # [rad] of the pieces whose bulge is bounded
-
-
-class PathArrays(NamedTuple):
-    """Pieces of a path and the states along it, as the kernel sees them."""
-
-    trims: IntArray  # (n,)
-    durations: Array  # (n,)
-    poses: Array  # (n + 1, 4)
-    links: IntArray  # (s, 2) joint and parent of each state
-    times: Array  # (s, 3) arrival, until when it may stand there, departure from the parent [s]
-    before: IntArray  # (s,) the state of the same joint that was found before, -1 for none
-    latest: IntArray  # (n + 1,) the state of each joint that was found last, -1 for none
-    keys: Array  # (s,) of the open list
-    items: IntArray  # (s,)
 
 
 def with_waits(query: LatticeQuery, word: Word) -> Word | None:

@@ -9,10 +9,10 @@ and every word is steered from the same pose to the same pose.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.groups._kernels import back_from, coast, compose, nearest_turn
 from maneuver_automaton.words._kernels_library import (
@@ -28,10 +28,7 @@ from maneuver_automaton.words._kernels_library import (
     time_between,
 )
 from maneuver_automaton.words._kernels_steering import length, steer, steer_one, steer_two
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
-    from maneuver_automaton.words.library import LibraryArrays, Scratch
+from maneuver_automaton.words.library import LibraryArrays, Scratch
 
 WHOLE = 1e-9  # share of a full turn that counts as none
 

@@ -7,15 +7,12 @@ follow a maneuver come in as conjugated twists, `product` is that of all displac
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import back_from, coast, compose, nearest_turn
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
 
 SWEEPS = 30  # of rotations at most; a handful does
 ORTHOGONAL = 1e-15  # cosine of the angle between two columns that are taken to be orthogonal

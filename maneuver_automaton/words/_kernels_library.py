@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import inlined_kernel, inner_kernel
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import IntArray
-    from maneuver_automaton.words.library import LibraryArrays
+from maneuver_automaton.words.library import LibraryArrays
 
 NO_TRIM = -1
 

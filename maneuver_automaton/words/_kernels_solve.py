@@ -7,10 +7,10 @@ exact second derivatives (Nocedal, Wright, Numerical Optimization, 2nd ed., Sec.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.words._kernels_times import (
     assign,
@@ -22,9 +22,6 @@ from maneuver_automaton.words._kernels_times import (
     newton_stationary,
     residual,
 )
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 SOLVED, FEASIBLE, FAILED = 0, 1, 2
 STALLED = 10  # steps in a row of next to no length, after which no more are tried

@@ -7,14 +7,11 @@ Planar motions are complex numbers: a trim is ``(velocity, turn rate)``, a displ
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array, IntArray
 
 
 @inner_kernel

@@ -9,15 +9,12 @@ the goal as seen from before all maneuvers (see `switching_times.conjugated`). L
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
-
-if TYPE_CHECKING:
-    from maneuver_automaton._arrays import Array
 
 
 @inner_kernel

@@ -10,10 +10,8 @@ import pytest
 from maneuver_automaton.analysis import turnpike
 from maneuver_automaton.models import SecondOrderUnicycle
 from maneuver_automaton.optimal_control import SolveStatus
-from maneuver_automaton.plotting import save_turnpike_figure
 from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.primitives.bang_bang import bang_bang
-from tests.plotting.cases import assert_picture
 
 ROBOT = SecondOrderUnicycle(
     max_speed=2.0, max_turn_rate=2.0, max_acceleration=1.0, max_angular_acceleration=1.0
@@ -63,11 +61,6 @@ def test_what_the_automaton_pays_more_does_not_grow(study):
         # speeding up: 1 s at 1 m/s^2, costs 1 + 1/3, and so does braking
         assert case.automaton_cost == pytest.approx(case.coast + 8.0 / 3.0, abs=1e-9)
     assert 0.0 < gaps[0] < gaps[1] < gaps[2] < 2.0 / 3.0
-
-
-def test_a_picture(study, tmp_path):
-    save_turnpike_figure(study, tmp_path / "turnpike.png")
-    assert_picture(tmp_path / "turnpike.png")
 
 
 @pytest.mark.parametrize(

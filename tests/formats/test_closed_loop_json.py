@@ -12,8 +12,8 @@ from maneuver_automaton.formats.closed_loop_json import (
     closed_loop_to_dict,
     load_steps,
     save_closed_loop,
+    save_statistics,
 )
-from maneuver_automaton.formats.statistics_json import save_statistics
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
     Disturbance,
@@ -171,7 +171,10 @@ class TestReading:
     @pytest.mark.parametrize(
         ("change", "message"),
         [
-            (lambda d: d.pop("automaton_hash"), "is no closed_loop.json, need an object with"),
+            (
+                lambda d: d.pop("automaton_hash"),
+                "this loop was planned with another",
+            ),
             (lambda d: d.pop("steps"), "is no closed_loop.json, need an object with"),
             (lambda d: d.update(schema=2), "schema: got 2, need 1"),
             (lambda d: d.update(steps=3), ""),
@@ -185,7 +188,7 @@ class TestReading:
             (lambda d: d["steps"][0].update(origin="heaven"), "heaven"),
             (lambda d: d["steps"][0].update(plan=None), ""),
             (
-                lambda d: d["steps"][0].update(plan=[{"name": "cw"}]),
+                lambda d: d["steps"][0].update(plan=[{"kind": "trim", "name": "cw"}]),
                 "duration_s: is missing, need a finite number",
             ),
             (lambda d: d["steps"][0]["plan"][0].update(duration_s=-1.0), "must not be negative"),

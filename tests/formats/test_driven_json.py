@@ -10,8 +10,12 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
-from maneuver_automaton.formats.closed_loop_json import closed_loop_to_dict, save_closed_loop
-from maneuver_automaton.formats.driven_json import driven_document, load_closed_loop
+from maneuver_automaton.formats.closed_loop_json import (
+    closed_loop_to_dict,
+    driven_document,
+    load_closed_loop,
+    save_closed_loop,
+)
 from maneuver_automaton.formats.plan_json import plan_of_document
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -67,7 +71,7 @@ def test_a_broken_log_is_told(tmp_path, capsys):
     document["steps"][1]["pose"] = document["steps"][1]["vehicle_pose"] = "here"
     Path(tmp_path / "a.json").write_text(json.dumps(document))
     assert run(["plot", str(tmp_path / "a.json")]) == 2
-    assert capsys.readouterr().err.startswith(f"{tmp_path / 'a.json'}: steps: pose: got ")
+    assert capsys.readouterr().err.startswith(f"{tmp_path / 'a.json'}: steps[1].pose: got ")
 
 
 def test_with_its_scenario_it_is_the_loop_that_it_was(tmp_path):

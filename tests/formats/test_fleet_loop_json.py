@@ -11,11 +11,12 @@ import pytest
 
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem, simulate_fleet, verify_driven
-from maneuver_automaton.formats.driven_json import driven_document
-from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict, save_fleet_loop
-from maneuver_automaton.formats.fleet_loop_reading import (
+from maneuver_automaton.formats.closed_loop_json import driven_document
+from maneuver_automaton.formats.fleet_loop_json import (
+    fleet_loop_to_dict,
     load_fleet_loop,
     read_fleet_loop_document,
+    save_fleet_loop,
 )
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.receding_horizon import Disturbance
@@ -141,7 +142,7 @@ def test_interrupted_and_sources(tmp_path):
         ),
         (
             lambda d: d["vehicles"]["a"]["steps"][0].pop("plan"),
-            "vehicles.a: misses the key 'plan'",
+            "vehicles.a.steps[0].plan: is missing, need a list",
         ),
         (
             lambda d: d["vehicles"]["a"]["steps"][0].update(held=None),
@@ -156,8 +157,11 @@ def test_interrupted_and_sources(tmp_path):
             lambda d: d["vehicles"]["a"]["steps"][0].update(vehicle_pose=[0.0]),
             "vehicles.a: steps: pose: got shape (1,), need 3 components last",
         ),
-        (lambda d: d["steps"][0]["swaps"].append({}), "misses the key 'vehicles'"),
-        (lambda d: d.pop("closest"), "misses the key 'closest'"),
+        (
+            lambda d: d["steps"][0]["swaps"].append({}),
+            "steps[0].swaps[0].vehicles: is missing, need a list",
+        ),
+        (lambda d: d.pop("closest"), "closest: is missing, need a list"),
     ],
 )  # fmt: skip
 def test_a_damaged_file_is_told(tmp_path, change, message):

@@ -270,7 +270,7 @@ def test_far_from_the_origin_no_digit_is_lost(tmp_path):
         (lambda d: d.pop("trajectory"), ": is no plan.json, need an object with schema, status, "
                                         "primitives, trajectory"),
         (lambda d: d.update(schema=2), ": schema: got 2, need 1"),
-        (lambda d: d["trajectory"].pop("pose"), ": misses the key 'pose'"),
+        (lambda d: d["trajectory"].pop("pose"), ": trajectory.pose: is missing, need a list"),
         (lambda d: d["trajectory"]["time_s"].pop(),
          ": trajectory: got 31 times and 32 poses, need one pose per time"),
         (lambda d: d["primitives"].append(dict(d["primitives"][0])),
@@ -278,7 +278,7 @@ def test_far_from_the_origin_no_digit_is_lost(tmp_path):
         (lambda d: d["primitives"][0].update(kind="dance"),
          ": primitives[0].kind: got 'dance', need 'trim' or 'maneuver'"),
         (lambda d: d["trajectory"].update(pose="abc"),
-         ": trajectory.pose: got 'abc', need numbers"),
+         ": trajectory.pose: got 'abc', need a list"),
     ],
 )  # fmt: skip
 def test_files_that_are_no_plan(tmp_path, change, message):

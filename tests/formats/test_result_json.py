@@ -10,8 +10,7 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.plan_json import plan_to_dict, save_plan
-from maneuver_automaton.formats.result_json import load_result
+from maneuver_automaton.formats.plan_json import load_result, plan_to_dict, save_plan
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 PARKING = ma.load_scenario(SCENARIOS / "parking.yaml").problem

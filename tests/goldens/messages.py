@@ -1,10 +1,15 @@
-"""Inputs that cannot be used, and the whole message and exit code that each of them gets."""
+"""What commands print: of inputs that cannot be used the whole message, of others the tables too.
+
+Numbers that are times of this machine, or no more than rounding, are masked, and so is how wide the
+columns are that hold them.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import io
 import os
+import re
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -15,8 +20,10 @@ import numpy as np
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
 from tests.inertia import unicycle_automaton
+from tests.results import ALONE, TOGETHER
 from tests.scenario.files import SCENARIO, but, grid
 from tests.scenario.files import automaton as library
+from tests.test_cli_fleets import FLEET
 
 UNIT = "{min: -1, max: 1, step: 1}"
 LOOP = SCENARIO + "receding_horizon: {step_s: 0.5}\n"
@@ -97,6 +104,42 @@ USAGE: dict[str, list[str]] = {
 }
 
 
+# What commands print that do their work, one after another in a folder: each row is a folder of its
+# own, and what its last command prints is kept.
+QUIET = ["--no-plot", "--quiet"]
+PRINTED: dict[str, list[list[str]]] = {
+    "plan": [["plan", "x.yaml", "--no-plot"]],
+    "plan, alternatives": [["plan", "x.yaml", "--no-plot", "--alternatives", "1"]],
+    "plan, none": [["plan", "none.yaml", "--no-plot"]],
+    "plan, figure": [["plan", "x.yaml", "--quiet"]],
+    "plan a folder": [["plan", "many", "--no-plot"]],
+    "loop": [["mpc", "loop.yaml", "--no-plot"]],
+    "loop, two steps": [["mpc", "loop.yaml", "--no-plot", "--steps", "2"]],
+    "loop, seeds": [["mpc", "loop.yaml", "--no-plot", "--seeds", "2"]],
+    "loop a folder": [["mpc", "many", "--no-plot", "--steps", "2"]],
+    "fleet": [["plan", "fleet.yaml", "--no-plot", "--time-limit", "20"]],
+    "fleet, loop": [["mpc", "fleet.yaml", "--no-plot", "--steps", "6"]],
+    "road": [["plan", "road.xml", "--no-plot"]],
+    "road, loop": [["mpc", "road.xml", "--no-plot"]],
+    "roads": [["plan", "two.xml", "--no-plot"]],
+    "roads, loop": [["mpc", "two.xml", "--no-plot"]],
+    "check": [["check", "x.yaml"]],
+    "check a plan": [["plan", "x.yaml", *QUIET], ["check", "out/plan.json", "--with", "x.yaml"]],
+    "check a fleet": [
+        ["plan", "fleet.yaml", *QUIET], ["check", "out/plan.json", "--with", "fleet.yaml"]
+    ],
+    "convert": [["convert", "x.yaml", "y.yaml"]],
+    "plot": [["plan", "x.yaml", *QUIET], ["plot", "out/plan.json"]],
+    "export": [["plan", "x.yaml", *QUIET], ["export", "out/plan.json", "--to", "csv"]],
+    "show a library": [["automaton", "show", "x.yaml"]],
+    "build a library": [["automaton", "build", "x.yaml", "--out", "library.json"]],
+    "draw a library": [["automaton", "draw", "x.yaml"]],
+}  # fmt: skip
+# Lines, and last columns of tables, whose numbers are times of this machine.
+BY_THE_CLOCK = re.compile(r"^ *(timing|time per step|searched|planned before|counts):")
+TIMED_COLUMN = re.compile(r"(first plan \[s\]|solved \[ms\])$")
+
+
 def _robot() -> ma.Automaton:
     return ma.Automaton.of_controls(ma.Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
 
@@ -159,6 +202,13 @@ def folder() -> Iterator[Path]:
             Path("empty").mkdir()
             Path("x.yaml").write_text(SCENARIO)
             Path("loop.yaml").write_text(LOOP)
+            Path("none.yaml").write_text(SCENARIO + "bounds_m: {x: [-0.5, 0.5]}\n")
+            Path("fleet.yaml").write_text(FLEET + "receding_horizon: {step_s: 0.5}\n")
+            Path("road.xml").write_text(ALONE)
+            Path("two.xml").write_text(TOGETHER)
+            Path("many").mkdir()
+            Path("many", "a.yaml").write_text(LOOP)
+            Path("many", "b.yaml").write_text(LOOP.replace("A case", "Another"))
             Path("long.yaml").write_text(FIXED + "receding_horizon: {step_s: 5.0}\n")
             yield Path(name)
         finally:
@@ -171,6 +221,34 @@ def of_command(arguments: list[str]) -> dict[str, Any]:
     with folder(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = run(arguments)
     return {"exit": code, "out": out.getvalue(), "err": err.getvalue()}
+
+
+def of_printed(commands: list[list[str]]) -> dict[str, Any]:
+    """Exit code of the last of several commands, and what it prints, masked."""
+    out, err = io.StringIO(), io.StringIO()
+    with folder(), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        for arguments in commands:
+            for stream in (out, err):
+                stream.truncate(0)
+                stream.seek(0)
+            code = run(arguments)
+    return {"exit": code, "out": masked(out.getvalue()), "err": masked(err.getvalue())}
+
+
+def masked(text: str) -> list[str]:
+    """The lines of a text without what depends on the machine; empty lines and rules left out."""
+    lines, timed = [], False
+    for line in (" ".join(one.split()) for one in text.splitlines()):
+        timed = (timed or bool(TIMED_COLUMN.search(line))) and bool(line)
+        if not line.strip("─ "):
+            timed = timed and bool(line)
+            continue
+        if BY_THE_CLOCK.match(line):
+            line = re.sub(r"[0-9.]+", "#", line)
+        elif timed and not TIMED_COLUMN.search(line):
+            line = re.sub(r"[0-9.e-]+$", "#", line)
+        lines.append(re.sub(r"\b[0-9.]+e-[0-9]{2}\b", "tiny", line))
+    return lines
 
 
 def of_file(text: str) -> dict[str, Any]:
@@ -203,6 +281,7 @@ def cases() -> dict[str, Callable[[], dict[str, Any]]]:
         ("file", FILES, of_file),
         ("command", COMMANDS, of_command),
         ("usage", USAGE, of_usage),
+        ("printed", PRINTED, of_printed),
         ("call", CALLS, of_call),
     ]
     return {

@@ -1,7 +1,7 @@
 """Write the data that later versions are held against: `python -m tests.goldens.record [PART ...]`.
 
-Parts are scenes, inertia, loops, documents, messages and files. Record where a change is meant, and
-say why beside it; never to make a test pass.
+Parts are scenes, inertia, loops, documents, messages, exports, pages and files. Record where a
+change is meant, and say why beside it; never to make a test pass.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import subprocess
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from tests.goldens import documents, messages, written
+from tests.goldens import documents, exports, messages, written
 from tests.goldens.inertia import all_with_inertia
 from tests.goldens.loops import all_loops
 from tests.goldens.measured import (
@@ -52,6 +52,8 @@ PARTS: dict[str, Callable[[], dict[str, Any]]] = {
     "loops": loops,
     "documents": documents.recorded,
     "messages": messages.recorded,
+    "exports": exports.recorded,
+    "pages": exports.recorded_pages,
     "files": written.write_files,
     "inertia": inertia,
 }

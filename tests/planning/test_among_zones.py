@@ -16,7 +16,7 @@ from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
 from tests.search.cases import compiled_only

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import shapely
 from benchmarks.unreachable import FAMILIES
 from maneuver_automaton import Automaton, Box, Car, plan
 from maneuver_automaton.bounds import Connection, widest_path
+from maneuver_automaton.bounds.connectivity import connectivity
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import SearchSettings
@@ -85,10 +87,22 @@ def test_a_bus_gets_into_a_slot_that_is_a_metre_longer():
     assert found.status is PlanStatus.FOUND
 
 
-def test_a_proof_ends_the_search():
+def test_a_proof_ends_the_search(monkeypatch):
+    made = []
+
+    def counted(*args, give=0.0, **more):
+        found = connectivity(*args, give=give, **more)
+        made.extend([found] if give == 0.0 and found.answer is Connection.SEPARATED else [])
+        return found
+
+    monkeypatch.setattr(
+        sys.modules["maneuver_automaton.bounds.separation"], "connectivity", counted
+    )
     found = plan(with_library(dead_end(4.8)), time_limit=300.0)
     assert found.status is PlanStatus.UNREACHABLE
     assert found.counts["expansions"] <= 50_000
+    assert len(made) == 1  # which the search and what follows it share
+    assert len(found.reached) == len(made[0].reached) > 0
 
 
 def test_the_widest_path_is_as_wide_as_there_is_room():

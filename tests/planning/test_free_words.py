@@ -8,7 +8,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from tests.inertia import unicycle_automaton
 from tests.search.cases import TABLE_2, compiled_only, robot

@@ -12,14 +12,14 @@ import pytest
 
 from maneuver_automaton import planning
 from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton.same_motion import Likeness
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import Condition, what_is_hit
 from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
-from maneuver_automaton.planning.result import LowerBound, PlanStatus
-from maneuver_automaton.planning.workspace import Workspace
+from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.fitting import COSTLIER, SHORT, with_lasting_coasts
 
@@ -190,6 +190,56 @@ def test_a_short_trim_is_left_out_before_a_plan_is_checked() -> None:
     stated = incumbents(replace(FREE, horizon=Horizon(min_coast=0.0)))
     assert stated.offer(driven("ahead", "slow", durations=[3.9995, 0.001]), 0)
     assert stated.plans[0].plan.durations.tolist() == [3.9995, 0.001]
+
+
+FAST = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "fast": (1.04, 0)})
+DASH = Plan([0, 0, 0], FAST.trims, durations=[3.9896, 0.01])  # costs 3.9996, and mended 4.0
+
+
+def offered_late(found: Incumbents, plan: Plan) -> None:
+    """Offer a plan when there is no time to leave out its short trims."""
+    found.longest_check, before = math.inf, found.longest_check
+    assert found.offer(plan, 0)
+    found.longest_check = before
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_a_plan_without_short_trims_goes_before_a_cheaper_one_of_its_motion(shown) -> None:
+    """But not before what was shown: that is never followed by what costs more."""
+    costs: list[float] = []
+
+    def show(make) -> None:
+        costs.append(make(bound=LowerBound(value=1.0, kind="distance")).cost)
+
+    problem = replace(FREE, automaton=FAST)
+    found = incumbents(problem, alternatives=1)
+    if shown:
+        found.budget = replace(found.budget, shows=show)
+    offered_late(found, DASH)
+    assert [one.plan for one in found.plans] == [DASH]
+    assert found.offer(replace(DASH), 0)
+    answer = found.found(bound=LowerBound(value=1.0, kind="distance"))
+    times = [3.9896, 0.01] if shown else [4.0]
+    assert answer.plan.durations.tolist() == times
+    assert answer.cost == problem.cost_of(answer.plan) == pytest.approx(sum(times), rel=1e-12)
+    assert answer.gap == (answer.cost - 1.0) / answer.cost
+    assert costs == ([answer.cost] if shown else [])
+    after = [cost for _, cost in answer.improvements]
+    assert after[-1] == answer.cost
+    assert all(b <= a for a, b in itertools.pairwise(after))
+    offered_late(found, Plan([0, 0, 0], FAST.trims, durations=[3.48, 0.5]))  # cheaper, of no short
+    assert found.found(bound=LowerBound(value=1.0, kind="distance")).cost == pytest.approx(3.98)
+    assert all(b < a for a, b in itertools.pairwise(costs))
+
+
+def test_alternatives_cost_no_less_than_the_plan() -> None:
+    found = incumbents(replace(FREE, automaton=FAST), alternatives=3)
+    found.likeness = Likeness(per_metre=0.0, heading=0.0)
+    offered_late(found, Plan([0, 0, 0], FAST.trims, durations=[4.0, 0.0]))
+    offered_late(found, DASH)
+    answer = found.found(bound=LowerBound(value=1.0, kind="distance"))
+    assert answer.cost == 4.0
+    assert answer.alternatives == ()
 
 
 def room(seed: int) -> Problem:

@@ -18,10 +18,10 @@ from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search import lattice, lattice_task
+from maneuver_automaton.search.lattice import forward_word, reversed_query
 from maneuver_automaton.search.lattice_pass import pass_of, plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import LINKED, WEIGHT, Resolution, task_of
-from maneuver_automaton.search.reversal import forward_word, reversed_query
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are
 from tests.search.cases import compiled_only

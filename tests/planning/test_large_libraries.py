@@ -16,7 +16,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Bounds, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.trim_choice import coarse_trims
+from maneuver_automaton.search.lattice_trims import coarse_trims
 from maneuver_automaton.words.library import moving_trims
 from tests.planning.test_among_obstacles import assert_moved
 from tests.search.cases import compiled_only

@@ -12,8 +12,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.planning import checking, steps
 from maneuver_automaton.planning.plan import plan_within, prepare
-from maneuver_automaton.planning.result import PlanStatus
-from maneuver_automaton.planning.workspace import workspace_of
+from maneuver_automaton.planning.result import PlanStatus, workspace_of
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from tests.inertia import unicycle_automaton
 from tests.matrix.vehicles import VEHICLES

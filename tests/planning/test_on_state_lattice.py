@@ -220,6 +220,27 @@ def test_what_was_asked_before_changes_nothing(looks_ahead):
         assert one.plan is None or other.plan.word == one.plan.word
 
 
+@pytest.mark.parametrize(("factor", "tables"), [(1.0, 1), (1.00005, 1), (1.5, 4)])
+def test_goals_a_quarter_turn_apart_share_a_table(looks_ahead, factor, tables):
+    """Where the library looks the same from all four sides; its prices may be rounded."""
+    one, *others = moves()
+    lattice = Lattice(
+        resolution=CELL,
+        headings=[k * QUARTER for k in range(4)],
+        moves=(replace(one, cost_multiplier=factor), *others),
+        turning_radius=1.0,
+    )
+    automaton = automaton_of_lattice(lattice)
+    wall = Box([0.4, 3.0], center=[1.5, 0.0])
+    planner = Planner(automaton, obstacles=wall, footprint=BODY, bounds=BOUNDS)
+    for k in range(4):
+        result = planner.plan([0, 0, 0], [3.0, 0.5, k * QUARTER])
+        assert result.cost == pytest.approx(shortest(result.problem), rel=1e-12)
+        assert result.gap == 0.0
+    graph = state_lattice.graph_of(result.problem, [0], planner.workspace.prepared)
+    assert len(graph.tables) == tables
+
+
 def test_a_table_holds_the_costs_of_plain_dijkstra():
     automaton = with_reverse()
     known = dijkstra(automaton, 7.0)

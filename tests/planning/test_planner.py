@@ -13,7 +13,7 @@ import pytest
 
 from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning import Planner, plan, workspace
+from maneuver_automaton.planning import Planner, plan, result
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import cost_to_go, lattice_library, lattice_worlds, prepared
 from tests import inertia, scenes
@@ -70,8 +70,8 @@ def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
         monkeypatch.setattr(module, name, counting)
 
     kinds = (
-        (workspace, "FclChecker"),
-        (workspace, "surroundings_around"),
+        (result, "FclChecker"),
+        (result, "surroundings_around"),
         (lattice_library, "_library"),
         (lattice_worlds, "_worlds"),
         (cost_to_go, "_kept"),

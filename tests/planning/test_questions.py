@@ -11,8 +11,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.result import PlanStatus
-from maneuver_automaton.planning.workspace import workspace_of
+from maneuver_automaton.planning.result import PlanStatus, workspace_of
 from maneuver_automaton.problem import Problem, SearchSettings
 from tests.search.cases import compiled_only
 

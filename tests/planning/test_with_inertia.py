@@ -18,7 +18,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.choose import search_insertion
 from tests.inertia import CAR, resting, unicycle_automaton
 from tests.quickly import quick_are
 

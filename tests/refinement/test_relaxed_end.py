@@ -11,7 +11,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import _Relaxation, with_relaxed_end
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
 

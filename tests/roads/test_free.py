@@ -19,7 +19,6 @@ from maneuver_automaton.roads import (
     RoadScene,
     RoadStart,
     RoadVehicle,
-    _kernels_free,
     _kernels_motion,
     drivable_area,
 )
@@ -111,7 +110,7 @@ def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
     clearance, edge = slow_clearance(states[0], control, tick)
     if edge < 0.0 and slow_clearance(states[0], np.zeros(2), tick)[1] < 0.0:
         return  # begins outside, which is never asked
-    if _kernels_free.free_ticks(CLEARING, states, tick):
+    if _kernels_motion.free_ticks(CLEARING, states, tick):
         assert clearance > 0.0
         assert edge > 0.0
     else:
@@ -121,9 +120,9 @@ def test_what_is_proven_free_is_free_and_what_is_not_is_near_something(drive):
 def test_who_is_gone_is_not_hit():
     states = states_of(36.0, 4.0, 0.4, 0.0, 0.0, [[0.0, 0.0]])
     assert slow_clearance(states[0], np.zeros(2), 20)[0] < 0.05
-    assert _kernels_free.free_ticks(CLEARING, states, 18) == 0
-    assert _kernels_free.free_ticks(CLEARING, states, 20) == 0
-    assert _kernels_free.free_ticks(CLEARING, states, 21) == 1
+    assert _kernels_motion.free_ticks(CLEARING, states, 18) == 0
+    assert _kernels_motion.free_ticks(CLEARING, states, 20) == 0
+    assert _kernels_motion.free_ticks(CLEARING, states, 21) == 1
 
 
 @pytest.mark.parametrize("control", [(-8.0, 0.4), (2.0, -0.4), (0.0, 0.0)])
@@ -159,9 +158,9 @@ def test_obstacles_are_kept_away_from_as_far_as_said(shape, off_traffic, moves):
         states = np.array([[x, 0.0, 0.0, 0.0, 0.0]] * 2)
         body = shapely.Polygon(SE2(states[0, :3]).act(VEHICLE.footprint.corners))
         apart = body.distance(outline)
-        free = _kernels_free.free_ticks(found, states, 0)
+        free = _kernels_motion.free_ticks(found, states, 0)
         assert free == (apart > off_traffic) or abs(apart - off_traffic) < 0.02
-        assert _kernels_free.free_ticks(found, states, 6) == 1 or not moves
+        assert _kernels_motion.free_ticks(found, states, 6) == 1 or not moves
 
 
 def land_of(*lanelets, last_tick=60):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.roads import RoadVehicle, _kernels_library
+from maneuver_automaton.roads import RoadVehicle, _kernels_motion
 from maneuver_automaton.roads.library import road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
 
@@ -84,7 +84,7 @@ def test_words_name_the_trims_of_the_automaton():
 
 
 def test_a_state_beside_the_grid_has_maneuvers_too():
-    found = _kernels_library.maneuvers_from(LIBRARY.limits, LIBRARY.trims, 7.37, 0.011)
+    found = _kernels_motion.maneuvers_from(LIBRARY.limits, LIBRARY.trims, 7.37, 0.011)
     assert found.target.size > 10
     np.testing.assert_allclose(
         7.37 + TICK * TICKS * found.control[:, 0], LIBRARY.trims.speed[found.target], atol=1e-12

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.formats.plan_json import write_document
+from maneuver_automaton.formats.documents import write_document
 from maneuver_automaton.formats.road_json import road_plan_to_dict
 from maneuver_automaton.models import rollout
 from maneuver_automaton.roads import RoadVehicle, plan_road

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maneuver_automaton.roads import RoadSettings, _kernels_free, _kernels_goals, road_planner
+from maneuver_automaton.roads import RoadSettings, _kernels_costs, _kernels_motion, road_planner
 from maneuver_automaton.roads.polishing import ROUNDS
 from tests.roads.files import LANES, car, parked, problem, scene_of
 
@@ -33,9 +33,9 @@ def assert_as_good(planner, plan, before):
     horizon, vehicle = planner.horizon, planner.vehicle
     assert (plan.tick, plan.lasting, plan.reaches) == (before.tick, before.lasting, True)
     states, controls = np.array(plan.states), np.array(plan.controls)
-    assert _kernels_free.free_ticks(horizon.clearing, states, plan.tick) == len(controls)
+    assert _kernels_motion.free_ticks(horizon.clearing, states, plan.tick) == len(controls)
     at_end = states[plan.lasting : plan.lasting + 1]
-    assert _kernels_goals.first_goal(horizon, at_end, plan.tick + plan.lasting) == 0
+    assert _kernels_costs.first_goal(horizon, at_end, plan.tick + plan.lasting) == 0
     assert plan.stops
     limits = vehicle.model.control_limits
     assert (controls >= limits[:, 0] - 1e-9).all()

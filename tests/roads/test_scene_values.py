@@ -123,8 +123,14 @@ def test_speed_limits_are_those_of_the_lanelets():
     ]
     goal = GoalRegion(places=(Box([10.0, 3.0], [90.0, 0.0]),), time=(0.0, 9.0))
     route = route_of(scene(lanes, goal=goal))
-    at = {round(x): limit for x, limit in zip(route.points[:, 0], route.limit, strict=True)}
+    lane, beside = route.limit[:, 24], route.limit[:, 30]
+    at = {round(x): limit for x, limit in zip(route.points[:, 0], lane, strict=True)}
     assert (at[20], at[80]) == (10.0, 20.0)
+    assert_allclose(beside[70:100], lane[70:100])  # off all lanelets: that of the route
+    lanes.append(straight(3, 4.0, speed_limit=5.0))
+    slower = route_of(scene(lanes, goal=goal)).limit
+    assert (slower[:, 24] == lane).all()
+    assert (slower[60:160, 30] == 5.0).all()
 
 
 def test_middle_and_rear_axle_are_each_others_inverse():

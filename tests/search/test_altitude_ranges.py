@@ -19,7 +19,7 @@ from maneuver_automaton.collision.layers import MOST_LAYERS, always, bands_of
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.problem import Bounds, Goal, Problem
-from maneuver_automaton.search.lattice_edges import altitude_ranges
+from maneuver_automaton.search.lattice_library import altitude_ranges
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.result import SearchStatus

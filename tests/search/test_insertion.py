@@ -26,7 +26,7 @@ from maneuver_automaton.search import (
 )
 from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.insertion import insertion_stages
+from maneuver_automaton.search.choose import insertion_stages
 from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.result import InsertionTask, TimedWord, plan_of
 from maneuver_automaton.search.setup import search_setup

@@ -11,7 +11,7 @@ from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search.insertion import search_insertion
+from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.linked_insertion import improve_linked_words
 from maneuver_automaton.search.linked_words import scan_linked_words
 from maneuver_automaton.search.result import plan_of

@@ -16,7 +16,7 @@ from maneuver_automaton.automaton.stock import load_stock_library
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.insertion import insertion_stages
+from maneuver_automaton.search.choose import insertion_stages
 from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
 from maneuver_automaton.search.result import InsertionTask, SearchStatus, plan_of
 from maneuver_automaton.search.word_setup import word_setup

@@ -12,12 +12,14 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups.chain import coasted
 from maneuver_automaton.models import Car, Unicycle
-from maneuver_automaton.search.lattice_trims import MOST_TRIMS, Chosen, trims_at_will
-from maneuver_automaton.search.trim_choice import (
+from maneuver_automaton.search.lattice_trims import (
+    MOST_TRIMS,
+    Chosen,
     at_two_paces,
     coarse_trims,
     paced_trims,
     paying_trims,
+    trims_at_will,
 )
 
 AXIS = np.round(np.linspace(-2.0, 2.0, 41), 12)

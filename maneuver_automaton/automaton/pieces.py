@@ -1,0 +1,203 @@
+"""A plan as the pieces of its word, and back: what files state, and processes send each other.
+
+Whoever has the library makes the same plan of them, to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, NotRequired
+
+import numpy as np
+from numpy.typing import ArrayLike
+from typing_extensions import TypedDict
+
+from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import samples_entry
+from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
+from maneuver_automaton.automaton.plan import Plan, Primitive
+from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+
+
+class Piece(TypedDict):
+    """A trim or a maneuver of a plan, and all about it that the library does not say."""
+
+    kind: Literal["trim", "maneuver"]
+    name: str
+    duration_s: float
+    control: NotRequired[list[float]]  # of a trim
+    source: NotRequired[str]  # of a maneuver: the trims at its ends
+    target: NotRequired[str]
+    body_velocity: NotRequired[list[float]]
+    reduced_state: NotRequired[list[float]]
+    course: NotRequired[dict[str, Any]]  # samples: time, pose, reduced_state, control
+
+
+def words_of(plan: Plan, library: Automaton) -> list[Piece]:
+    """The primitives of a plan with their durations: enough to make it again from its start.
+
+    Those that the library holds are told by their names and ends, others in full.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1.0, 0.0), "left": (0.0, 1.0)})
+    >>> plan = Plan([0, 0, 0], [robot["on"], robot["left"]], durations=[2.0, 1.0])
+    >>> words = words_of(plan, robot)
+    >>> [(one["name"], one["duration_s"]) for one in words]
+    [('on', 2.0), ('left', 1.0)]
+    >>> plan_of(plan.start, 0.0, words, robot).end.tolist()
+    [2.0, 0.0, 1.0]
+    """
+    return [
+        _piece(primitive, float(duration), library)
+        for primitive, duration in zip(plan.primitives, plan.primitive_durations, strict=True)
+    ]
+
+
+def plan_of(start: ArrayLike, time: float, words: Sequence[Piece], library: Automaton) -> Plan:
+    """The plan from a pose (dof,) at a time [s]; maneuvers are those of the library, or cut.
+
+    Raises
+    ------
+    ValueError, KeyError, TypeError
+        If a piece misses a key, or names what the library has not.
+    """
+    durations = [float(one["duration_s"]) for one in words]
+    if all(one["kind"] == "trim" for one in words) and library.is_kinematic:
+        trims = tuple(_trim(one, library) for one in words)
+        return Plan(start, trims, durations=durations, start_time=time)
+    primitives: list[Primitive] = [
+        _coasted(one, library) if one["kind"] == "trim" else _maneuver(one, library)
+        for one in words
+    ]
+    if not primitives and library.rest is not None:
+        at_rest = (library.trims[library.rest],)
+        return Plan(start, at_rest, durations=[0.0], start_time=time)
+    return Plan.of_primitives(
+        start,
+        primitives,
+        durations=durations,
+        trims=_passed(primitives, library),
+        start_time=time,
+    )
+
+
+def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
+    """A trim or maneuver by its name; with what it does if the library holds none such."""
+    if isinstance(primitive, Trim):
+        entry: Piece = {
+            "kind": "trim",
+            "name": primitive.name,
+            "control": primitive.control.tolist(),
+            "duration_s": duration,
+        }
+        known = library[primitive.name] if primitive.name in library.trim_names else None
+        if not library.is_kinematic and known is None:
+            entry["body_velocity"] = primitive.body_velocity.tolist()
+            entry["reduced_state"] = primitive.reduced_state.tolist()
+        elif library.is_kinematic and known is not None and _is_disturbed(primitive, known):
+            entry["body_velocity"] = primitive.body_velocity.tolist()
+        return entry
+    entry = {
+        "kind": "maneuver",
+        "name": primitive.name,
+        "source": primitive.source,
+        "target": primitive.target,
+        "duration_s": duration,
+    }
+    if primitive.course is not None and _in_library(entry, library) is None:
+        entry["course"] = samples_entry(primitive.course)
+    return entry
+
+
+def _is_disturbed(trim: Trim, known: Trim) -> bool:
+    """Whether a trim has another body velocity than that of the library at the same control."""
+    same = np.array_equal(trim.control, known.control)
+    return same and not np.array_equal(trim.body_velocity, known.body_velocity)
+
+
+def _passed(primitives: Sequence[Primitive], library: Automaton) -> dict[str, Trim]:
+    """Trims between maneuvers and at their ends, by name: of the library, or of a course's ends."""
+    model = library.model
+    still = np.zeros(len(model.control_names))
+    known = {trim.name: trim for trim in library.trims}
+    known |= {one.name: one for one in primitives if isinstance(one, Trim)}
+    for one in primitives:
+        if isinstance(one, Trim) or one.course is None:
+            continue
+        for name, state in ((one.source, 0), (one.target, -1)):
+            if name not in known:
+                reduced = one.course.reduced_state[state]
+                velocity = np.asarray(model.body_velocity(reduced, still))
+                known[name] = Trim(
+                    name=name, body_velocity=velocity, control=still, reduced_state=reduced
+                )
+    return known
+
+
+def _coasted(entry: Piece, library: Automaton) -> Trim:
+    """A trim of the library, or one that the piece tells all about."""
+    if entry["name"] in library.trim_names or "reduced_state" not in entry:
+        return library[entry["name"]]
+    return Trim(
+        name=entry["name"],
+        body_velocity=np.array(entry["body_velocity"]),
+        control=np.array(entry["control"]),
+        reduced_state=np.array(entry["reduced_state"]),
+    )
+
+
+def _in_library(entry: Piece, library: Automaton) -> Maneuver | None:
+    """The maneuver of the library that has the name and the ends of an entry."""
+    sought = (entry["name"], entry["source"], entry["target"])
+    return next(
+        (one for one in library.maneuvers if (one.name, one.source, one.target) == sought), None
+    )
+
+
+def _maneuver(entry: Piece, library: Automaton) -> Maneuver:
+    """The maneuver of the library, or what was left of it when the step began."""
+    one = _in_library(entry, library)
+    if one is None:
+        return _written(entry, library)
+    begun = one.duration - float(entry["duration_s"])
+    if begun <= 0.0:
+        return one
+    trims = (library[one.source], library[one.target])
+    still = np.zeros(library.model.group.dof)
+    whole = Plan(still, trims, durations=[0.0, 0.0], maneuvers=(one,))
+    rest = tail_of(with_samples_at(whole, [begun], library.model), begun)
+    assert rest.maneuvers[0] is not None
+    return rest.maneuvers[0]
+
+
+def _written(entry: Piece, library: Automaton) -> Maneuver:
+    """A maneuver whose course is written in the log."""
+    if "course" not in entry:
+        raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
+    course = entry["course"]
+    samples = Trajectory(
+        time=np.array(course["time"], dtype=np.float64),
+        pose=np.array(course["pose"], dtype=np.float64),
+        reduced_state=np.array(course["reduced_state"], dtype=np.float64),
+        control=np.array(course["control"], dtype=np.float64),
+        model=library.model,
+    )
+    return Maneuver.along(
+        samples,
+        name=entry["name"],
+        source=entry["source"],
+        target=entry["target"],
+    )
+
+
+def _trim(entry: Piece, library: Automaton) -> Trim:
+    """The trim of the library; one at another pace is made from its control."""
+    name, control = entry["name"], entry["control"]
+    if "body_velocity" in entry:
+        twist = np.array(entry["body_velocity"])
+        return Trim(name=name, body_velocity=twist, control=np.array(control))
+    if name in library.trim_names and library[name].control.tolist() == control:
+        return library[name]
+    return Automaton.of_controls(library.model, {name: control}).trims[0]

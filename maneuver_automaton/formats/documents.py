@@ -1,0 +1,376 @@
+"""Result files, each kind stated once: one reader, one writer, one error.
+
+What a kind of file holds is a TypedDict beside what writes it; pydantic checks files against it
+when they are read, and makes its JSON Schema. Those who write need neither: what they return are
+plain values. Strict JSON; numbers read back to the last bit, and what is infinite is null.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any, Final, NotRequired, cast
+
+from pydantic import AllowInfNan, Field, Strict, TypeAdapter, ValidationError
+from typing_extensions import TypedDict
+
+from maneuver_automaton._files import open_input, relative, write_text_atomically
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.yaml_source import shown, spelled
+from maneuver_automaton.models import Model
+
+SCHEMA = 1
+FLEET: Final = "fleet"  # the kind of a file of several vehicles
+KINDS = {  # of documents: where it is stated, its file, and keys without which it is none
+    "plan": ("plan_json.PlanDocument", ("status", "primitives", "trajectory")),
+    "loop": ("closed_loop_json.LoopDocument", ("reached", "steps", "step_s")),
+    "statistics": ("closed_loop_json.StatisticsDocument", ("loops",)),
+    "fleet": ("fleet_json.FleetDocument", ("status", "vehicles")),
+    "fleet-loop": ("fleet_loop_json.FleetLoopDocument", ("status", "vehicles", "steps")),
+    "road-plan": ("road_json.RoadPlanDocument", ("status", "primitives", "trajectory")),
+    "drive": ("road_json.DriveDocument", ("reached", "steps", "step_s")),
+    "road-fleet": ("road_json.RoadFleetDocument", ("status", "vehicles")),
+    "road-fleet-drive": ("road_json.RoadFleetDriveDocument", ("status", "vehicles")),
+}
+A_LINE_EACH = ("primitives", "stop", "alternatives", "steps", "broken_guarantees", "closest")
+
+
+def says(text: str) -> Any:
+    """What a key means, for the JSON Schema."""
+    return Field(description=text)
+
+
+Number = Annotated[float, Strict(), AllowInfNan(False)]
+Known = Number | None  # null where there is none, or no limit
+Whole = Annotated[int, Strict()]
+Flag = Annotated[bool, Strict()]
+Pairs = list[tuple[Number, Number]]
+
+
+class ModelEntry(TypedDict):
+    """The vehicle by name, and what the columns of a trajectory are."""
+
+    model: str
+    reduced_state: list[str]
+    control: list[str]
+
+
+class ClosestEntry(TypedDict):
+    """Two vehicles, and where they are nearest to each other."""
+
+    pair: tuple[str, str]
+    time_s: Annotated[Number, says("on the clock of all")]
+    distance_m: Number
+
+
+class ClearanceEntry(TypedDict):
+    """What is kept at least; null where there is nothing to keep clear of."""
+
+    between: Annotated[Known, says("any two vehicles")]
+    to_obstacles: Known
+
+
+SourceEntry = TypedDict(  # what a result was made from, as seen from its file
+    "SourceEntry",
+    {"file": str, "with": NotRequired[str | None], "case": NotRequired[Whole | None]},
+)
+
+
+class Document(TypedDict):
+    """What every result file has."""
+
+    schema: Annotated[Whole, says("1")]
+    version: NotRequired[Annotated[str, says("of the package that wrote it")]]
+    name: NotRequired[Annotated[str, says("of the scenario, which heads pictures")]]
+    reason: NotRequired[Annotated[str, says("why it did not end well; else empty")]]
+    notes: NotRequired[Annotated[list[str], says("what was left out, and why")]]
+    source: NotRequired[SourceEntry]
+    interrupted: NotRequired[Annotated[Flag, says("only where a signal came before the end")]]
+
+
+def number(value: float | None) -> float | None:
+    """A number for strict JSON; None where there is none, or no limit."""
+    return None if value is None or math.isinf(value) else float(value)
+
+
+def or_inf(value: float | None) -> float:
+    """A number of a file, where null is no limit."""
+    return math.inf if value is None else float(value)
+
+
+@functools.cache
+def package_version() -> str:
+    """The version of this package; "0" where it is not installed."""
+    try:
+        return metadata.version("maneuver-automaton")
+    except metadata.PackageNotFoundError:
+        return "0"
+
+
+def vehicle_entry(model: Model) -> ModelEntry:
+    """The vehicle by name, and what the columns of a trajectory are."""
+    return {
+        "model": model.name,
+        "reduced_state": list(model.reduced_names),
+        "control": list(model.control_names),
+    }
+
+
+def source_entry(source: Mapping[str, Any], path: Path) -> SourceEntry:
+    """The files that results in the file `path` were made from, as seen from it."""
+    seen = {
+        key: relative(value, path.parent) if isinstance(value, Path) else value
+        for key, value in source.items()
+    }
+    return cast("SourceEntry", seen)
+
+
+# -- reading
+
+
+def read_document(path: Path | str, *kinds: str) -> dict[str, Any]:
+    """What a plan.json, closed_loop.json or statistics.json holds, of whichever kind it is.
+
+    Parameters
+    ----------
+    path : Path or str
+    *kinds : str
+        Those that it may be, by their names in `KINDS`; any if left out.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read, is none of these, or states what it may not: file, field, value
+        met, and what would be right.
+    """
+    file = file_of(kinds[0]) if kinds else "plan.json"
+    value = parsed(path, file)
+    kind = kind_of(value) or "plan"
+    if kinds and kind not in kinds:
+        if isinstance(value, dict) and {"schema", *KINDS[kind][1]} <= value.keys():
+            whose = "several vehicles" if "fleet" in kinds[0] else "one vehicle"
+            raise InvalidScenario(f"{path}: is no {file} of {whose}")
+        kind = kinds[0]
+    return checked(kind, value, path)
+
+
+def document_if(path: Path | str, *kinds: str) -> dict[str, Any] | None:
+    """What a file holds if that is of one of these kinds; None if it is not, or cannot be read.
+
+    Raises
+    ------
+    InvalidScenario
+        If it is of such a kind, but states what it may not.
+    """
+    try:
+        value = parsed(path)
+    except InvalidScenario:
+        return None
+    kind = kind_of(value)
+    return checked(kind, value, path) if kind in kinds else None
+
+
+def parsed(path: Path | str, file: str = "plan.json") -> Any:
+    """The value of a strict JSON file; raises InvalidScenario."""
+    try:
+        with open_input(Path(path)) as stream:
+            text = stream.read().decode("utf-8")
+        return json.loads(text, parse_constant=_refuse_constant)
+    except FileNotFoundError as error:
+        raise InvalidScenario(f"{path}: no such file") from error
+    except IsADirectoryError as error:
+        raise InvalidScenario(f"{path}: is a folder, need a {file}") from error
+    except OSError as error:
+        raise InvalidScenario(f"{path}: cannot be read: {error.strerror}") from error
+    except json.JSONDecodeError as error:
+        raise InvalidScenario(f"{path}:{error.lineno}: not valid JSON: {error.msg}") from error
+    except (ValueError, RecursionError) as error:
+        raise InvalidScenario(f"{path}: not valid JSON: {error}") from error
+
+
+def _refuse_constant(word: str) -> float:
+    raise ValueError(f"{word} is no JSON")
+
+
+def kind_of(value: Any) -> str:
+    """The kind of document that the value of a file states; empty if it states none.
+
+    Examples
+    --------
+    >>> kind_of({"kind": "fleet", "steps": []}), kind_of({"loops": []}), kind_of(None)
+    ('fleet-loop', 'statistics', '')
+    """
+    keys = value.keys() if isinstance(value, dict) else set()
+    if "loops" in keys:
+        return "statistics"
+    if "kind" in keys and value["kind"] == FLEET:
+        several = {"steps": "fleet-loop", "reached": "road-fleet-drive", "alone_cost": "fleet"}
+        return next((kind for key, kind in several.items() if key in keys), "road-fleet")
+    if {"reached", "steps"} <= keys:
+        steps = value["steps"]
+        first = steps[0] if isinstance(steps, list) and steps else None
+        return "drive" if isinstance(first, dict) and "reduced_state" in first else "loop"
+    if not {"primitives", "trajectory"} & keys:
+        return ""
+    return "road-plan" if "stop" in keys else "plan"
+
+
+def file_of(kind: str) -> str:
+    """The name of the file that a kind of document is written to."""
+    if kind == "statistics":
+        return "statistics.json"
+    return "closed_loop.json" if "loop" in kind or "drive" in kind else "plan.json"
+
+
+@functools.cache
+def adapter_of(kind: str) -> TypeAdapter[Any]:
+    """What checks a kind of document, and knows its JSON Schema."""
+    module, _, name = KINDS[kind][0].partition(".")
+    return TypeAdapter(getattr(importlib.import_module(f"{__package__}.{module}"), name))
+
+
+def schema_of(kind: str) -> dict[str, Any]:
+    """The JSON Schema of a kind of document, by its name in `KINDS`.
+
+    Examples
+    --------
+    >>> schema_of("plan")["required"]
+    ['schema', 'status', 'primitives', 'trajectory']
+    """
+    return adapter_of(kind).json_schema()
+
+
+def checked(kind: str, value: Any, path: Path | str) -> dict[str, Any]:
+    """The value of a file if it is a document of this kind; `path` is its place, for messages.
+
+    Raises
+    ------
+    InvalidScenario
+        If it is none, or a key is missing, or holds what it may not: the first one.
+    """
+    needed = ("schema", *KINDS[kind][1])
+    if not isinstance(value, dict) or any(key not in value for key in needed):
+        raise InvalidScenario(
+            f"{path}: is no {file_of(kind)}, need an object with {', '.join(needed)}"
+        )
+    if value["schema"] != SCHEMA:
+        raise InvalidScenario(f"{path}: schema: got {value['schema']!r}, need {SCHEMA}")
+    try:
+        adapter_of(kind).validate_python(value)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where, words = first["loc"], first["msg"]
+        if first["type"] == "missing":
+            words = f"is missing, need {_needed(schema_of(kind), where)}"
+        else:
+            need = NEED.get(first["type"]) or words.partition(" should be ")[2]
+            words = f"got {shown(first['input'])}, need {need}"
+        raise misstated(path, where, words) from error
+    return value
+
+
+def misstated(path: Path | str, where: tuple[str | int, ...], said: str) -> InvalidScenario:
+    """The error of a field of a file: raise it."""
+    steps = (step for step in where if isinstance(step, int) or step[:1] != "<")  # tags of unions
+    return InvalidScenario(f"{path}: {spelled(tuple(steps))}: {said}")
+
+
+@contextlib.contextmanager
+def told_of(place: object) -> Iterator[None]:
+    """Name the file, or a place in it, where its values make no plan."""
+    try:
+        yield
+    except InvalidScenario:
+        raise
+    except (ValueError, KeyError, TypeError, IndexError, OverflowError, AttributeError) as error:
+        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
+        raise InvalidScenario(f"{place}: {said}") from error
+
+
+NEED = {  # by the kinds of complaint of pydantic, and by the types of JSON Schema
+    "float_type": "a finite number",
+    "finite_number": "a finite number",
+    "int_type": "a whole number",
+    "string_type": "a text",
+    "bool_type": "true or false",
+    "list_type": "a list",
+    "tuple_type": "a list",
+    "dict_type": "an object",
+    "too_short": "at least one entry",
+    "number": "a finite number",
+    "integer": "a whole number",
+    "string": "a text",
+    "boolean": "true or false",
+    "array": "a list",
+    "object": "an object",
+}
+
+
+def _needed(schema: Mapping[str, Any], where: tuple[str | int, ...]) -> str:
+    """What a key that is missing may hold, by the schema."""
+    options: list[Any] = [schema]
+    for step in where:
+        inside: list[Any] = []
+        for one in options:
+            part = schema["$defs"][one["$ref"].rpartition("/")[2]] if "$ref" in one else one
+            found = part.get("items") if isinstance(step, int) else None
+            if isinstance(step, str):
+                found = part.get("properties", {}).get(step) or part.get("additionalProperties")
+                found = part if step[:1] == "<" else found
+            if found:
+                inside += found.get("oneOf") or found.get("anyOf") or [found]
+        options = inside
+    kinds = [NEED[one["type"]] for one in options if one.get("type") in NEED]
+    return " or ".join(dict.fromkeys(kinds)) or "an object"
+
+
+# -- writing
+
+
+def write_document(
+    document: Mapping[str, Any], path: Path | str, *, interrupted: bool = False
+) -> None:
+    """Write a document in one step: strict JSON, long lists entry by entry.
+
+    Where a signal came before the work was done, the key `interrupted` says so.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    said = {**document, "interrupted": True} if interrupted else document
+    write_text_atomically(Path(path), _object(said, "") + "\n")
+
+
+def _object(document: Mapping[str, Any], left: str) -> str:
+    """An object, a key a line, `left` of which that many spaces stand."""
+    inside = left + "  "
+    rows = (
+        f"{inside}{json.dumps(key, ensure_ascii=False)}: {_json(key, value, inside)}"
+        for key, value in document.items()
+    )
+    return "{\n" + ",\n".join(rows) + f"\n{left}}}"
+
+
+def _json(key: str, value: Any, left: str) -> str:
+    """A value of the file in one line, but lists of objects one object a line, and vehicles."""
+    if key in A_LINE_EACH and value and isinstance(value, list):
+        rows = ",\n".join(f"{left}  {_json('', row, '')}" for row in value)
+        return f"[\n{rows}\n{left}]"
+    if key == "trajectory":
+        return _object(value, left)
+    if key == "vehicles":
+        inside = left + "  "
+        rows = ",\n".join(
+            f"{inside}{json.dumps(name, ensure_ascii=False)}: {_object(row, inside)}"
+            for name, row in value.items()
+        )
+        return "{\n" + rows + f"\n{left}}}"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
