@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from maneuver_automaton.formats.fleet_loop_reading import load_fleet_loop
 
 from benchmarks.fleet_loops import driven
 from maneuver_automaton import (
@@ -22,7 +21,7 @@ from maneuver_automaton import (
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
-from maneuver_automaton.formats.fleet_loop_json import save_fleet_loop
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, save_fleet_loop
 from tests.fleet.robots import (
     at_rest,
     crossing,
