@@ -332,7 +332,7 @@ def test_who_leaves_is_gone_for_all_at_the_same_time(noise):
 
 def test_who_has_inertia_drives_maneuvers_that_can_be_left():
     fleet = FleetProblem([Problem(unicycle_automaton(), [0, 0, 0], [3, 1, 0.5])], names=["a"])
-    log = simulate_fleet(fleet, step=0.5, first_time_limit=2.0)
+    log = simulate_fleet(fleet, step=0.5, first_time_limit=20.0)
     assert log.reached
     known = {one.name for one in fleet.problems[0].automaton.maneuvers}
     for step in log.steps:
