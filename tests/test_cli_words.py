@@ -118,10 +118,11 @@ def test_a_loop_whose_goal_is_blocked_says_so(capsys):
     assert printed.err.startswith("x.yaml: no_plan: the goal is blocked: ")
 
 
-def test_check_of_a_loop_of_one_vehicle_is_told(capsys):
+def test_a_loop_of_one_vehicle_is_checked_in_its_world_and_no_scenario(capsys):
     run(["mpc", "x.yaml", "--no-plot", "--quiet"])
-    for more in ([], ["--with", "x.yaml"]):
-        assert run(["check", str(Path("out/closed_loop.json")), *more]) == 2
-        assert "is a closed loop of one vehicle, which is audited" in capsys.readouterr().err
+    assert run(["check", str(Path("out/closed_loop.json"))]) == 2
+    assert "need --with" in capsys.readouterr().err
+    assert run(["check", str(Path("out/closed_loop.json")), "--with", "x.yaml"]) == 0
+    capsys.readouterr()
     assert run(["plan", str(Path("out/closed_loop.json"))]) == 2
     assert capsys.readouterr().err.endswith(":1: is a closed loop, need a scenario\n")
