@@ -32,7 +32,7 @@ def test_a_picture_carries_the_name_of_its_scenario_unless_told_otherwise(tmp_pa
     from maneuver_automaton import plotting
 
     looks = []
-    monkeypatch.setattr(plotting, "save_closed_loop_figure", lambda *_, look: looks.append(look))
+    monkeypatch.setattr(plotting, "save_picture", lambda *_, look: looks.append(look))
     loop = ["mpc", str(SCENARIOS / "parking_loop.yaml"), "--out", str(tmp_path), "--quiet"]
     for more in ([], ["--title", "A loop"], ["--style", "paper"]):
         assert run([*loop, *more]) == 0

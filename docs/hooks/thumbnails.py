@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
+
+from maneuver_automaton import plotting
 
 ROOT = Path(__file__).parents[2]
 FOLDER = "pictures/thumbnails"  # in docs
@@ -29,7 +31,7 @@ def thumbnail(value: Any, path: Path) -> None:
     """Write the thumbnail of a plan, a closed loop, or those of several vehicles."""
     figure = Figure(figsize=SIZE_IN, dpi=DPI)
     ax = figure.add_axes((0.0, STRIP, 1.0, 1.0 - STRIP))
-    _drawing(value)(ax)
+    plotting.draw_plane(ax, value, legend=False)
     ax.set_axis_off()
     _scale(figure, ax)
     drawn = io.BytesIO()
@@ -37,24 +39,6 @@ def thumbnail(value: Any, path: Path) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     few = Image.open(drawn).convert("RGB").quantize(256, method=Image.Quantize.MAXCOVERAGE)
     few.save(path, optimize=True)
-
-
-def _drawing(value: Any) -> Callable[[Axes], Any]:
-    """What draws a value in the plane."""
-    from maneuver_automaton import plotting
-    from maneuver_automaton.fleet import FleetLog, FleetResult
-    from maneuver_automaton.plotting.fleet_cast import cast_of
-    from maneuver_automaton.plotting.fleet_loop_cast import loop_cast_of
-    from maneuver_automaton.plotting.fleet_plane import draw_fleet_plane
-    from maneuver_automaton.receding_horizon import ClosedLoop
-
-    if isinstance(value, FleetResult):
-        return lambda ax: draw_fleet_plane(ax, cast_of(value))
-    if isinstance(value, FleetLog):
-        return lambda ax: draw_fleet_plane(ax, loop_cast_of(value))
-    if isinstance(value, ClosedLoop):
-        return lambda ax: plotting.draw_closed_loop(ax, value, legend=False)
-    return lambda ax: plotting.draw_plan(ax, value.plan, problem=value.problem, legend=False)
 
 
 def _scale(figure: Figure, ax: Axes) -> None:

@@ -16,19 +16,14 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import draw_motions as draw_motions
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
-    from maneuver_automaton.plotting.controls import draw_altitude as draw_altitude
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
     from maneuver_automaton.plotting.factors import draw_factor as draw_factor
     from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
     from maneuver_automaton.plotting.films import film_of as film_of
     from maneuver_automaton.plotting.films import save_film as save_film
-    from maneuver_automaton.plotting.footprint import footprint_polygons as footprint_polygons
-    from maneuver_automaton.plotting.labels import control_labels as control_labels
     from maneuver_automaton.plotting.look import Look as Look
     from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
-    from maneuver_automaton.plotting.motions import track_colors as track_colors
-    from maneuver_automaton.plotting.nodes import draw_nodes as draw_nodes
     from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
     from maneuver_automaton.plotting.pictures import figure_of as figure_of
     from maneuver_automaton.plotting.pictures import save_picture as save_picture
@@ -45,19 +40,14 @@ _HOMES = {
     "draw_motions": "automata",
     "save_automaton_figure": "automata",
     "trim_colors": "colors",
-    "draw_altitude": "controls",
     "draw_controls": "controls",
     "draw_factor": "factors",
     "save_factor_figure": "factors",
     "film_of": "films",
     "save_film": "films",
-    "footprint_polygons": "footprint",
-    "control_labels": "labels",
     "Look": "look",
     "draw_maneuvers": "maneuvers",
     "save_maneuvers_figure": "maneuvers",
-    "track_colors": "motions",
-    "draw_nodes": "nodes",
     "draw_obstacles": "obstacles",
     "figure_of": "pictures",
     "save_picture": "pictures",

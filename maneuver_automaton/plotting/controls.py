@@ -117,45 +117,6 @@ def draw_track_controls(
     return drawn
 
 
-def draw_altitude(
-    ax: Axes, plan: Plan, *, colors: Mapping[str, Color] | None = None
-) -> StepArtists:
-    """Draw the altitude of a `plan` in SE(2) x R over time.
-
-    Raises
-    ------
-    ValueError
-        If the plan lies in the plane.
-    """
-    track = track_of_plan(plan)
-    used = dict(track_colors(track.twists) if colors is None else colors)
-    return draw_track_altitude(ax, track, colors=used)
-
-
-def draw_track_altitude(ax: Axes, track: Track, *, colors: Mapping[str, Color]) -> StepArtists:
-    """Draw the altitude of a `track`; see `draw_altitude`."""
-    if track.start.size < 4:
-        raise ValueError("altitude: the plan lies in the plane, need poses with a z")
-    curves = [np.stack([piece.time, piece.pose[:, 3]], axis=-1) for piece in track.pieces]
-    return draw_over_time(ax, track, curves, label="z [m]", colors=colors)
-
-
-def draw_track_states(
-    axes: Sequence[Axes], track: Track, *, labels: Sequence[str], colors: Mapping[str, Color]
-) -> tuple[StepArtists, ...]:
-    """Draw the first components of the reduced state of a `track` over time, one on each axes."""
-    return tuple(
-        draw_over_time(
-            ax,
-            track,
-            [np.stack([piece.time, piece.state[:, k]], axis=-1) for piece in track.pieces],
-            label=label,
-            colors=colors,
-        )
-        for k, (ax, label) in enumerate(zip(axes, labels, strict=True))
-    )
-
-
 def step_curves(track: Track, k: int) -> list[Array]:
     """Control `k` over time, corners (n, 2) of its steps for each piece."""
     return [_steps(piece, k) for piece in track.pieces]

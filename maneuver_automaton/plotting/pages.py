@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import textwrap
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ VECTOR: Any = {
 UNDATED: dict[str, dict[str, Any]] = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}
 PLANE = 0.57  # share of the width that the plane has beside what is over time
 FLAT = 1.7  # a plane so much wider than high is given the width of the page
-LOW, HIGH, LEAST_PLANE = 3.6, 5.6, 1.2  # [in] height of the plane
+LOW, HIGH, LEAST_PLANE = 3.6, 5.6, 0.8  # [in] height of the plane
 PANEL, LEAST_PANEL, COLUMN = 1.15, 0.55, 2.15  # [in] heights over time, and the least width
 TICKS, LABEL, EDGE = 0.2, 0.4, 0.12  # [in] of numbers, of numbers and a label, and of the page
 FIRST = 4.0  # [in] height of a page before it is known
@@ -255,14 +256,24 @@ def _legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[st
         fontsize=SMALL_PT, borderpad=0.0, handlelength=1.8, columnspacing=1.6, labelspacing=0.45,
     )  # fmt: skip
     plain(legend, labels)
-    return float(legend.get_window_extent().height / figure.dpi)
+    with any_script():
+        return float(legend.get_window_extent().height / figure.dpi)
+
+
+@contextlib.contextmanager
+def any_script() -> Iterator[None]:
+    """No warning of a trim that is named in a script which the font lacks."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        yield
 
 
 def settled(figure: Figure) -> Figure:
     """The figure laid out once, so that what moves later moves no axes."""
     engine = figure.get_layout_engine()
     if engine is not None:
-        engine.execute(figure)
+        with any_script():
+            engine.execute(figure)
         figure.set_layout_engine("none")
     return figure
 
@@ -280,9 +291,7 @@ def write_figure(figure: Figure, path: str | Path) -> None:
     target = Path(path)
     ending = target.suffix.lstrip(".").lower() or "png"
     stream = io.BytesIO()
-    with warnings.catch_warnings(), rc_context(VECTOR):
-        # a trim may be named in a script that the font lacks
-        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+    with any_script(), rc_context(VECTOR):
         if ending == "png":
             # a fast level: the size of the file hardly depends on it, the time does
             figure.savefig(stream, format="png", dpi=DPI, pil_kwargs={"compress_level": 2})

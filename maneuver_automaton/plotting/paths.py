@@ -66,7 +66,7 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
         "halo": LineCollection(
             lines, colors=["white"], linewidths=4.0, capstyle="butt", joinstyle="round", zorder=2.9
         ),
-        "swept": _swept_area(track, scene),
+        "swept": swept_area(track, scene),
         "spins": LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
         "spin_heads": PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
         "moments": _moment_bodies(track, scene),
@@ -188,7 +188,7 @@ def _spin_symbols(spins: list[Piece], *, size: float) -> tuple[list[Array], list
     return arcs, heads
 
 
-def _swept_area(track: Track, scene: Scene) -> PathCollection:
+def swept_area(track: Track, scene: Scene) -> PathCollection:
     """Area that the body covers along a track; empty where the body is not known."""
     region = swept_region(track, scene.body) if scene.body and track.pieces else []
     carried = [swept_region(part.track, part.body) for part in scene.carried]

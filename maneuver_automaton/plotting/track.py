@@ -165,8 +165,8 @@ def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
     """Track of one plan after the other; a trim that goes on in the next plan is one piece."""
     pieces: list[Piece] = []
     for plan in plans:
-        for piece in track_of_plan(plan).pieces:
-            if pieces and _goes_on(pieces[-1], piece):
+        for k, piece in enumerate(track_of_plan(plan).pieces):
+            if k == 0 and pieces and _goes_on(pieces[-1], piece):
                 pieces[-1] = _one_piece(pieces[-1], piece)
             else:
                 pieces.append(piece)

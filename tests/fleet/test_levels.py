@@ -33,9 +33,10 @@ from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
-from maneuver_automaton.plotting.fleet_cast import cast_of
-from maneuver_automaton.plotting.fleet_distances import nearest_others
+from maneuver_automaton.plotting.cast import cast_of
+from maneuver_automaton.plotting.distances import nearest_others
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import car
 from tests.matrix.vehicles import VEHICLES
@@ -212,7 +213,7 @@ def test_pictures_show_the_distance_in_space():
     results = {name: replace(one, plan=plan) for name, plan in plans.items()}
     result = FleetResult(problem=fleet, status=FleetStatus.FOUND, results=results)
     times = np.arange(0.0, 12.0, 0.01)
-    shown = nearest_others(cast_of(result).members, times)
+    shown = nearest_others(cast_of(recording_of(result)).actors, times)
     assert shown.min() == pytest.approx(least_in_space(fleet, plans))
     assert shown.min() == pytest.approx(2.5 - 1.5 - 0.3)
 

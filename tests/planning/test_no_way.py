@@ -16,7 +16,7 @@ from maneuver_automaton.planning.no_way import (
     too_long,
     with_proof,
 )
-from maneuver_automaton.plotting import save_plan_figure
+from maneuver_automaton.plotting import save_picture
 from tests.bounds.scenes import bend, gap
 from tests.bounds.test_cell_bound import WALL, among
 
@@ -34,7 +34,7 @@ def test_a_plan_for_a_gap_that_is_too_narrow_does_not_exist(tmp_path):
     assert written["status"] == "unreachable"
     assert written["narrowest"]["place"] == pytest.approx([10.0, 0.0], abs=0.5)
     assert written["narrowest"]["missing_m"] == pytest.approx(0.3, rel=0.2)
-    save_plan_figure(result, tmp_path / "plan.png")
+    save_picture(result, tmp_path / "plan.png")
     assert (tmp_path / "plan.png").stat().st_size > 1000
 
 

@@ -99,9 +99,9 @@ def slalom_problem(plan, **more):
     return Problem(ROBOT, plan.start, goal, obstacles=obstacles, footprint=footprint, **more)
 
 
-def result_of(plan, *, others=()):
+def result_of(plan, *, others=(), problem=None):
     return PlanResult(
-        problem=Problem(ROBOT, plan.start, plan.end, cost=Cost(effort=1.0)),
+        problem=problem or Problem(ROBOT, plan.start, plan.end, cost=Cost(effort=1.0)),
         status=PlanStatus.FOUND,
         reason="",
         plan=plan,

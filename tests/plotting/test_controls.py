@@ -5,10 +5,13 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from maneuver_automaton.plotting import draw_altitude, draw_controls, draw_plan
-from maneuver_automaton.plotting.controls import draw_track_controls, draw_track_states
-from maneuver_automaton.plotting.track import track_of_document
-from tests.plotting.cases import document_of, flight_plan, parking_plan, plan_of
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.plotting import draw_controls, draw_plane, figure_of
+from maneuver_automaton.plotting.colors import INK
+from maneuver_automaton.plotting.controls import draw_over_time
+from maneuver_automaton.plotting.track import Track
+from maneuver_automaton.primitives import Trim
+from tests.plotting.cases import flight_plan, parking_plan, plan_of
 
 
 def test_controls_are_steps_between_the_switching_times():
@@ -28,7 +31,7 @@ def test_controls_are_steps_between_the_switching_times():
 def test_the_colours_are_those_of_the_path():
     plan = plan_of(["straight", "clockwise"], [1.0, 2.0])
     axes = Figure().subplots(3, 1)
-    path = draw_plan(axes[0], plan).path
+    path = draw_plane(axes[0], plan)["path"]
     for artists in draw_controls(axes[1:], plan):
         assert [to_rgb(c) for c in artists.steps.get_colors()] == [
             to_rgb(c) for c in path.get_colors()
@@ -66,30 +69,16 @@ def test_a_plan_without_motion_leaves_empty_axes():
     axes[0].figure.canvas.draw()
 
 
-def test_a_maneuver_has_a_step_for_each_change():
-    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
-    document["trajectory"]["control"] = [[0, 0], [1, 0], [1, 0], [3, 0], [3, 0]]
-    track = track_of_document(document)
-    speed, _ = draw_track_controls(
-        Figure().add_subplot(), track, labels=(), colors={"straight": (0.0, 0.0, 0.0)}
-    )
-    np.testing.assert_allclose(
-        speed.steps.get_segments()[0],
-        [[0, 0], [0.25, 0], [0.25, 1], [0.75, 1], [0.75, 3], [1, 3]],
-    )
-
-
 def test_the_altitude_is_a_line_over_time():
-    ax = Figure().add_subplot()
-    artists = draw_altitude(ax, flight_plan())
-    ends = np.array([segment[[0, -1]] for segment in artists.steps.get_segments()])
+    figure = figure_of(flight_plan())
+    (lines,) = [
+        artist.get_segments()
+        for artist in figure.axes[-1].collections
+        if artist.get_linewidth()[0] == 2.4
+    ]
+    ends = np.array([segment[[0, -1]] for segment in lines])
     np.testing.assert_allclose(ends, [[[0, 0], [3, 6]], [[3, 6], [7, 10]], [[7, 10], [12, 2.5]]])
-    assert ax.get_ylabel() == "z [m]"
-
-
-def test_a_planar_plan_has_no_altitude():
-    with pytest.raises(ValueError, match="lies in the plane"):
-        draw_altitude(Figure().add_subplot(), parking_plan())
+    assert figure.axes[-1].get_ylabel() == "z [m]"
 
 
 def test_axes_and_labels_must_match_the_controls():
@@ -100,11 +89,9 @@ def test_axes_and_labels_must_match_the_controls():
 
 
 def test_values_that_hardly_vary_are_a_line_above_zero_without_an_offset():
-    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
-    document["trajectory"]["control"] = [[2.99999 + 1e-6 * k, 1e6 + k] for k in range(5)]
     axes = Figure().subplots(2, 1)
-    colors = {"straight": (0.0, 0.0, 0.0)}
-    draw_track_controls(axes, track_of_document(document), labels=(), colors=colors)
+    ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[2.99999, 1e6 + 3.0])
+    draw_controls(axes, Plan(np.zeros(3), (ahead,), durations=[1.0]))
     axes[0].figure.canvas.draw()
     for ax in axes:
         assert ax.yaxis.get_offset_text().get_text() == ""
@@ -122,14 +109,6 @@ def test_so_many_switches_that_lines_would_hide_the_steps_have_none():
 
 def test_a_label_longer_than_its_axes_is_in_lines():
     column = Figure(figsize=(4.0, 5.0)).subplots(4, 1)
-    draw_track_states(
-        column[:1], track_of_document(_with_state()), labels=["angular acceleration [rad/s²]"],
-        colors={"straight": (0.0, 0.0, 0.0)},
-    )  # fmt: skip
+    label = "angular acceleration [rad/s²]"
+    draw_over_time(column[0], Track(np.zeros(3), ()), [], label=label, colors=INK)
     assert "\n" in column[0].get_ylabel()
-
-
-def _with_state():
-    document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
-    document["trajectory"]["reduced_state"] = [[0.1 * k] for k in range(5)]
-    return document

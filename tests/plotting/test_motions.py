@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from maneuver_automaton.plotting import draw_plane
 from maneuver_automaton.plotting.colors import twist_color
 from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
-from maneuver_automaton.plotting.paths import draw_plan
 from tests.plotting.cases import plan_of_trims
 
 GRID = {
@@ -30,7 +30,9 @@ def test_of_those_that_move_alike_the_faster_is_darker():
 
 
 def test_the_legend_of_a_long_plan_is_short_and_has_no_name_twice():
-    legend = draw_plan(Figure().add_subplot(), plan_of_trims(3 * MOST_TRIMS)).legend
+    ax = Figure().add_subplot()
+    draw_plane(ax, plan_of_trims(3 * MOST_TRIMS))
+    legend = ax.get_legend()
     names = [text.get_text() for text in legend.get_texts()]
     assert names == ["ahead, turning left, 1 m/s", "start", "goal"]
 

@@ -9,12 +9,13 @@ import shapely
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.bodies import swept_area
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.paths import swept_area
 from maneuver_automaton.plotting.scene import plan_scene
 from maneuver_automaton.plotting.swept import swept_region
-from maneuver_automaton.plotting.track import Piece, Track, track_of_document, track_of_plan
+from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
 from maneuver_automaton.scenario import load_scenario
 from tests.plotting.cases import document_of, parking_plan, plan_of
 
@@ -59,7 +60,7 @@ def test_every_pose_on_the_way_is_covered(body):
 
 def test_a_file_sweeps_what_its_plan_sweeps():
     plan = parking_plan()
-    there = track_of_document(document_of(plan))
+    there = track_of_plan(plan_of_document(document_of(plan)))
     areas = [
         shapely.union_all(swept_region(track, CAR)).area for track in (there, track_of_plan(plan))
     ]

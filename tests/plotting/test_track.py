@@ -3,14 +3,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.plotting.colors import trim_colors
-from maneuver_automaton.plotting.track import track_of_document, track_of_plan
+from maneuver_automaton.plotting.track import track_of_plan
 from tests.plotting.cases import document_of, flight_plan, parking_plan, plan_of, plan_of_trims
 
 
 @pytest.mark.parametrize("plan", [parking_plan(), flight_plan(), plan_of_trims(12)])
 def test_a_file_gives_the_track_of_its_plan(plan):
-    of_plan, of_file = track_of_plan(plan), track_of_document(document_of(plan))
+    of_plan, of_file = track_of_plan(plan), track_of_plan(plan_of_document(document_of(plan)))
     assert [piece.name for piece in of_file.pieces] == [piece.name for piece in of_plan.pieces]
     np.testing.assert_allclose(of_file.switching_times, of_plan.switching_times)
     np.testing.assert_allclose(of_file.switching_poses, plan.switching_poses, atol=1e-12)
@@ -28,7 +29,7 @@ def test_a_file_gives_the_track_of_its_plan(plan):
 def test_trims_of_no_duration_are_left_out():
     plan = plan_of(["straight", "spin", "straight"], [1.0, 0.0, 2.0])
     assert [piece.name for piece in track_of_plan(plan).pieces] == ["straight", "straight"]
-    assert [piece.name for piece in track_of_document(document_of(plan)).pieces] == [
+    assert [piece.name for piece in track_of_plan(plan_of_document(document_of(plan))).pieces] == [
         "straight",
         "straight",
     ]
@@ -37,36 +38,25 @@ def test_trims_of_no_duration_are_left_out():
 def test_the_origin_of_a_file_is_added():
     document = document_of(parking_plan())
     document["trajectory"]["origin"] = [4e6, -5.0]
-    track = track_of_document(document)
+    track = track_of_plan(plan_of_document(document))
     np.testing.assert_allclose(track.start, [4e6, -4.0, 0.0])
-
-
-def test_a_file_without_a_trajectory_has_no_track():
-    document = document_of(parking_plan())
-    document["trajectory"] = {key: [] for key in document["trajectory"]}
-    assert track_of_document(document) is None
 
 
 def test_a_maneuver_in_a_file_keeps_its_varying_control():
     document = document_of(plan_of(["straight"], [1.0]), rate=4.0)
-    document["primitives"][0]["kind"] = "maneuver"
+    document["primitives"][0] |= {"kind": "maneuver", "source": "rest", "target": "rest"}
     document["trajectory"]["control"] = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [9.0, 0.0]]
-    (piece,) = track_of_document(document).pieces
+    (piece,) = track_of_plan(plan_of_document(document)).pieces
     assert piece.control[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 3.0]
-
-
-def test_columns_of_different_length_are_refused():
-    document = document_of(parking_plan())
-    document["trajectory"]["pose"].pop()
-    with pytest.raises(ValueError, match="poses for"):
-        track_of_document(document)
 
 
 def maneuver_of(plan, *, name):
     """The file of a plan in which all of it is one maneuver."""
     document = document_of(plan, rate=50.0)
-    document["primitives"] = [{"kind": "maneuver", "name": name, "duration_s": plan.duration}]
-    return track_of_document(document)
+    ends = {"source": "rest", "target": "rest"}
+    entry = {"kind": "maneuver", "name": name, "duration_s": plan.duration}
+    document["primitives"] = [entry | ends]
+    return track_of_plan(plan_of_document(document))
 
 
 def test_a_long_motion_is_told_apart_by_gear_and_turn():

@@ -23,7 +23,7 @@ from tests.matrix.vehicles import Vehicle
 def _draw(result: PlanResult, path: Path) -> None:
     from maneuver_automaton import plotting
 
-    plotting.save_plan_figure(result, path)
+    plotting.save_picture(result, path)
 
 
 def _blank(_: PlanResult, path: Path) -> None:

@@ -1,0 +1,537 @@
+"""Pictures of every kind of result, as files and as figures."""
+
+from __future__ import annotations
+
+import dataclasses
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from PIL import Image
+
+from maneuver_automaton.collision import Box, Disc
+from maneuver_automaton.fleet import FleetProblem, simulate_fleet
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.plotting import Look, draw_plane, figure_of, player_of, save_picture
+from maneuver_automaton.plotting.cast import cast_of
+from maneuver_automaton.plotting.colors import fleet_colors
+from maneuver_automaton.plotting.distances import distance_times, nearest_others, thinned
+from maneuver_automaton.plotting.over_time import draw_bars, draw_distances
+from maneuver_automaton.plotting.pages import DPI
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.receding_horizon import Disturbance
+from maneuver_automaton.recording import recording_of
+from maneuver_automaton.recording.plans import stated
+from tests.fleet import robots
+from tests.plotting.cases import (
+    ROBOT,
+    assert_picture,
+    document_of,
+    flight_plan,
+    parking_plan,
+    plan_of,
+    plan_of_trims,
+    result_of,
+    slalom_problem,
+)
+from tests.plotting.fleets import answer, crossing, fleet_of, no_answer, row_of
+from tests.plotting.loops import (
+    LOOPS,
+    flight_loop,
+    helpless_loop,
+    parking_loop,
+    pushed_loop,
+    straight_loop,
+    unfinished_loop,
+)
+from tests.quickly import quick_are
+
+CAR = Box([0.9, 0.5], [0.2, 0.0])
+NOISE = Disturbance(position_m=0.01, heading_rad=0.01)
+NOBODY = fleet_of([no_answer([0, 0, 0], [1, 0, 0])], names=["a"])
+
+
+def with_body(plan, body):
+    return result_of(plan, problem=Problem(ROBOT, plan.start, plan.end, footprint=body))
+
+
+def of_body(loop, body):
+    return dataclasses.replace(loop, problem=dataclasses.replace(loop.problem, footprint=body))
+
+
+def drawn(result):
+    ax = Figure().add_subplot()
+    return ax, draw_plane(ax, result)
+
+
+def legend_of(figure):
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def texts_of(figure):
+    return [text.get_text() for text in figure.texts]
+
+
+def boxes_of(figure):
+    """Places of all axes with their labels, and of the legend, once it is laid out [px]."""
+    figure.canvas.draw()
+    inner = [ax.get_tightbbox() for ax in figure.axes]
+    return inner, [legend.get_window_extent() for legend in figure.legends]
+
+
+class TestFiles:
+    @pytest.mark.parametrize("body", quick_are([CAR], [(), CAR, [Disc(0.2), CAR]]))
+    @pytest.mark.parametrize(
+        "plan",
+        [
+            parking_plan(),
+            plan_of([], []),
+            plan_of(["rest"], [8.0]),
+            plan_of(["spin"], [2.0]),
+            plan_of_trims(12),
+            plan_of(["straight", "clockwise"] * 40, [0.5] * 80),
+        ],
+    )
+    def test_plans_are_written(self, plan, body, tmp_path):
+        save_picture(with_body(plan, body), tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+
+    def test_a_result_without_a_plan_is_written(self, tmp_path):
+        result = PlanResult(
+            problem=Problem(ROBOT, [0, 0, 0], [3, 1, 0]),
+            status=PlanStatus.OUT_OF_BUDGET,
+            reason="no plan within 5 s",
+        )
+        save_picture(result, tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+        with pytest.raises(ValueError, match="holds no plan: no plan within 5 s"):
+            save_picture(result, tmp_path / "alternatives.png", view="alternatives")
+
+    @pytest.mark.parametrize("goal", ["reached", "several", "free heading"])
+    def test_scenes_are_written(self, goal, tmp_path):
+        plan = parking_plan()
+        goals = {
+            "reached": plan.end,
+            "several": [Goal(pose=plan.end, tolerance_m=0.1), Goal(pose=[2.0, 0.0, 1.0])],
+            "free heading": Goal(pose=plan.end, free_heading=True),
+        }
+        problem = slalom_problem(plan, goal=goals[goal])
+        save_picture(result_of(plan, problem=problem), tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("columns", [3, 4])
+    def test_expanded_nodes_are_drawn_if_they_are_known(self, columns, tmp_path):
+        nodes = np.random.default_rng(1).normal(size=(200, columns))
+        result = dataclasses.replace(result_of(parking_plan()), nodes=nodes)
+        save_picture(result, tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+
+    @pytest.mark.parametrize("name", quick_are(["parking", "empty", "straight"], LOOPS))
+    def test_loops_are_written(self, name, tmp_path):
+        save_picture(LOOPS[name](), tmp_path / "loop.png")
+        assert_picture(tmp_path / "loop.png")
+
+    @pytest.mark.parametrize("result", [row_of(30), NOBODY])
+    def test_any_number_is_written(self, tmp_path, result):
+        save_picture(result, tmp_path / "fleet.png")
+        assert_picture(tmp_path / "fleet.png")
+
+    @pytest.mark.parametrize("plan", [parking_plan(), plan_of_trims(50), flight_plan()])
+    def test_files_are_drawn_without_anything_else(self, plan, tmp_path):
+        save_picture(stated(document_of(plan), plan), tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+
+    def test_a_file_without_a_plan_is_drawn(self, tmp_path):
+        document = document_of(parking_plan())
+        document |= {"status": "no_plan", "reason": "all tried", "cost": None}
+        save_picture(stated(document, None), tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+
+    @pytest.mark.slow
+    @pytest.mark.parametrize("count", [0, 1, 12])
+    def test_alternatives_are_written(self, count, tmp_path):
+        words = [plan_of(["spin", "straight", "spin"], [0.5 + 0.2 * k, 1, 1]) for k in range(count)]
+        result = result_of(parking_plan(), others=words)
+        save_picture(result, tmp_path / "alternatives.png", view="alternatives")
+        assert_picture(tmp_path / "alternatives.png")
+
+    @pytest.mark.slow
+    def test_the_same_result_gives_the_same_bytes_and_text_stays_text(self, tmp_path):
+        result = result_of(parking_plan(), problem=slalom_problem(parking_plan()))
+        for name in ("plan.pdf", "again.pdf", "plan.svg", "plan.png", "again.png"):
+            save_picture(result, tmp_path / name)
+        for ending in ("pdf", "png"):
+            one, other = (tmp_path / f"{name}.{ending}" for name in ("plan", "again"))
+            assert one.read_bytes() == other.read_bytes()
+        pdf = (tmp_path / "plan.pdf").read_bytes()
+        assert pdf.startswith(b"%PDF")
+        assert b"/CIDFontType2" in pdf  # a Type 42 font, in the words of PDF
+        assert b"/Type3" not in pdf
+        assert "turn rate [rad/s]</text>" in (tmp_path / "plan.svg").read_text(encoding="utf-8")
+
+    def test_an_old_file_is_replaced_whole_or_not_at_all(self, tmp_path):
+        path = tmp_path / "plan.png"
+        path.write_bytes(b"old")
+        save_picture(result_of(parking_plan()), path)
+        assert_picture(path)
+        other = tmp_path / "plan.nonsense"
+        other.write_bytes(b"old")
+        with pytest.raises(ValueError, match="nonsense"):
+            save_picture(result_of(parking_plan()), other)
+        assert other.read_bytes() == b"old"
+
+    def test_names_in_any_script_raise_no_warning(self, tmp_path):
+        plan = parking_plan()
+        trims = tuple(
+            dataclasses.replace(trim, name=name)
+            for trim, name in zip(plan.trims, ["日本語", "$x_1", "_hidden", "a" * 200], strict=True)
+        )
+        save_picture(result_of(dataclasses.replace(plan, trims=trims)), tmp_path / "plan.png")
+        assert_picture(tmp_path / "plan.png")
+
+    def test_what_is_no_result_or_no_view_is_refused(self):
+        with pytest.raises(TypeError, match="recording: got int"):
+            figure_of(3)
+        with pytest.raises(ValueError, match="need one of plane, space, alternatives"):
+            figure_of(parking_plan(), view="aside")
+
+
+class TestPages:
+    @pytest.mark.parametrize(
+        "look",
+        quick_are(
+            [Look(size=(3.5, None), style="paper"), Look(size=(9.0, 2.6))],
+            [
+                Look(size=(3.5, None), style="paper"),
+                Look(size=(7.16, 4.0), style="paper"),
+                Look(size=(12.0, 6.0), title="Parking"),
+                Look(size=(9.0, 2.6)),  # nothing has room but the plane
+                Look(),
+            ],
+        ),
+    )
+    @pytest.mark.parametrize(
+        "make", [lambda: result_of(parking_plan()), pushed_loop, crossing, lambda: row_of(20)]
+    )
+    def test_a_page_has_its_size_and_nothing_overlaps(self, make, look, tmp_path):
+        save_picture(make(), tmp_path / "plan.png", look=look)
+        assert_picture(tmp_path / "plan.png")
+        with Image.open(tmp_path / "plan.png") as image:
+            wide, high = image.size
+        assert wide == pytest.approx(DPI * look.width, abs=1.0)
+        if look.height is not None:
+            assert high == pytest.approx(DPI * look.height, abs=2.0)
+        figure = figure_of(make(), look=look)
+        axes, legends = boxes_of(figure)
+        inner = [box.padded(-1.0) for box in (*axes, *legends)]
+        assert not any(one.overlaps(other) for one, other in combinations(inner, 2))
+        page = figure.bbox
+        for box in (*axes, *legends):
+            assert page.x0 <= box.x0 < box.x1 <= page.x1
+            assert page.y0 <= box.y0 < box.y1 <= page.y1
+
+    def test_the_title_comes_first_and_stands_alone_in_a_paper(self):
+        def said(look):
+            return texts_of(figure_of(result_of(parking_plan()), look=look))
+
+        assert said(Look(title="Parking"))[0] == "Parking"
+        assert said(Look(title="Parking"))[1].startswith("cost 9.75")
+        assert said(Look(title="Parking", style="paper")) == ["Parking"]
+        assert said(Look(style="paper")) == []
+
+    @pytest.mark.parametrize(
+        ("wrong", "message"),
+        [
+            ({"style": "poster"}, "need one of screen, paper"),
+            ({"size": (0.5, None)}, "size: got 0.5 in, need from 2.5 to 40 in"),
+            ({"size": (5.0, float("nan"))}, "size: got nan in"),
+        ],
+    )
+    def test_a_look_that_cannot_be_is_refused(self, wrong, message):
+        with pytest.raises(ValueError, match=message):
+            Look(**wrong)
+
+    def test_a_flat_scene_takes_little_height_of_a_column(self):
+        look = Look(size=(3.5, None), style="paper")
+        figure = figure_of(with_body(plan_of(["straight"], [20.0]), CAR), look=look)
+        axes, _ = boxes_of(figure)
+        plane, *over_time = (box.height / figure.dpi for box in axes)
+        assert plane < 2.0 < plane + min(over_time)
+
+    def test_a_polished_motion_is_never_called_polished_alone(self):
+        plan = parking_plan()
+        trims = tuple(dataclasses.replace(trim, name="polished") for trim in plan.trims)
+        figure = figure_of(result_of(dataclasses.replace(plan, trims=trims)))
+        words = [*texts_of(figure), *legend_of(figure)]
+        assert any("polished motion" in word for word in words)
+        assert "polished" not in words
+
+
+class TestLoops:
+    def test_a_trim_that_goes_on_is_drawn_once(self):
+        loop = parking_loop()
+        track = cast_of(recording_of(loop)).actors[0].track
+        assert [piece.name for piece in track.pieces] == ["clockwise", "straight", "spin", "rest"]
+        assert np.allclose(track.end, loop.poses[-1], atol=1e-9)
+        _, artists = drawn(loop)
+        assert len(artists["path"].get_segments()) == 2
+        assert len(artists["spins"].get_segments()) == 1
+
+    def test_the_path_is_where_the_vehicle_was(self):
+        loop = straight_loop()
+        _, artists = drawn(loop)
+        corners = np.concatenate(artists["path"].get_segments())
+        assert np.allclose(corners[[0, -1]], loop.poses[[0, -1], :2], atol=1e-9)
+        assert len(artists["held"].get_segments()) == len(loop.steps) == 35
+        new = [step.pose[:2] for step in loop.steps if step.replanned]
+        assert len(artists["held anew"].get_segments()) == len(new)
+        assert np.allclose(artists["replanned"].get_offsets(), new)
+        assert artists["jumps"].get_segments() == []
+
+    @pytest.mark.parametrize("make", [straight_loop, pushed_loop])
+    def test_scales_are_equal_and_nothing_lies_outside(self, make):
+        loop = of_body(make(), Box([0.5, 0.3]))
+        ax, _ = drawn(loop)
+        assert ax.get_aspect() == 1.0
+        ax.apply_aspect()
+        (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
+        for x, y, *_ in [*loop.poses, *(step.plan.end for step in loop.steps)]:
+            assert left < x < right
+            assert low < y < high
+
+    def test_disturbances_are_dotted_and_the_tolerance_is_a_disc(self):
+        loop = pushed_loop()
+        ax, artists = drawn(loop)
+        jumps = artists["jumps"].get_segments()
+        assert len(jumps) == len(loop.steps)
+        assert np.allclose(jumps[0], [loop.driven[0].end[:2], loop.poses[1, :2]])
+        assert artists["tolerance 0"].radius == 0.1
+        names = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert {"goal tolerance", "disturbance", "replanned", "plan of a step"} <= set(names)
+
+    def test_bodies_on_top_of_each_other_are_drawn_once(self):
+        loop = straight_loop()
+        _, crowded = drawn(of_body(loop, Disc(1.0)))
+        assert len(crowded["bodies"].get_paths()) < 10
+        _, sparse = drawn(of_body(loop, Disc(0.001)))
+        assert len(sparse["bodies"].get_paths()) == len(loop.poses)
+
+    def test_value_and_cost_have_a_constant_sum(self):
+        loop = parking_loop()
+        cost = figure_of(loop).axes[1]
+        spent, total = cost.lines[:2]
+        assert np.allclose(total.get_ydata(), loop.cost)
+        assert np.allclose(spent.get_ydata()[[0, -1]], [0.0, loop.cost])
+        assert np.allclose(total.get_xdata(), loop.times)
+
+    def test_what_noise_took_is_marked(self):
+        loop = pushed_loop()
+        taken = [step.time for step in loop.steps if step.disturbed]
+        crosses = figure_of(loop).axes[1].collections[-2].get_offsets()
+        assert taken
+        assert np.allclose(crosses[:, 0], taken)
+
+    def test_times_per_step_are_on_whole_decades(self):
+        loop = straight_loop()
+        ax = figure_of(loop).axes[-1]
+        assert ax.get_yscale() == "log"
+        assert np.allclose(ax.lines[0].get_ydata(), loop.solve_s)
+        assert np.allclose(np.log10(ax.get_ylim()), np.round(np.log10(ax.get_ylim())))
+
+    def test_how_a_loop_ended(self):
+        for loop, said in (
+            (parking_loop(), "goal reached"),
+            (unfinished_loop(), "the goal is not reached after 2 steps"),
+            (helpless_loop(), "recursive feasibility: "),
+        ):
+            assert texts_of(figure_of(loop))[0].startswith(said)
+        assert texts_of(figure_of(parking_loop()))[1].startswith("cost 4.66158 · duration 4 s")
+
+    def test_a_flight_shows_its_altitude(self):
+        labels = [ax.get_ylabel() for ax in figure_of(flight_loop()).axes]
+        over_time = ["cost", "speed [m/s]", "turn", "climb [m/s]", "z [m]", "to decide [s]"]
+        assert labels == ["y [m]", *over_time]
+
+
+class TestFleets:
+    def test_paths_bodies_and_ends_are_where_the_plans_are(self):
+        result = crossing()
+        ax, artists = drawn(result)
+        assert ax.get_aspect() == 1.0
+        there, back = result.plans["there"], result.plans["back"]
+        lines = artists["paths"].get_segments()
+        assert len(lines) == 2
+        for line, plan in zip(lines, (there, back), strict=True):
+            np.testing.assert_allclose(line[[0, -1]], [plan.start[:2], plan.end[:2]], atol=1e-9)
+        for what, pose in (("goals", there.end), ("starts", there.start)):
+            corners = artists[what].get_paths()[0].vertices[:4]
+            np.testing.assert_allclose(corners, SE2(pose).act(Box([0.6, 0.4]).corners), atol=1e-9)
+        assert (artists["starts"].get_facecolor()[:, 3:] == 0.0).all()
+        assert (artists["goals"].get_facecolor()[:, 3] == 1.0).all()
+        times = cast_of(recording_of(result)).scene.times
+        middles = [path.vertices[:-1].mean(axis=0) for path in artists["bodies"].get_paths()]
+        expected = [there.pose_at(t)[:2] for t in times if 0.0 < t < 4.0]
+        expected += [back.pose_at(t)[:2] for t in times if 0.5 < t < 5.5]
+        np.testing.assert_allclose(middles, expected, atol=1e-9)
+
+    def test_one_without_a_plan_is_hatched_at_its_start(self):
+        result = crossing()
+        _, artists = drawn(result)
+        (missing,), (wanted,) = artists["missing"].get_paths(), artists["wanted"].get_paths()
+        np.testing.assert_allclose(missing.vertices[:4].mean(axis=0), [5.0, 3.0], atol=1e-9)
+        assert artists["missing"].get_hatch()
+        np.testing.assert_allclose(wanted.vertices[:4].mean(axis=0), [0.0, 3.0], atol=1e-9)
+        assert "stuck: walls enclose the start" in texts_of(figure_of(result))
+        many = fleet_of([no_answer([0, k, 0], [1, k, 0]) for k in range(7)], names=list("abcdefg"))
+        assert "a, b, c, d and 3 more: too narrow" in texts_of(figure_of(many))
+
+    def test_points_are_marks(self):
+        ahead, lost = plan_of(["straight"], [2.0]), no_answer([0, 5, 0], [3, 5, 0])
+        _, artists = drawn(fleet_of([answer(ahead), lost], names=["a", "b"]))
+        marks = {
+            "start marks": ahead.start[:2], "goal marks": ahead.end[:2],
+            "missing marks": [0.0, 5.0], "wanted marks": [3.0, 5.0],
+        }  # fmt: skip
+        for what, place in marks.items():
+            np.testing.assert_allclose(artists[what].get_offsets(), [place])
+        assert artists["starts"].get_paths() == artists["missing"].get_paths() == []
+
+    def test_each_has_its_colour_everywhere(self):
+        result, colors = crossing(), fleet_colors(3)
+        _, artists = drawn(result)
+        bars = draw_bars(Figure().add_subplot(), cast_of(recording_of(result)))
+        for shown in (artists["paths"].get_colors(), artists["goals"].get_facecolor()):
+            np.testing.assert_allclose(shown[:, :3], colors[:2], atol=1e-3)
+        np.testing.assert_allclose(to_rgb(bars.get_facecolor()[0]), colors[0], atol=1e-3)
+
+    def test_bars_tell_drives_from_rests(self):
+        bars = draw_bars(Figure().add_subplot(), cast_of(recording_of(crossing())))
+        spans = [sorted({*path.vertices[:, 0].tolist()}) for path in bars.get_paths()]
+        assert spans == [[0.0, 4.0], [0.5, 1.5], [1.5, 5.5]]
+        shades = bars.get_facecolor()[:, :3].sum(axis=1)
+        assert shades[1] > shades[2]
+
+    def test_many_are_numbered_and_their_steps_on_request(self):
+        figure = figure_of(row_of(14))
+        assert {text.get_text() for text in figure.axes[0].texts} == {str(k + 1) for k in range(14)}
+        numbered = figure_of(crossing(), look=Look(numbered=True)).axes[0].texts
+        assert {text.get_text() for text in numbered} <= {str(k) for k in range(7)}
+        assert numbered
+
+    def test_distances_are_those_of_the_bodies(self):
+        cast = cast_of(recording_of(crossing()))
+        times = distance_times(cast.begin, cast.end)
+        least = nearest_others(cast.actors, times).min(axis=1)
+        assert least.min() == pytest.approx(1.0)
+        ax = Figure().add_subplot()
+        draw_distances(ax, cast, times, least)
+        assert ax.lines[1].get_ydata()[0] == 0.05
+        flat = np.where(np.isfinite(least), least, 9.0)
+        assert min(thinned(times, flat, most=10)[1]) == flat.min()
+
+    def test_the_picture_has_the_plane_the_bars_and_the_distances(self):
+        figure = figure_of(crossing(), look=Look(title="Crossing"))
+        plane, bars, distances = figure.axes
+        assert plane.get_xlabel() == "x [m]"
+        assert [text.get_text() for text in bars.get_yticklabels()] == ["there", "back", "stuck"]
+        assert bars.get_xlim() == distances.get_xlim()
+        assert "shapely every 0.05 s" in distances.get_title(loc="left")
+        assert figure.texts[0].get_text() == "Crossing"
+        wanted = {"there", "start", "goal", "no plan", "obstacle", "margin, 0.05 m"}
+        assert wanted | {"not there at that time"} <= set(legend_of(figure))
+
+    def test_obstacles_that_several_share_are_drawn_once(self):
+        _, artists = drawn(crossing())
+        times = cast_of(recording_of(crossing())).scene.times
+        assert len(artists["obstacles"].get_paths()) == 1
+        assert len(artists["traffic"].get_paths()) == 2 * len(times)
+
+    def test_a_moved_fleet_has_the_moved_picture(self):
+        by, result = SE2([3.0, -2.0, 0.7]), row_of(3)
+        plans = result.plans.values()
+        moved = [plan_of(p.word, p.durations, start=(by @ SE2(p.start)).pose) for p in plans]
+        answers = [answer(plan, footprint=Box([0.6, 0.4])) for plan in moved]
+        _, here = drawn(result)
+        _, there = drawn(fleet_of(answers, names=["a", "b", "c"]))
+        paths = here["bodies"].get_paths(), there["bodies"].get_paths()
+        for one, other in zip(*paths, strict=True):
+            np.testing.assert_allclose(by.act(one.vertices), other.vertices, atol=1e-9)
+
+    def test_notebooks_show_the_picture(self):
+        assert crossing()._repr_png_()[1:4] == b"PNG"
+
+
+def fleet_loop(**more):
+    fleet = robots.crossing(tolerance=0.1, margin=0.2)
+    return simulate_fleet(fleet, step=0.5, steps=40, first_time_limit=1.0, **more)
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    return fleet_loop(disturbance=NOISE)
+
+
+@pytest.fixture(scope="module")
+def broken():
+    return fleet_loop(breaks_s={"a": 2.0}, joins_s={"b": 1.0})
+
+
+class TestFleetLoops:
+    def test_all_are_where_they_were(self, noisy):
+        cast = cast_of(recording_of(noisy))
+        for one in cast.actors:
+            for piece in noisy.driven[one.name]:
+                if piece.start_time < one.arrival:
+                    at = one.mover.pose_at(piece.start_time)
+                    np.testing.assert_allclose(at, piece.start, atol=1e-12)
+            assert one.arrival == noisy.arrived_s[one.name]
+            assert all(end <= one.arrival for _, end, _ in one.spans)
+            times = [time for time, _ in one.jumps]
+            assert times == sorted(times)
+            assert 0.0 < max(np.hypot(*(line[1] - line[0])) for _, line in one.jumps) < 0.1
+        sampled = nearest_others(cast.actors, distance_times(cast.begin, cast.end)).min()
+        assert noisy.distance_m - 1e-9 <= sampled <= noisy.distance_m + 0.05
+
+    def test_values_fall_by_what_is_spent(self):
+        recording = recording_of(fleet_loop())
+        curves = {(one.label, one.mover): one.value for one in recording.curves}
+        values, costs = curves["value", ""], curves["spent", ""]
+        assert (np.diff(values + costs) <= 1e-6).all()
+        assert values[-1] == 0.0
+        np.testing.assert_allclose(curves["value", "a"] + curves["value", "b"], values, atol=1e-9)
+        assert not any(one.jumps for one in cast_of(recording).actors)
+
+    def test_the_picture(self, noisy, broken):
+        figure = figure_of(broken)
+        assert len(figure.axes) == 4
+        names = legend_of(figure)
+        assert {"a", "b", "not arrived", "plan held", "spent", "sum"} <= set(names)
+        assert "disturbance" not in names
+        assert "disturbance" in legend_of(figure_of(noisy))
+        assert "a: it broke down" in texts_of(figure)
+
+    def test_who_joins_is_not_there_before(self, broken):
+        a, b = cast_of(recording_of(broken)).actors
+        assert not b.mover.is_there(0.5)
+        assert b.mover.is_there(1.0)
+        assert b.bodies_at(0.5) == []
+        assert not a.mover.reached
+
+    def test_the_page(self, broken):
+        content = player_of(broken, title="A crossing").content
+        a, b = content["motions"]
+        assert (a["joins"], b["joins"]) == (False, True)
+        assert a["reason"] == "it broke down"
+        assert content["fleet"]["value"]["v"][-1] == 0.0
+        assert dict(content["facts"])["vehicles"] == "1 of 2 arrived"
+
+    def test_nobody_comes_in_and_one_alone(self):
+        log = fleet_loop(joins_s={"b": 1e6})
+        assert "b: it was never let in" in texts_of(figure_of(log))
+        fleet = robots.crossing(tolerance=0.1)
+        alone = simulate_fleet(FleetProblem(fleet.problems[:1]), step=0.5, first_time_limit=1.0)
+        assert "distance [m]" not in [ax.get_ylabel() for ax in figure_of(alone).axes]
