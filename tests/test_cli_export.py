@@ -69,13 +69,21 @@ def test_a_plan_is_written_beside_its_file(plan):
     np.testing.assert_allclose(path["coordinates"][-1], [0.0, 0.0], atol=1e-9)
 
 
-@pytest.mark.parametrize("vehicle", [None, {"control": ["one"]}, {"control": "speed"}, []])
-def test_controls_that_a_file_does_not_name_are_counted(plan, tmp_path, vehicle):
+def test_controls_that_a_file_does_not_name_are_counted(plan, tmp_path):
     document = json.loads(plan.read_text())
-    document["vehicle"] = vehicle
-    (tmp_path / "plan.json").write_text(json.dumps(document))
+    (tmp_path / "plan.json").write_text(json.dumps(document | {"vehicle": None}))
     assert run(["export", str(tmp_path / "plan.json"), "--to", "csv"]) == 0
     assert lines(tmp_path / "plan.csv")[0][-5:-3] == ["control_0", "control_1"]
+
+
+@pytest.mark.parametrize("vehicle", [{"control": ["one"]}, {"control": "speed"}, []])
+def test_a_vehicle_that_is_none_is_told_in_one_line(plan, tmp_path, vehicle, capsys):
+    document = json.loads(plan.read_text())
+    (tmp_path / "plan.json").write_text(json.dumps(document | {"vehicle": vehicle}))
+    assert run(["export", str(tmp_path / "plan.json"), "--to", "csv"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"{tmp_path / 'plan.json'}: vehicle")
+    assert err.count("\n") == 1
 
 
 def test_a_loop_is_written_with_its_scenario(loop, tmp_path, capsys):

@@ -172,7 +172,6 @@ def _mover(
         pieces=(whole,),
         model=vehicle.model,
         bodies={"": (vehicle.footprint,)},
-        regions=tuple(place for goal in scene.goals for place in goal.places or ()),
         has_plan=plan is not None,
         reached=plan is not None if reached is None else reached,
         reason=reason,

@@ -95,7 +95,6 @@ class Mover:
     model: Model | None = None  # None: it is not known, as in a file alone
     bodies: Mapping[str, tuple[Shape, ...]] = field(default_factory=dict)  # "": its own; its parts'
     problem: Problem | None = None  # that it was to solve; None: on roads, or not known
-    regions: tuple[Shape, ...] = ()  # goals on roads
     has_plan: bool = True
     reached: bool = True  # whether it ends at a goal
     arrived_s: float | None = None  # [s]; None: at the end of the last piece, if at all
@@ -119,6 +118,12 @@ class Mover:
     def goals(self) -> tuple[Goal, ...]:
         """Where it was to go; empty if that is not known, or a region."""
         return () if self.problem is None else self.problem.goals
+
+    @property
+    def regions(self) -> tuple[Shape, ...]:
+        """Places of goals on roads."""
+        goals = () if self.road is None else self.road.scene.goals
+        return tuple(place for goal in goals for place in goal.places or ())
 
     @property
     def start(self) -> Array:
