@@ -121,8 +121,8 @@ def film_of(result: Any, *, look: Look | None = None) -> Film:
 
     def show(time: float) -> None:
         there = [one for one in shapes if one.there(time) or not cast.recording.world.fleeting]
-        traffic.set_paths([one.at(time) for one in there])  # type: ignore[attr-defined]
-        show_presence(traffic, [MOVING] * len(there), [one.there(time) for one in there])  # type: ignore[arg-type]
+        traffic.set_paths([one.at(time) for one in there])
+        show_presence(traffic, [MOVING] * len(there), [one.there(time) for one in there])
         _color(old, _fading(cast, time))
         _color(ahead, _ahead(cast, time))
         _color(trails, _trails(cast, time))

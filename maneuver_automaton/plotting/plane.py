@@ -123,7 +123,7 @@ def plane_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], li
     lanes = ([Patch(facecolor=LANE)], ["lane"]) if world.lanes else ([], [])
     around = obstacle_handles(scene.obstacles, scene.times[:1] if moving else scene.times)
     limits = limit_handles(scene.zones, scene.bounds)
-    rows = [driven, ends, lanes, around, limits]
+    rows: list[Any] = [driven, ends, lanes, around, limits]
     if (
         not moving
         and cast.recording.search is not None
