@@ -1,7 +1,7 @@
 """What the pictures of every kind of result show: texts, legends, artists, and where they are.
 
 Each case is drawn into a file whose bytes are not looked at; the figure is. Films are looked at in
-their middle, and pages by the numbers and texts that their scripts draw.
+their middle. `exports.py` beside it has the pages.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,6 @@ from tests.roads.files import LANES, car, commonroad, parked, problem
 
 DIGITS = 3
 MASKED = "to decide [s]"  # axes whose numbers are those of a clock
-CLOCKED = ("solve_s", "costs", "bounds")  # keys of a page that hold what a clock measured
 QUICK = RoadSettings(width=40, narrow=20)
 
 
@@ -242,39 +241,6 @@ def film_record(moving: film.Film) -> dict[str, Any]:
     return {"pictures": len(times), "span_s": span, "middle": picture_record(moving.figure)}
 
 
-def page_record(content: Mapping[str, Any]) -> dict[str, Any]:
-    """The texts of a page by their keys; of its numbers how many, the least, the most, the sum."""
-    texts: dict[str, list[str]] = {}
-    numbers: dict[str, list[float]] = {}
-    for key, value in _leaves(content, ""):
-        if isinstance(value, str):
-            texts.setdefault(key, []).append(value)
-        else:
-            numbers.setdefault(key, []).append(float(value))
-    clocked = {key for key in numbers if any(part in CLOCKED for part in key.split("."))}
-    return {
-        "texts": {key: list(dict.fromkeys(some)) for key, some in texts.items()},
-        "numbers": {
-            key: [len(some)]
-            if key in clocked
-            else [len(some), *(_rounded(f(some)) for f in (min, max, sum))]
-            for key, some in numbers.items()
-        },
-    }
-
-
-def _leaves(value: Any, key: str) -> Iterator[tuple[str, Any]]:
-    """Numbers and texts in a value, each with its key; those of lists share one."""
-    if isinstance(value, Mapping):
-        for name, one in value.items():
-            yield from _leaves(one, f"{key}.{name}" if key else name)
-    elif isinstance(value, list | tuple):
-        for one in value:
-            yield from _leaves(one, key)
-    elif value is not None:
-        yield key, value
-
-
 def _rounded(number: Any) -> float:
     return round(float(number), DIGITS) + 0.0
 
@@ -306,10 +272,6 @@ def film_of(name: str) -> film.Film:
 CASES: dict[str, Callable[[], dict[str, Any]]] = {
     **{f"picture, {name}": lambda name=name: picture_record(picture_of(name)) for name in RESULTS},
     **{f"film, {name}": lambda name=name: film_record(film_of(name)) for name in FILMS},
-    **{
-        f"page, {name}": lambda make=make: page_record(plotting.player_of(make()).content)
-        for name, make in RESULTS.items()
-    },
 }
 
 
