@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 
-class Player(Protocol):
+class PlayerPage(Protocol):
     """A page that plays a plan; see `maneuver_automaton.plotting.Player`."""
 
     @property
@@ -25,7 +25,7 @@ class Player(Protocol):
 class Drawing(Protocol):
     """What makes pages and pictures of values."""
 
-    def player_of(self, value: Any, *, title: str) -> Player:
+    def player_of(self, value: Any, *, title: str) -> PlayerPage:
         """The page that plays a value."""
 
     def picture_of(self, value: Any) -> bytes:
@@ -54,7 +54,7 @@ class Played(Drawn):
 
     __slots__ = ()
 
-    def player(self, *, title: str = "") -> Player:
+    def player(self, *, title: str = "") -> PlayerPage:
         """A page that plays it: `.html`, or `.save(path)`; `title` heads it."""
         return _LOADERS[0]().player_of(self, title=title)
 

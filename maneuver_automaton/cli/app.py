@@ -11,9 +11,9 @@ from typing import Annotated
 
 import typer
 
-from maneuver_automaton.cli.entry import safe_streams
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
 from maneuver_automaton.cli.help_texts import ending
+from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
 PRINTED = (["schema"],)  # commands that do nothing but print

@@ -248,7 +248,7 @@ ALIKE = 1e-9  # [cells] lengths and radii that differ by less are equal
 SPIN_STEP = 0.2  # [rad] between poses of a turn on the spot, as Nav2's
 
 
-class _Turn(NamedTuple):
+class _LatticeTurn(NamedTuple):
     """From a heading to another: cells between the ends, and the stretches between them."""
 
     cells: tuple[int, int]
@@ -331,7 +331,7 @@ def _directions() -> IntArray:
     return np.concatenate([quarter @ np.linalg.matrix_power(turned, k) for k in range(4)])
 
 
-def _shortest(first: float, last: float, radius: float) -> _Turn:
+def _shortest(first: float, last: float, radius: float) -> _LatticeTurn:
     """The shortest motion to a cell, of all whose arc has at least a radius [cells].
 
     Straights cut at a corner, d1 from the start and d2 from the end. The arc that touches both
@@ -350,7 +350,7 @@ def _shortest(first: float, last: float, radius: float) -> _Turn:
     length[arcs < radius - ALIKE] = math.inf
     alike = np.flatnonzero(length <= length.min() + ALIKE)
     best = int(alike[np.argmax(arcs[alike])])
-    return _Turn(
+    return _LatticeTurn(
         cells=(int(i[best]), int(j[best])),
         before=float(ahead[best] - on_arc[best]),
         radius=float(arcs[best]),
@@ -359,7 +359,7 @@ def _shortest(first: float, last: float, radius: float) -> _Turn:
     )
 
 
-def _is_chain(turns: dict[tuple[int, int], _Turn], a: int, k: int, n: int) -> bool:
+def _is_chain(turns: dict[tuple[int, int], _LatticeTurn], a: int, k: int, n: int) -> bool:
     """Whether two smaller turns lead to the same cell and are no longer."""
     whole = turns[a, (a + k) % n]
     for part in range(1, abs(k)):
@@ -379,7 +379,7 @@ def _straight(heading: float, to: Array) -> Array:
     return np.column_stack([places, np.full(count + 1, heading)])
 
 
-def _along(first: float, last: float, turn: _Turn) -> Array:
+def _along(first: float, last: float, turn: _LatticeTurn) -> Array:
     """Poses (n, 3) [cells, cells, rad] of a straight, an arc and a straight."""
     angle = float(wrapped(last - first))
     side = math.copysign(turn.radius, angle)

@@ -49,14 +49,14 @@ KEYS: Mapping[str, int] = {  # and how many numbers follow each
 
 
 @dataclass(frozen=True, slots=True)
-class _Word:
+class _CfgWord:
     """A word of the header and its line."""
 
     text: str
     line: int
 
 
-_Header: TypeAlias = Mapping[str, list[_Word]]  # the numbers after each key
+_Header: TypeAlias = Mapping[str, list[_CfgWord]]  # the numbers after each key
 
 
 def is_sbpl(path: Path) -> bool:
@@ -100,13 +100,13 @@ def read_sbpl(path: Path) -> tuple[Statement, ...]:
 
 def _header(path: Path, lines: list[str]) -> tuple[_Header, int]:
     """The numbers of each key, and how many lines stand before that of the cells."""
-    header: dict[str, list[_Word]] = {}
+    header: dict[str, list[_CfgWord]] = {}
     place = ("", 0)  # the key that is being read, and its line
     for k, line in enumerate(lines):
         for text in line.split():
             key, number = place
             if not text.endswith(":") and key:
-                header[key].append(_Word(text, k + 1))
+                header[key].append(_CfgWord(text, k + 1))
                 continue
             if key and len(header[key]) != KEYS[key]:
                 raise InvalidScenario(
@@ -133,7 +133,7 @@ def _check_complete(path: Path, header: _Header) -> None:
             raise InvalidScenario(f"{path}: the key {key[:-1]!r} is missing{with_size}")
 
 
-def _numbers(path: Path, key: str, words: list[_Word]) -> list[float]:
+def _numbers(path: Path, key: str, words: list[_CfgWord]) -> list[float]:
     return [finite(word.text, at=f"{path}:{word.line}: {key[:-1]}") for word in words]
 
 

@@ -78,7 +78,7 @@ class Element:
         return InvalidScenario(f"{self.at}: {what}")
 
 
-class _Builder:
+class _XmlBuilder:
     """Collect the elements of one file."""
 
     def __init__(self, path: Path | zipfile.Path) -> None:
@@ -135,7 +135,7 @@ def read_xml(path: Path | zipfile.Path, *, what: str, most: int) -> Element:
     InvalidScenario
         If it cannot be read, or is no XML.
     """
-    return _Builder(path).read(read_bytes(path, most=most, what=what))
+    return _XmlBuilder(path).read(read_bytes(path, most=most, what=what))
 
 
 def root_tag(path: Path) -> str:

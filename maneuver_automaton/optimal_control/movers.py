@@ -20,7 +20,7 @@ NEARBY = 1e-3  # [s] for the velocity of a corner
 ALWAYS, NEVER = -1, -2  # the interval of what is there in all of them, and in none
 
 
-class Mover(NamedTuple):
+class MovingSolid(NamedTuple):
     """A convex solid that moves."""
 
     corners: Array  # (m, 2) [m] in its own frame
@@ -43,7 +43,9 @@ class Pieces(NamedTuple):
         return self.first < len(self.solids)
 
 
-def pieces_during(still: Sequence[Solid], movers: Sequence[Mover], durations: Array) -> Pieces:
+def pieces_during(
+    still: Sequence[Solid], movers: Sequence[MovingSolid], durations: Array
+) -> Pieces:
     """What stands still, and what moves in each interval of a motion of `durations` (n,) [s].
 
     Corners of what moves are those at the begin of the interval, then those at its end: their hull
@@ -51,7 +53,9 @@ def pieces_during(still: Sequence[Solid], movers: Sequence[Mover], durations: Ar
 
     Examples
     --------
-    >>> ahead = Mover(np.zeros((1, 2)), 0.5, lambda t: np.stack([t, 0 * t, 0 * t], -1), (0.0, 9.0))
+    >>> def poses(times):
+    ...     return np.stack([times, 0 * times, 0 * times], -1)
+    >>> ahead = MovingSolid(np.zeros((1, 2)), 0.5, poses, (0.0, 9.0))
     >>> pieces = pieces_during([], [ahead], np.ones(2))
     >>> [corners[:, 0].tolist() for corners, _ in pieces.solids], pieces.interval.tolist()
     ([[0.0, 1.0], [1.0, 2.0]], [0, 1])
@@ -84,7 +88,7 @@ def pieces_during(still: Sequence[Solid], movers: Sequence[Mover], durations: Ar
     )
 
 
-def _corners(one: Mover, times: Array) -> Array:
+def _corners(one: MovingSolid, times: Array) -> Array:
     """Where the corners are (n, m, 2) at times (n,)."""
     x, y, heading = np.moveaxis(one.poses(times), -1, 0)[..., None]
     c, s = np.cos(heading), np.sin(heading)
@@ -92,13 +96,13 @@ def _corners(one: Mover, times: Array) -> Array:
     return np.stack([x + c * along - s * aside, y + s * along + c * aside], axis=-1)
 
 
-def _rates(one: Mover, times: Array) -> Array:
+def _rates(one: MovingSolid, times: Array) -> Array:
     """Velocities (n, m, 2) of the corners [m/s]."""
     ahead, behind = _corners(one, times + NEARBY), _corners(one, times - NEARBY)
     return np.asarray((ahead - behind) / (2.0 * NEARBY))
 
 
-def _bulges(one: Mover, begin: Array, end: Array) -> Array:
+def _bulges(one: MovingSolid, begin: Array, end: Array) -> Array:
     """How far paths of corners lead beside the chords (n,) [m], by some looks."""
     here, there = _corners(one, begin), _corners(one, end)
     most = np.zeros(len(begin))

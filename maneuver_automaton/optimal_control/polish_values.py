@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.optimal_control.movers import Mover, Pieces, pieces_during
+from maneuver_automaton.optimal_control.movers import MovingSolid, Pieces, pieces_during
 from maneuver_automaton.optimal_control.problem import Guess
 from maneuver_automaton.optimal_control.separation import BodyPart, Solid
 from maneuver_automaton.optimal_control.solution import SolveStatus
@@ -55,7 +55,7 @@ class Scene:
 
     parts: tuple[BodyPart, ...] = ()
     pieces: tuple[Solid, ...] = ()
-    movers: tuple[Mover, ...] = ()
+    movers: tuple[MovingSolid, ...] = ()
     walls: tuple[tuple[float, float, float], ...] = ()  # (a, b, c): a x + b y <= c
     guards: tuple[Guard, ...] = ()
 

@@ -22,7 +22,7 @@ from maneuver_automaton.plotting.scene import (
     ROOM,
     STILL_SIZE_M,
     Carried,
-    Scene,
+    Scenery,
     mark_size,
     view_box,
 )
@@ -153,7 +153,7 @@ class Cast:
 
     recording: Recording
     actors: tuple[Actor, ...]
-    scene: Scene
+    scene: Scenery
     colors: Mapping[str, Color]  # of trims, by name
     box: Array
     size: float  # [m] of the marks in the picture
@@ -242,7 +242,7 @@ def _actor(mover: Mover, name: str, label: str, color: Color) -> Actor:
 def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
     first, world = actors[0], recording.world
     alone = len(actors) == 1 and not world.lanes
-    scene = Scene(
+    scene = Scenery(
         goals=first.mover.goals if alone else (),
         reached=first.mover.goal_index if alone else None,
         obstacles=world.obstacles,

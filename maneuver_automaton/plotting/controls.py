@@ -18,7 +18,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.plotting.colors import GREY, INK, Color
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.style import outer_legend, tidy
-from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
+from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
 
 STYLES: tuple[tuple[float, Sequence[float]] | Literal["-"], ...] = (
     "-",
@@ -169,7 +169,7 @@ def within(ax: Axes, label: str) -> str:
     return label if len(label) <= most else "\n".join(textwrap.wrap(label, most))
 
 
-def _steps(piece: Piece, k: int) -> Array:
+def _steps(piece: TrackPiece, k: int) -> Array:
     """Corners (n, 2) of control `k` of a piece over time, held from sample to sample."""
     changes = np.flatnonzero(np.diff(piece.control[:-1, k])) + 1
     starts = np.concatenate([[0], changes])

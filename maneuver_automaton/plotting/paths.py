@@ -22,10 +22,10 @@ from maneuver_automaton.plotting.labels import shown_name
 from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names
 from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
 from maneuver_automaton.plotting.regions import region_path
-from maneuver_automaton.plotting.scene import Scene
+from maneuver_automaton.plotting.scene import Scenery
 from maneuver_automaton.plotting.style import dashed_handle, line_handle, mark_handle
 from maneuver_automaton.plotting.swept import merged, swept_region
-from maneuver_automaton.plotting.track import Piece, Track
+from maneuver_automaton.plotting.track import Track, TrackPiece
 
 SPIN_RADIUS, ARC_POINTS, MOST_SPINS = 0.09, 61, 12  # of the size; more cannot be told apart
 RING, CLIMB, SINK = "o", "^", "v"
@@ -163,14 +163,14 @@ def trim_handles(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D
     return handles, [shown_name(name) for name in entries]
 
 
-def _symbol(piece: Piece) -> str:
+def _symbol(piece: TrackPiece) -> str:
     """Marker of a piece that stays where it is, empty if a line shows it."""
     if piece.drives or piece.turn:
         return ""
     return RING if not piece.climb else CLIMB if piece.climb > 0.0 else SINK
 
 
-def _spin_symbols(spins: list[Piece], *, size: float) -> tuple[list[Array], list[Array]]:
+def _spin_symbols(spins: list[TrackPiece], *, size: float) -> tuple[list[Array], list[Array]]:
     """Arcs about the place of each turn and their arrow heads; later turns there lie outside."""
     arcs, heads, places = [], [], np.zeros((0, 2))
     for piece in spins:
@@ -188,7 +188,7 @@ def _spin_symbols(spins: list[Piece], *, size: float) -> tuple[list[Array], list
     return arcs, heads
 
 
-def swept_area(track: Track, scene: Scene) -> PathCollection:
+def swept_area(track: Track, scene: Scenery) -> PathCollection:
     """Area that the body covers along a track; empty where the body is not known."""
     region = swept_region(track, scene.body) if scene.body and track.pieces else []
     carried = [swept_region(part.track, part.body) for part in scene.carried]
@@ -199,7 +199,7 @@ def swept_area(track: Track, scene: Scene) -> PathCollection:
     )  # fmt: skip
 
 
-def _darts(track: Track, scene: Scene, *, size: float) -> PolyCollection:
+def _darts(track: Track, scene: Scenery, *, size: float) -> PolyCollection:
     """Where the body is not known: darts along a path, and white ones where trims begin.
 
     The white ones leave the path between them free.
@@ -229,7 +229,7 @@ def _apart(poses: Array, apart: float) -> list[int]:
     return kept
 
 
-def _switch_bodies(track: Track, scene: Scene) -> PolyCollection:
+def _switch_bodies(track: Track, scene: Scenery) -> PolyCollection:
     """Outlines where trims begin and at the end, which is clear; many others are fainter.
 
     Those of what it carries stand beside them; a motion by optimal control has a few within.
@@ -263,7 +263,7 @@ def _shown_times(track: Track, *, apart: float) -> Array:
     return np.sort(np.concatenate([times, *inner]))
 
 
-def _bodies_within(piece: Piece, *, apart: float) -> int:
+def _bodies_within(piece: TrackPiece, *, apart: float) -> int:
     """How many bodies have room within a piece, `apart` [m] from each other and from its ends."""
     length = float(np.linalg.norm(np.diff(piece.pose[:, :2], axis=0), axis=1).sum())
     return min(INNER_BODIES, max(0, int(length / apart) - 1)) if apart > 0.0 else 0
@@ -289,7 +289,7 @@ def _step_bodies(one: Actor, *, size: float) -> PolyCollection:
     )  # fmt: skip
 
 
-def _moment_bodies(track: Track, scene: Scene) -> PolyCollection:
+def _moment_bodies(track: Track, scene: Scenery) -> PolyCollection:
     """The body at the times at which moving obstacles are shown, the darker the later."""
     times = scene.times if scene.moves and track.pieces else scene.times[:0]
     outlines = placed(scene.body, track.at(times))
@@ -303,7 +303,7 @@ def _moment_bodies(track: Track, scene: Scene) -> PolyCollection:
     )  # fmt: skip
 
 
-def _goal_bodies(scene: Scene) -> PolyCollection:
+def _goal_bodies(scene: Scenery) -> PolyCollection:
     """Dashed outlines at the goals that are not reached and ask for a heading."""
     poses = [
         goal.pose
@@ -316,7 +316,7 @@ def _goal_bodies(scene: Scene) -> PolyCollection:
     )  # fmt: skip
 
 
-def _between_ends(track: Track, scene: Scene, *, apart: float) -> Array:
+def _between_ends(track: Track, scene: Scenery, *, apart: float) -> Array:
     """Poses where trims begin, but none at the start or a goal, where other marks are."""
     ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
     gaps = np.linalg.norm(track.switching_poses[:, None, :2] - ends[:, :2], axis=-1)

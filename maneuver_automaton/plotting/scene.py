@@ -42,7 +42,7 @@ class Carried:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Scene:
+class Scenery:
     """Goals, obstacles, limits and a body."""
 
     goals: tuple[Goal, ...]
@@ -65,7 +65,7 @@ class Scene:
         return any(isinstance(o, Obstacle) and o.motion is not None for o in self.obstacles)
 
 
-def plan_scene(problem: Problem, plan: Plan | None, *, footprint: Any = None) -> Scene:
+def plan_scene(problem: Problem, plan: Plan | None, *, footprint: Any = None) -> Scenery:
     """The scene of a `problem`, its own body if no other is given.
 
     The goal reached is the one nearest to the end of the plan. Without a plan, moving obstacles are
@@ -95,15 +95,15 @@ def carried_parts(problem: Problem, plan: Plan) -> tuple[Carried, ...]:
     )
 
 
-def bare_scene(track: Track, *, footprint: Any) -> Scene:
+def bare_scene(track: Track, *, footprint: Any) -> Scenery:
     """A scene of which nothing is known but the end of the track, and a body."""
     body = tuple(footprint_polygons(footprint))
-    return Scene(goals=(Goal(pose=track.end),), reached=0, body=body, times=np.zeros(1))
+    return Scenery(goals=(Goal(pose=track.end),), reached=0, body=body, times=np.zeros(1))
 
 
-def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = None) -> Scene:
+def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = None) -> Scenery:
     """The scene of a `problem` from time `begin` to `end` [s]; its own body if none is given."""
-    return Scene(
+    return Scenery(
         goals=problem.goals,
         obstacles=problem.obstacles,
         zones=problem.zones,
@@ -113,7 +113,7 @@ def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = Non
     )
 
 
-def scene_size(scene: Scene, track: Track) -> float:
+def scene_size(scene: Scenery, track: Track) -> float:
     """Size of a picture [m], from which those of its marks follow: the symmetry leaves it alone."""
     ends = np.array([track.start, *(goal.pose for goal in scene.goals)])[:, :2]
     apart = float(np.linalg.norm(ends - ends[0], axis=1).max())
@@ -121,7 +121,7 @@ def scene_size(scene: Scene, track: Track) -> float:
     return size if size > 1e-9 else STILL_SIZE_M
 
 
-def view_box(scene: Scene, points: Array, *, size: float) -> Array:
+def view_box(scene: Scenery, points: Array, *, size: float) -> Array:
     """Corners (2, 2) of what a picture shows around `points` (n, 2), where something happens.
 
     All obstacles and limits, unless they are much larger than that: then those that are near.
@@ -139,7 +139,7 @@ def view_box(scene: Scene, points: Array, *, size: float) -> Array:
     return np.array([all_low, all_high])
 
 
-def mark_size(scene: Scene, box: Array, *, size: float) -> float:
+def mark_size(scene: Scenery, box: Array, *, size: float) -> float:
     """Size of a path [m] that the marks of a picture suit.
 
     The path's own, but smaller for a small body on a long path, and larger where obstacles take
@@ -166,7 +166,7 @@ def set_view(ax: Axes, box: Array, place: Array) -> None:
     count_from_near(ax, place)
 
 
-def scene_points(scene: Scene, track: Track, *, size: float) -> Array:
+def scene_points(scene: Scenery, track: Track, *, size: float) -> Array:
     """Places (n, 2) where something happens: the track, the body along it, start and goals."""
     ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
     bodies = placed(scene.body, np.concatenate([track.switching_poses, ends]))

@@ -11,7 +11,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Polygon
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.plotting.footprint import placed
-from maneuver_automaton.plotting.track import Piece, Track
+from maneuver_automaton.plotting.track import Track, TrackPiece
 
 STRAIGHT_RAD, DETOUR = 1e-9, 1e-12  # turn, and way over chord, of a piece drawn by its two ends
 
@@ -54,7 +54,7 @@ def merged(parts: Sequence[Any]) -> list[Any]:
     return [part for part in shapely.get_parts(whole).tolist() if part.geom_type == "Polygon"]
 
 
-def _samples(piece: Piece) -> Array:
+def _samples(piece: TrackPiece) -> Array:
     """Poses (n, dof) of a piece, no more than it takes.
 
     That it turns by nothing in all is not enough: a lane change goes left and right again.

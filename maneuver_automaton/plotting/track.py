@@ -29,7 +29,7 @@ SEEN = 5e-3  # of the duration: what takes less can hardly be seen in a picture
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Piece:
+class TrackPiece:
     """One trim or maneuver of a plan that takes time, as samples."""
 
     name: str
@@ -66,7 +66,7 @@ class Track:
     """A start and the pieces driven from there; no piece if the vehicle is there already."""
 
     start: Array  # (dof,)
-    pieces: tuple[Piece, ...]
+    pieces: tuple[TrackPiece, ...]
 
     @property
     def end(self) -> Array:
@@ -163,7 +163,7 @@ def track_of_plan(plan: Plan) -> Track:
 
 def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
     """Track of one plan after the other; a trim that goes on in the next plan is one piece."""
-    pieces: list[Piece] = []
+    pieces: list[TrackPiece] = []
     for plan in plans:
         for k, piece in enumerate(track_of_plan(plan).pieces):
             if k == 0 and pieces and _goes_on(pieces[-1], piece):
@@ -173,7 +173,7 @@ def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
     return Track(start, tuple(pieces))
 
 
-def _goes_on(one: Piece, other: Piece) -> bool:
+def _goes_on(one: TrackPiece, other: TrackPiece) -> bool:
     scale = 1.0 + float(np.abs(one.pose[-1]).max())
     return bool(
         one.name == other.name
@@ -182,8 +182,8 @@ def _goes_on(one: Piece, other: Piece) -> bool:
     )
 
 
-def _one_piece(one: Piece, other: Piece) -> Piece:
-    return Piece(
+def _one_piece(one: TrackPiece, other: TrackPiece) -> TrackPiece:
+    return TrackPiece(
         name=one.name,
         twist=one.twist,
         time=np.concatenate([one.time, other.time[1:]]),
@@ -205,7 +205,7 @@ class _Samples(NamedTuple):
         return _Samples(*(column[rows] for column in self))
 
 
-def _pieces(plan: Plan, k: int, duration: float) -> list[Piece]:
+def _pieces(plan: Plan, k: int, duration: float) -> list[TrackPiece]:
     primitive, begin = plan.primitives[k], float(plan.switching_times[k])
     if isinstance(primitive, Maneuver):
         if (course := primitive.course) is None:
@@ -221,7 +221,7 @@ def _pieces(plan: Plan, k: int, duration: float) -> list[Piece]:
     steps = math.ceil(abs(primitive.body_velocity[2]) * duration / CHORD_RAD)
     time = np.linspace(begin, float(plan.switching_times[k + 1]), max(1, steps) + 1)
     return [
-        Piece(
+        TrackPiece(
             name=primitive.name,
             twist=primitive.body_velocity,
             time=time,
@@ -234,7 +234,7 @@ def _pieces(plan: Plan, k: int, duration: float) -> list[Piece]:
     ]
 
 
-def _sampled(name: str, kind: str, samples: _Samples) -> list[Piece]:
+def _sampled(name: str, kind: str, samples: _Samples) -> list[TrackPiece]:
     """Pieces of a primitive; a maneuver is cut where it turns back, or turns the other way."""
     runs = _runs(samples) if kind == "maneuver" else []
     whole = len(runs) < 2
@@ -246,7 +246,7 @@ def _sampled(name: str, kind: str, samples: _Samples) -> list[Piece]:
             twist[2] = 0.0  # what it still turns can hardly be seen
         said = motion(twist)
         pieces.append(
-            Piece(
+            TrackPiece(
                 name=name if whole and name != POLISHED else f"{name}, {said}",
                 twist=twist,
                 time=part.time,

@@ -9,12 +9,12 @@ import importlib
 from typing import Any
 
 from maneuver_automaton.recording.values import Curve as Curve
+from maneuver_automaton.recording.values import Environment as Environment
 from maneuver_automaton.recording.values import Event as Event
 from maneuver_automaton.recording.values import Fact as Fact
 from maneuver_automaton.recording.values import Mover as Mover
 from maneuver_automaton.recording.values import Recording as Recording
 from maneuver_automaton.recording.values import Search as Search
-from maneuver_automaton.recording.values import World as World
 
 ROOMS = {  # of results: who records them, loaded only where there is such a result
     "automaton": "plans",

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.recording.values import Curve, Event, Fact, Mover, Recording, World
+from maneuver_automaton.recording.values import Curve, Environment, Event, Fact, Mover, Recording
 from maneuver_automaton.roads import (
     RoadDrive,
     RoadFleetDrive,
@@ -136,9 +136,9 @@ def _nearest(result: RoadFleetResult | RoadFleetDrive) -> list[Fact]:
     return [Fact(label="nearest", value=result.distance_m, unit="m", digits=3)]
 
 
-def _world(scene: RoadScene, planned: Mapping[str, Any] | tuple[()]) -> World:
+def _world(scene: RoadScene, planned: Mapping[str, Any] | tuple[()]) -> Environment:
     """The road and all on it but those who are planned: they are road users too."""
-    return World(
+    return Environment(
         obstacles=tuple(one for one in scene.traffic if one.name not in planned),
         lanes=tuple(lanelet.ring for lanelet in scene.lanelets),
         source=scene.source,

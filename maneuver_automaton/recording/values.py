@@ -226,7 +226,7 @@ class Mover:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class World:
+class Environment:
     """What stands and moves around those who drive, and what they have to keep to."""
 
     obstacles: tuple[AnyObstacle, ...] = ()
@@ -278,7 +278,7 @@ class Recording:
     ending: str = ""  # how it ended, in words
     facts: tuple[Fact, ...] = ()
     movers: tuple[Mover, ...]
-    world: World = field(default_factory=World)
+    world: Environment = field(default_factory=Environment)
     alternatives: tuple[Mover, ...] = ()  # the first mover's other plans, costlier
     events: tuple[Event, ...] = ()
     curves: tuple[Curve, ...] = ()
@@ -304,14 +304,14 @@ def bodies_of(problem: Problem) -> dict[str, tuple[Shape, ...]]:
     }
 
 
-def world_of(*problems: Problem, margin: float = 0.0) -> World:
+def world_of(*problems: Problem, margin: float = 0.0) -> Environment:
     """What is around vehicles on one floor, each thing once; bounds that hold all of theirs."""
     around: dict[tuple[int, ...], AnyObstacle] = {}
     for one in (one for problem in problems for one in problem.obstacles):
         # problems made alike hold the same shapes and maps
         same = (id(one.shape), id(one.motion)) if isinstance(one, Obstacle) else (id(one),)
         around.setdefault(same, one)
-    return World(
+    return Environment(
         obstacles=tuple(around.values()),
         zones=tuple({id(zone): zone for one in problems for zone in one.zones}.values()),
         bounds=problems[0].bounds if len(problems) == 1 else _loosest(problems),

@@ -21,7 +21,7 @@ from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.lateral import lateral_limit
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.movers import Mover
+from maneuver_automaton.optimal_control.movers import MovingSolid
 from maneuver_automaton.optimal_control.polish_values import (
     LEAST_DURATION,
     MOST_DURATION,
@@ -137,7 +137,7 @@ class PolishTask:
         guard, shape = one
         return guard._replace(solids=tuple(pieces_seen_from([shape], self.start[:3])))
 
-    def _movers_of(self, obstacle: Obstacle) -> Iterator[Mover]:
+    def _movers_of(self, obstacle: Obstacle) -> Iterator[MovingSolid]:
         """The convex pieces of an obstacle that moves, seen from the start and its time."""
         motion, origin, since = obstacle.motion, self.start[:3], self.start_time
         assert motion is not None
@@ -147,7 +147,7 @@ class PolishTask:
 
         first, last = obstacle.presence
         for corners, by in convex_pieces(obstacle.shape):
-            yield Mover(corners, by + self.margin, poses, (first - since, last - since))
+            yield MovingSolid(corners, by + self.margin, poses, (first - since, last - since))
 
     def _walls(self) -> list[tuple[float, float, float]]:
         cosine, sine = math.cos(self.start[2]), math.sin(self.start[2])

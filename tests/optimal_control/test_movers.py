@@ -10,20 +10,20 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.optimal_control.movers import ALWAYS, NEVER, Mover, pieces_during
+from maneuver_automaton.optimal_control.movers import ALWAYS, NEVER, MovingSolid, pieces_during
 from maneuver_automaton.optimal_control.separation import Pairs, near_pairs
 
 BOX = np.array([[1.0, 0.5], [-1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]])
 STILL = (BOX + 9.0, 0.0)
 
 
-def mover(rate=(1.0, 0.0, 0.5), there=(-np.inf, np.inf), rounding=0.2) -> Mover:
+def mover(rate=(1.0, 0.0, 0.5), there=(-np.inf, np.inf), rounding=0.2) -> MovingSolid:
     end = SE2.exp(4.0 * np.array(rate)).pose
     motion = Motion([0.0, 4.0], [[0.0, 0.0, 0.0], end], [rate])
-    return Mover(BOX, rounding, motion.at, there)
+    return MovingSolid(BOX, rounding, motion.at, there)
 
 
-def swept(one: Mover, begin: float, end: float):
+def swept(one: MovingSolid, begin: float, end: float):
     """All that it covers between two times, by many looks."""
     times = np.linspace(max(begin, one.there[0]), min(end, one.there[1]), 60)
     at = SE2(one.poses(times)[:, None]).act(BOX)

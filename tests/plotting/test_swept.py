@@ -15,7 +15,7 @@ from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.paths import swept_area
 from maneuver_automaton.plotting.scene import plan_scene
 from maneuver_automaton.plotting.swept import swept_region
-from maneuver_automaton.plotting.track import Piece, Track, track_of_plan
+from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
 from maneuver_automaton.scenario import load_scenario
 from tests.plotting.cases import document_of, parking_plan, plan_of
 
@@ -95,7 +95,7 @@ def test_a_lane_change_that_turns_by_nothing_in_all_is_swept_where_it_goes():
     heading[[0, -1]] = 0.0
     pose, nothing = np.stack([ahead, aside, heading], axis=-1), np.zeros((81, 0))
     twist = np.array([15.0, 0.0, 0.0])
-    piece = Piece(name="m", twist=twist, time=time, pose=pose, control=nothing, state=nothing)
+    piece = TrackPiece(name="m", twist=twist, time=time, pose=pose, control=nothing, state=nothing)
     region = shapely.union_all(swept_region(Track(pose[0], (piece,)), CAR))
     assert off(region, placed(CAR, pose)) < NEAR_M
 

@@ -24,7 +24,7 @@ from maneuver_automaton.plotting.controls import step_curves
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.labels import control_labels
 from maneuver_automaton.plotting.limits import bound_lines
-from maneuver_automaton.plotting.track import Piece, Track
+from maneuver_automaton.plotting.track import Track, TrackPiece
 from maneuver_automaton.problem import Bounds, Goal
 from maneuver_automaton.recording import Mover
 
@@ -129,7 +129,7 @@ def part_frames(track: Track, model: Model) -> tuple[Array, Array]:
     return time, np.asarray(model.part_poses(state))
 
 
-def _arcs(piece: Piece) -> list[tuple[float, Array, Array]]:
+def _arcs(piece: TrackPiece) -> list[tuple[float, Array, Array]]:
     """Begin, first pose and twist of the arcs of a piece."""
     group = group_of(piece.pose.shape[1])
     since = (piece.time - piece.time[0])[:, None]
