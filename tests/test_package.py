@@ -26,7 +26,7 @@ SAYS_EXTRA = {  # where an extra is asked for by its name
     "pandas": "automaton/plan.py",
     "commonroad": "exports/commonroad_solution.py",
     "rerun": "exports/rerun_log.py",
-    "ros": "exports/ros2_bag.py",
+    "ros": "exports/ros.py",
 }
 DISTRIBUTIONS = {  # of modules that are called otherwise
     "PIL": "pillow",

@@ -52,6 +52,7 @@ def text_of(page: Path) -> str:
 TEXTS = {page: text_of(page) for page in PAGES}
 EXPLAINED = [text for page, text in TEXTS.items() if page.parent.name != "reference"]
 TEXT = "\n".join(EXPLAINED)
+OF_FILES = "\n".join([TEXT, TEXTS[DOCS / "reference" / "documents.md"]])  # keys of result files
 LONG = {  # pages whose code, and words in commands that, take seconds
     "best_so_far",
     "exact_pose",
@@ -194,7 +195,7 @@ def test_every_key_of_the_plans_of_a_fleet_is_explained():
     fleet = load_scenario(ROOT / "scenarios/fleets/intersection.yaml").fleet
     document = fleet_to_dict(plan_fleet(fleet, time_limit=0.5))
     for key in [*document, *document["clearance_m"], *document["timing_s"], *document["counts"]]:
-        assert f"`{key}`" in TEXT
+        assert f"`{key}`" in OF_FILES
 
 
 def test_every_key_of_the_loop_of_a_fleet_is_explained():
@@ -224,7 +225,7 @@ def test_every_key_of_a_scenario_is_explained():
 def test_every_key_of_a_plan_and_every_status_is_explained():
     document = plan_to_dict(plan(load_scenario(ROOT / "scenarios" / "parking.yaml").problem))
     for key in [*document, *document["trajectory"], *(status.value for status in PlanStatus)]:
-        assert f"`{key}`" in TEXT
+        assert f"`{key}`" in OF_FILES
 
 
 def anchors(page: Path) -> set[str]:
