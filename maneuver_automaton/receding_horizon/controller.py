@@ -159,7 +159,7 @@ class RecedingHorizon:
         total = problem.horizon.time
         # a fixed time that no rest fills cannot be prolonged: it ends then [s]
         self.arrival = None if total is None or settings.pad else problem.start_time + total
-        self.promises = promises(problem, step=step)
+        self.promises = promises(problem, step=settings.step)
         self.most_steps: int | None = None
         if last is not None and not settings.continuous:  # the bound counts from the first step
             bound = self.promises.most_steps(last.value)
