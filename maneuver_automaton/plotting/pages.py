@@ -53,18 +53,6 @@ def axes_at(figure: Figure, *, left: float, bottom: float, width: float, height:
     return figure.add_axes((left / wide, bottom / high, width / wide, height / high))
 
 
-def stacked_axes(
-    figure: Figure, count: int, *, left: float, bottom: float, width: float, height: float,
-    gap: float = 0.16,
-) -> list[Axes]:  # fmt: skip
-    """`count` axes above each other in a box given in inches; the first is on top."""
-    each = (height - gap * (count - 1)) / count
-    return [
-        axes_at(figure, left=left, bottom=bottom + k * (each + gap), width=width, height=each)
-        for k in reversed(range(count))
-    ]
-
-
 def hide_times(column: Sequence[Axes]) -> None:
     """Leave the times to the axes below."""
     for ax in column:
@@ -107,26 +95,6 @@ def title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float
 def fill(text: str, most: int) -> str:
     """The text in lines of at most so many characters; lines that it has stay lines."""
     return "\n".join(textwrap.fill(line, most) for line in text.split("\n"))
-
-
-def legend_rows(labels: Sequence[str], width: float, *, length: int = NAME_LENGTH) -> int:
-    """Rows that a legend of `labels`, cut to a `length`, takes in `width` [in]."""
-    return math.ceil(len(labels) / _columns(labels, width, length))
-
-
-def bottom_legend(
-    figure: Figure, handles: Sequence[Artist], labels: Sequence[str], *, left: float, width: float,
-    length: int = NAME_LENGTH,
-) -> None:  # fmt: skip
-    """A legend in rows along the lower edge of `figure`, in a strip given in inches."""
-    wide, high = figure.get_size_inches()
-    legend = figure.legend(
-        handles, [str(k) for k in range(len(labels))], loc="lower left", frameon=False,
-        bbox_to_anchor=(left / wide, 0.06 / high), ncols=_columns(labels, width, length),
-        fontsize=SMALL_PT, borderaxespad=0.0, borderpad=0.0, handlelength=1.8,
-        columnspacing=1.6, labelspacing=0.45,
-    )  # fmt: skip
-    plain(legend, labels, length=length)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.axes import Axes
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision import AnyObstacle, Obstacle, OccupancyMap
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.limits import limit_boxes
-from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
+from maneuver_automaton.plotting.obstacles import moving_shapes, static_shapes
 from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import count_from_near, tidy
-from maneuver_automaton.plotting.track import Track, track_of_plan
-from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.plotting.track import Track
+from maneuver_automaton.problem import Bounds, Goal
 
 STILL_SIZE_M = 1.0  # size of a path that goes nowhere
 ROOM = 0.16  # around start and goals where the body is not known, of the size
@@ -63,62 +59,6 @@ class Scenery:
     def moves(self) -> bool:
         """Whether an obstacle moves."""
         return any(isinstance(o, Obstacle) and o.motion is not None for o in self.obstacles)
-
-
-def plan_scene(problem: Problem, plan: Plan | None, *, footprint: Any = None) -> Scenery:
-    """The scene of a `problem`, its own body if no other is given.
-
-    The goal reached is the one nearest to the end of the plan. Without a plan, moving obstacles are
-    shown over all their motion.
-    """
-    if plan is None:
-        motions = [o.motion for o in problem.obstacles if isinstance(o, Obstacle) and o.motion]
-        ends = [float(motion.time[-1]) for motion in motions]
-        return scene_of(problem, problem.start_time, max(ends, default=0.0), footprint=footprint)
-    begin, end = plan.switching_times[[0, -1]].tolist()
-    off = [sum(goal.off(plan.end)) for goal in problem.goals]
-    scene = scene_of(problem, begin, end, footprint=footprint)
-    return replace(scene, reached=int(np.argmin(off)), carried=carried_parts(problem, plan))
-
-
-def carried_parts(problem: Problem, plan: Plan) -> tuple[Carried, ...]:
-    """The parts of a vehicle and their tracks along a `plan`."""
-    model = problem.automaton.model
-    return tuple(
-        Carried(
-            name=name,
-            body=tuple(footprint_polygons(shapes)),
-            track=track_of_plan(carried(plan, model, name)),
-        )
-        for name, shapes in problem.parts.items()
-        if plan.trims
-    )
-
-
-def bare_scene(track: Track, *, footprint: Any) -> Scenery:
-    """A scene of which nothing is known but the end of the track, and a body."""
-    body = tuple(footprint_polygons(footprint))
-    return Scenery(goals=(Goal(pose=track.end),), reached=0, body=body, times=np.zeros(1))
-
-
-def scene_of(problem: Problem, begin: float, end: float, *, footprint: Any = None) -> Scenery:
-    """The scene of a `problem` from time `begin` to `end` [s]; its own body if none is given."""
-    return Scenery(
-        goals=problem.goals,
-        obstacles=problem.obstacles,
-        zones=problem.zones,
-        bounds=problem.bounds,
-        body=tuple(footprint_polygons(problem.footprint if footprint is None else footprint)),
-        times=round_times(begin, end),
-    )
-
-
-def scene_size(scene: Scenery, track: Track) -> float:
-    """Size of a picture [m], from which those of its marks follow: the symmetry leaves it alone."""
-    ends = np.array([track.start, *(goal.pose for goal in scene.goals)])[:, :2]
-    apart = float(np.linalg.norm(ends - ends[0], axis=1).max())
-    size = max(track.size, apart, 2.0 * scene.reach)
-    return size if size > 1e-9 else STILL_SIZE_M
 
 
 def view_box(scene: Scenery, points: Array, *, size: float) -> Array:
@@ -164,16 +104,6 @@ def set_view(ax: Axes, box: Array, place: Array) -> None:
     ax.autoscale_view()
     tidy(ax, x="x [m]", y="y [m]")
     count_from_near(ax, place)
-
-
-def scene_points(scene: Scenery, track: Track, *, size: float) -> Array:
-    """Places (n, 2) where something happens: the track, the body along it, start and goals."""
-    ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
-    bodies = placed(scene.body, np.concatenate([track.switching_poses, ends]))
-    for part in scene.carried:
-        bodies += placed(part.body, part.track.switching_poses)
-    room = 0.0 if scene.body else ROOM * size
-    return np.concatenate([track.pose[:, :2], ends[:, :2] - room, ends[:, :2] + room, *bodies])
 
 
 def obstacle_boxes(obstacles: Sequence[AnyObstacle], times: Array) -> list[Array]:

@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
@@ -133,14 +132,3 @@ def outer_legend(
         handlelength=1.6,
     )
     return plain(legend, labels, length=length)
-
-
-def share_limits(column: Sequence[Axes]) -> None:
-    """Give axes below each other the widest limits among them; only the last shows its times."""
-    for get, set_ in (("get_xlim", "set_xlim"), ("get_ylim", "set_ylim")):
-        limits = np.array([getattr(ax, get)() for ax in column])
-        for ax in column:
-            getattr(ax, set_)(limits[:, 0].min(), limits[:, 1].max())
-    for ax in column[:-1]:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)

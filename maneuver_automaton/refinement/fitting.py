@@ -173,13 +173,6 @@ def _short_words(
             yield [trims[n] for n in numbers], [time for _, time in word]
 
 
-def with_best_times(problem: Problem, plan: Plan, goal: Goal) -> Plan | None:
-    """A plan's word with its best times to a goal; None if none are found that are cheaper."""
-    longest = np.array([trim.max_duration for trim in plan.trims])
-    again = _solved(problem, plan, goal, np.zeros(len(longest)), longest)
-    return None if again is None or problem.cost_of(again) >= problem.cost_of(plan) else again
-
-
 def with_lasting_coasts(
     problem: Problem, plan: Plan, goal: Goal, *, is_free: Callable[[Plan], bool]
 ) -> Plan:

@@ -4,26 +4,27 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.collision import Box, OccupancyMap, Polygon
-from maneuver_automaton.plotting.scene import (
-    mark_size,
-    plan_scene,
-    scene_points,
-    scene_size,
-    view_box,
-)
-from maneuver_automaton.plotting.track import track_of_plan
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.plotting.cast import Cast, cast_of
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.recording import recording_of
 from tests.plotting.cases import ROBOT, plan_of, slalom_problem
 
 PLAN = plan_of(["straight"], [2.0], start=(0.0, 0.0, 0.0))  # 3 m ahead
 BODY = Box([0.6, 0.4])
 
 
+def shown(problem, plan) -> Cast:
+    status = PlanStatus.NO_PLAN if plan is None else PlanStatus.FOUND
+    return cast_of(recording_of(PlanResult(problem=problem, status=status, reason="", plan=plan)))
+
+
+def cast_among(obstacles, **options) -> Cast:
+    return shown(Problem(ROBOT, PLAN.start, PLAN.end, obstacles=obstacles, **options), PLAN)
+
+
 def view_of(obstacles, **options):
-    problem = Problem(ROBOT, PLAN.start, PLAN.end, obstacles=obstacles, **options)
-    scene, track = plan_scene(problem, PLAN), track_of_plan(PLAN)
-    size = scene_size(scene, track)
-    return view_box(scene, scene_points(scene, track, size=size), size=size)
+    return cast_among(obstacles, **options).box
 
 
 def test_without_obstacles_the_plan_and_its_body_fill_the_view():
@@ -54,7 +55,7 @@ def test_only_blocked_cells_count():
 
 def test_what_moves_is_in_view_at_the_times_shown():
     plan = plan_of(["straight"], [3.0])
-    scene = plan_scene(slalom_problem(plan), plan)
+    scene = shown(slalom_problem(plan), plan).scene
     assert scene.moves
     assert scene.times[[0, -1]].tolist() == [0.0, 3.0]
 
@@ -62,24 +63,18 @@ def test_what_moves_is_in_view_at_the_times_shown():
 def test_the_goal_reached_is_the_nearest():
     goals = [Goal(pose=[3.0, 0.0, 2.0]), Goal(pose=[3.0, 0.0, 2 * np.pi]), Goal(pose=[9, 0, 0])]
     problem = Problem(ROBOT, PLAN.start, goals)
-    assert plan_scene(problem, PLAN).reached == 1
-    assert plan_scene(problem, None).reached is None
+    assert shown(problem, PLAN).scene.reached == 1
+    assert shown(problem, None).scene.reached is None
 
 
 @pytest.mark.parametrize("far", [30.0, 300.0])
 def test_marks_suit_the_body_on_a_long_way(far):
-    plan = plan_of(["straight"], [far / 1.5])
+    plan = plan_of(["straight"], [far / 1.5], start=(0.0, 0.0, 0.0))
     problem = Problem(ROBOT, plan.start, plan.end, footprint=BODY)
-    scene, track = plan_scene(problem, plan), track_of_plan(plan)
-    size = scene_size(scene, track)
-    assert size == pytest.approx(far)
-    box = np.array([[0.0, 0.0], [far, 1.0]])
-    assert mark_size(scene, box, size=size) == pytest.approx(0.35 * far)
+    assert shown(problem, plan).size == pytest.approx(0.35 * far)
 
 
 def test_marks_stay_visible_where_obstacles_fill_the_picture():
-    wall = Polygon([[-20.0, -20.0], [20.0, -20.0], [20.0, -19.0]])
-    problem = Problem(ROBOT, PLAN.start, PLAN.end, obstacles=wall, footprint=BODY)
-    scene = plan_scene(problem, PLAN)
-    box = np.array([[-20.0, -20.0], [20.0, 1.0]])
-    assert mark_size(scene, box, size=3.0) == pytest.approx(20.0)
+    wall = Polygon([[-3.0, -3.0], [3.0, -3.0], [3.0, -2.5]])
+    cast = cast_among(wall, footprint=BODY)
+    assert cast.size == pytest.approx(0.5 * np.ptp(cast.box, axis=0).max())

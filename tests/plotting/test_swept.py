@@ -11,11 +11,13 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.plotting.cast import cast_of
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
 from maneuver_automaton.plotting.paths import swept_area
-from maneuver_automaton.plotting.scene import plan_scene
 from maneuver_automaton.plotting.swept import swept_region
 from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.plotting.cases import document_of, parking_plan, plan_of
 
@@ -105,7 +107,8 @@ def test_what_is_carried_is_swept_as_well():
     trims = problem.automaton.trims
     turn = max(trims, key=lambda trim: trim.body_velocity[0] * abs(trim.body_velocity[2]))
     plan = Plan(problem.start, (turn,), durations=[3.0])
-    scene = plan_scene(problem, plan)
+    result = PlanResult(problem=problem, status=PlanStatus.FOUND, reason="", plan=plan)
+    scene = cast_of(recording_of(result)).scene
     (path,) = swept_area(track_of_plan(plan), scene).get_paths()
     rings = [shapely.Polygon(ring) for ring in path.to_polygons(closed_only=False)]
     region = shapely.union_all(rings)
