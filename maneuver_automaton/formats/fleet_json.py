@@ -158,12 +158,8 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
     InvalidScenario
         If the file cannot be read, has other vehicles, or was planned with other libraries.
     """
-    document = read_document(path, "fleet")
+    document = read_of_fleet(path, "fleet", fleet)
     stated = document["vehicles"]
-    if set(stated) != set(fleet.names):
-        raise InvalidScenario(
-            f"{path}: vehicles: got {', '.join(stated)}, need {', '.join(fleet.names)}"
-        )
     results = {
         name: result_of(stated[name], problem, place=f"{path}: vehicles.{name}")
         for name, problem in zip(fleet.names, fleet.problems, strict=True)
@@ -182,6 +178,16 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
             order=tuple(document["order"]),
             improvements=tuple((float(s), float(v)) for s, v in document["improvements"]),
         )
+
+
+def read_of_fleet(path: Path | str, kind: str, fleet: FleetProblem) -> dict[str, Any]:
+    """What a file of this kind holds of a fleet; it has to be that of these vehicles."""
+    document = read_document(path, kind)
+    if set(stated := document["vehicles"]) != set(fleet.names):
+        raise InvalidScenario(
+            f"{path}: vehicles: got {', '.join(stated)}, need {', '.join(fleet.names)}"
+        )
+    return document
 
 
 def closest_entry(one: Closest) -> ClosestEntry:

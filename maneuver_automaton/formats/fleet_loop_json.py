@@ -52,14 +52,13 @@ from maneuver_automaton.formats.documents import (
     number,
     or_inf,
     package_version,
-    read_document,
     says,
     source_entry,
     told_of,
     vehicle_entry,
     write_document,
 )
-from maneuver_automaton.formats.fleet_json import closest_entry, closest_of
+from maneuver_automaton.formats.fleet_json import closest_entry, closest_of, read_of_fleet
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.problem import Problem
 
@@ -446,12 +445,8 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
     InvalidScenario
         If the file cannot be read, has other vehicles, or was driven with other libraries.
     """
-    document = read_document(path, "fleet-loop")
+    document = read_of_fleet(path, "fleet-loop", fleet)
     stated = document["vehicles"]
-    if set(stated) != set(fleet.names):
-        raise InvalidScenario(
-            f"{path}: vehicles: got {', '.join(stated)}, need {', '.join(fleet.names)}"
-        )
     problems = dict(zip(fleet.names, fleet.problems, strict=True))
     for name, problem in problems.items():
         if stated[name]["automaton_hash"] != automaton_hash(problem.automaton):

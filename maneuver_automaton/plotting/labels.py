@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from maneuver_automaton.plotting.style import shortened
 
@@ -47,20 +46,6 @@ def control_labels(names: Sequence[str]) -> list[str]:
     ]
 
 
-def stated_labels(document: Mapping[str, Any], what: str) -> list[str]:
-    """Axis labels of the columns of a loaded plan.json, `what` is control or reduced_state.
-
-    Empty where it does not name them.
-
-    Examples
-    --------
-    >>> stated_labels({"vehicle": {"control": ["speed"]}}, "control"), stated_labels({}, "control")
-    (['speed [m/s]'], [])
-    """
-    vehicle = document.get("vehicle") or {}
-    return control_labels([str(name) for name in vehicle.get(what) or ()])
-
-
 def shown_name(name: str) -> str:
     """The name of a trim or maneuver as pictures show it: "polished" alone says little.
 
@@ -97,31 +82,3 @@ def word_text(word: Sequence[str], *, width: int, lines: int) -> str:
         head += 1
     cut = ARROW.join([*names[:head], "…", *tail]) + f" ({len(names)} trims)"
     return "\n".join(textwrap.wrap(cut, width, break_long_words=False))
-
-
-def result_text(
-    *,
-    cost: float | None,
-    duration: float | None,
-    error_m: float | None,
-    error_rad: float | None,
-    clearance_m: float | None = None,
-) -> str:
-    """Cost, duration, terminal error and clearance in one line; values of None are left out.
-
-    Examples
-    --------
-    >>> result_text(cost=9.75, duration=8.0, error_m=0.0, error_rad=2e-16)
-    'cost 9.75 · 8 s · terminal error 0 m, 2e-16 rad'
-    """
-    parts = []
-    if cost is not None:
-        parts.append(f"cost {cost:.6g}")
-    if duration is not None:
-        parts.append(f"{duration:.5g} s")
-    if error_m is not None:
-        angle = "" if error_rad is None else f", {error_rad:.2g} rad"
-        parts.append(f"terminal error {error_m:.2g} m{angle}")
-    if clearance_m is not None:
-        parts.append(f"clearance {clearance_m:.3g} m")
-    return " · ".join(parts)

@@ -13,8 +13,8 @@ from maneuver_automaton.plotting.player import player_of as player_of
 from maneuver_automaton.recording import recording_of
 
 
-def picture_of(value: Any) -> bytes | None:
-    """The picture of a value as a PNG; None if it holds nothing to draw.
+def picture_of(value: Any) -> bytes:
+    """The picture of a value as a PNG.
 
     Examples
     --------
