@@ -21,6 +21,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks.cases import DATA, present
 from benchmarks.tables import show
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import read_commonroad
@@ -34,7 +35,7 @@ from maneuver_automaton.roads import (
     road_planner,
 )
 
-SCENARIOS = Path(__file__).parents[1] / "../shared/data/commonroad/scenarios"
+SCENARIOS = DATA / "commonroad/scenarios"
 HEAD = (
     "scenario",
     "reachable",
@@ -60,6 +61,8 @@ def main() -> None:
     parser.add_argument("--width", type=int, default=RoadSettings().width)
     parser.add_argument("--wide", type=int, default=8000)
     arguments = parser.parse_args()
+    if arguments.scenarios == SCENARIOS and not present("commonroad/scenarios"):
+        return
     rows, wall, cpu, said = [], [], [], []
     for file in sorted(arguments.scenarios.glob("*.xml")):
         try:

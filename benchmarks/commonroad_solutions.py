@@ -21,10 +21,11 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import maneuver_automaton as ma
+from benchmarks.cases import DATA, present
 from benchmarks.tables import show
 from maneuver_automaton.errors import InvalidScenario
 
-SCENARIOS = Path(__file__).parents[1] / "../shared/data/commonroad/scenarios"
+SCENARIOS = DATA / "commonroad/scenarios"
 CHECKS = ("goal", "start", "traffic", "boundary", "feasible", "valid")
 HEAD = ("scenario", "kind", "ours", "step [s]", "states", *CHECKS)
 
@@ -34,6 +35,8 @@ def main() -> None:
     parser.add_argument("--scenarios", type=Path, default=SCENARIOS)
     parser.add_argument("--out", type=Path, default=Path(tempfile.gettempdir()) / "solutions")
     arguments = parser.parse_args()
+    if arguments.scenarios == SCENARIOS and not present("commonroad/scenarios"):
+        return
     warnings.simplefilter("ignore")
     logging.disable(logging.CRITICAL)
     rows, said = [], []

@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import shapely
 
+from benchmarks import cases
 from benchmarks.tables import show
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
@@ -31,7 +32,7 @@ from maneuver_automaton.collision.surroundings import Part, parts_of
 from maneuver_automaton.fleet import FleetProblem, FleetResult, plan_fleet
 from maneuver_automaton.scenario import load_scenario
 
-DATA = Path(__file__).parents[1] / ".." / "shared" / "data" / "fleet"
+DATA = cases.DATA / "fleet"
 STEP = 0.005  # [s] between two looks at the bodies
 BLOCK = 2000  # looks at once
 
@@ -99,6 +100,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args()
+    if not cases.present("fleet"):
+        return
     best, rows = published(), []
     for path in files(given.words):
         fleet = load_scenario(path).fleet

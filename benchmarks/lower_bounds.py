@@ -41,10 +41,11 @@ def by_length(problems: dict[str, Problem]) -> Iterator[tuple[str, Problem]]:
 
 def groups() -> dict[str, Iterator[tuple[str, Problem]]]:
     bays = {f"bay {w} m, aisle {a} m": scenes.bay(w, a) for w, a in scenes.BAYS}
-    tpcap = {f"TPCAP {k}": one for k, one in cases.tpcap().items()}
-    dynobench = {name: cases.dynobench(name) for name in cases.FIRST_ORDER}
+    there = {name: cases.present(name) for name in ("car-scenarios", "tpcap", "dynobench")}
+    tpcap = {f"TPCAP {k}": one for k, one in (cases.tpcap() if there["tpcap"] else {}).items()}
+    dynobench = {name: cases.dynobench(name) for name in cases.FIRST_ORDER if there["dynobench"]}
     return {
-        "cars": by_length(cases.car_scenarios()),
+        "cars": by_length(cases.car_scenarios() if there["car-scenarios"] else {}),
         "slots": by_length({f"slot {x} m": scenes.parallel_slot(x) for x in SLOTS}),
         "bays": by_length(bays),
         "corridors": by_length({f"corridor {x} m": scenes.corridor(x) for x in scenes.CORRIDORS}),

@@ -21,6 +21,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import maneuver_automaton as ma
+from benchmarks.cases import present
 from benchmarks.fleets import DATA
 from benchmarks.latency import planner_of
 from benchmarks.tables import show
@@ -112,6 +113,8 @@ def main() -> None:
     parser.add_argument("--every", type=int, default=5)
     parser.add_argument("--repeats", type=int, default=15)
     arguments = parser.parse_args()
+    if arguments.file == FILE and not present("fleet"):
+        return
     scenario = load_scenario(arguments.file)
     if not isinstance(scenario, FleetScenario):
         parser.error(f"{arguments.file}: need a file of several vehicles")

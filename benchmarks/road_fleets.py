@@ -24,6 +24,7 @@ import shapely
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from benchmarks.cases import DATA, present
 from benchmarks.tables import show
 from maneuver_automaton import Plan
 from maneuver_automaton.collision import Box, Obstacle
@@ -39,7 +40,7 @@ from maneuver_automaton.roads import (
     drive_roads,
 )
 
-DATA = Path(__file__).parents[1] / ".." / "shared" / "data" / "commonroad" / "scenarios"
+SCENARIOS = DATA / "commonroad/scenarios"
 LEAST_STATES, LEAST_WAY = 20, 10.0  # recorded states, and [m], of a car that is driven
 SPEEDS = (3.0, 30.0)  # [m/s] of its start at least, and at most
 STEP = 0.005  # [s] between two looks at the bodies
@@ -130,8 +131,10 @@ def main() -> None:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--most", type=int, default=3)
     arguments = parser.parse_args()
+    if not present("commonroad/scenarios"):
+        return
     rows = []
-    for path in sorted(DATA.glob("*.xml")):
+    for path in sorted(SCENARIOS.glob("*.xml")):
         if arguments.names and not any(name in path.name for name in arguments.names):
             continue
         found = row(path, arguments.most)

@@ -28,6 +28,7 @@ import numpy as np
 import shapely
 from shapely.affinity import rotate, translate
 
+from benchmarks.cases import DATA, present
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.formats.libraries import read_primitives
@@ -36,7 +37,6 @@ from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.planner import Planner
 from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.search.state_lattice import GraphSearch, graph_of
-from tests.formats.outside import DATA
 
 FILES = ("field/nova04.json", "field/carina16.mprim", "sbpl/mprim/pr2.mprim")
 SPAN = 100  # cells from side to side of the room
@@ -232,4 +232,4 @@ def main(files):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [DATA / one for one in FILES])
+    main(sys.argv[1:] or [DATA / one for one in FILES if present(one)])

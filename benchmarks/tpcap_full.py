@@ -19,11 +19,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import maneuver_automaton as ma
+from benchmarks.cases import DATA, present
 from benchmarks.tables import show
 from maneuver_automaton.automaton import Plan
 
 ROOT = Path(__file__).parents[1]
-CASES = ROOT / "../shared/data/tpcap"
+CASES = DATA / "tpcap"
 STANDING = 1e-3  # [m/s] slower is no gear
 HEAD = ("case", "T [s]", "weighted", "gears", "first [s]", "first T", "clearance [mm]", "CPU [s]")
 
@@ -51,6 +52,8 @@ def main() -> None:
     parser.add_argument("cases", nargs="*", type=Path)
     parser.add_argument("--time-limit", type=float, default=10.0)
     options = parser.parse_args()
+    if not options.cases and not present("tpcap"):
+        return
     files = options.cases or sorted(CASES.glob("Case*.csv"), key=lambda path: int(path.stem[4:]))
     rows = []
     for number, path in enumerate([*files[:1], *files]):  # the first one twice: it loads
