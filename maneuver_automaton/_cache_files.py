@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 DIGEST = hashlib.sha256().digest_size  # [bytes] in front of the content
+PLAINLY = "kernels are compiled as numba does by itself, which takes longer"
 LOG = logging.getLogger("maneuver_automaton")
 
 _said: set[str] = set()

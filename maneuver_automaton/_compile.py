@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
+from maneuver_automaton._cache_files import PLAINLY, say_once
 from maneuver_automaton._kernel_folders import kernel_folder
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
@@ -164,9 +165,14 @@ def _pipeline(name: str) -> dict[str, Any]:
     import numba
 
     if not LINKED[0] <= numba.version_info.short <= LINKED[1]:
+        first, last = (".".join(map(str, one)) for one in LINKED)
+        say_once("plainly", f"{PLAINLY}: numba is {numba.__version__}, known are {first} to {last}")
         return {}
-    from maneuver_automaton import _linking
-
+    try:
+        from maneuver_automaton import _linking
+    except Exception as error:  # noqa: BLE001, nobody promised that these insides stay as they are
+        say_once("plainly", f"{PLAINLY}: {type(error).__name__}: {error}")
+        return {}
     return {"pipeline_class": getattr(_linking, name)}
 
 

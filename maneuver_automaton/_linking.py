@@ -8,15 +8,19 @@ lowered here; the kernel that Python calls is optimised with all of them, which 
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
+import numba
 from llvmlite.binding import Linkage, parse_assembly
 from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import Compiler, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
+
+from maneuver_automaton._cache_files import PLAINLY, say_once
 
 CALLED = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object, ctypes.py_object, ctypes.c_void_p)
 
@@ -125,13 +129,13 @@ class KernelLowering(NativeLowering):  # type: ignore[misc]
         return bool(super().run_pass(state))
 
 
-class LinkedCompiler(CompilerBase):  # type: ignore[misc]
-    """Compiler of functions that only kernels call."""
+class LinkingCompiler(Compiler):  # type: ignore[misc]
+    """The usual passes, but for the lowering."""
 
-    lowering: ClassVar[type[NativeLowering]] = LinkedLowering
+    lowering: ClassVar[type[NativeLowering]]
 
     def define_pipelines(self) -> list[Any]:
-        """The usual passes, but for the lowering."""
+        """The passes."""
         usual = DefaultPassBuilder.define_nopython_pipeline(self.state)
         usual.add_pass_after(self.lowering, NativeLowering)
         usual.passes = [one for one in usual.passes if one[0] is not NativeLowering]
@@ -139,7 +143,48 @@ class LinkedCompiler(CompilerBase):  # type: ignore[misc]
         return [usual]
 
 
+class LinkedCompiler(LinkingCompiler):
+    """Compiler of functions that only kernels call."""
+
+    lowering = LinkedLowering
+
+    def define_pipelines(self) -> list[Any]:
+        """The passes; numba's own where it is not as it is taken to be here."""
+        return super().define_pipelines() if _fits() else Compiler.define_pipelines(self)
+
+
 class KernelCompiler(LinkedCompiler):
     """Compiler of functions that Python calls."""
 
     lowering = KernelLowering
+
+
+@functools.cache
+def _fits() -> bool:
+    """Whether two functions of a line, one calling the other, are compiled and kept as they should.
+
+    It is asked before the first function is compiled, and not where compiled code is loaded.
+    """
+
+    class Linked(LinkingCompiler):
+        lowering = LinkedLowering
+
+    class Kernel(LinkingCompiler):
+        lowering = KernelLowering
+
+    try:
+        inner = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Linked)(
+            lambda x: x + 1.0
+        )
+        outer = numba.njit(no_cfunc_wrapper=True, pipeline_class=Kernel)(lambda x: inner(x))
+        if outer(1.0) != 2.0:
+            raise ValueError("1 + 1 is not 2")
+        (compiled,) = outer.overloads.values()
+        again = type(compiled)._rebuild(compiled.target_context, *compiled._reduce())
+        if again.entry_point(2.0) != 3.0:
+            raise ValueError("2 + 1 is not 3")
+    except Exception as error:  # noqa: BLE001, nobody promised that these insides stay as they are
+        why = " ".join(str(error).split())
+        say_once("plainly", f"{PLAINLY}: {type(error).__name__}: {why}")
+        return False
+    return True
