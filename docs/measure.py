@@ -56,7 +56,7 @@ LARGE = {  # pictures of the README and of pages, by their scenarios
     "helicopter_city": ("plan_3d.png", "helicopter_city.png"),
 }
 FILMED = "parallel_parking"
-FIGURES = ("symmetry", "feasible", "uniform_effort", "unconstrained", "turnpike")
+FIGURES = ("inside", "symmetry", "feasible", "uniform_effort", "unconstrained", "turnpike")
 TABLES = {  # between a line <!-- word --> and <!-- end -->
     "reference/keys.md": ("keys", reference.keys),
     "reference/documents.md": ("documents", reference.documents),
@@ -79,6 +79,7 @@ def measured_pages() -> list[Path]:
     """The pages whose outputs are written here."""
     docs = ROOT / "docs"
     return [
+        docs / "inside.md",
         docs / "paper.md",
         *sorted(docs.glob("howto/*.md")),
         *sorted(docs.glob("questions/*.md")),
@@ -240,10 +241,13 @@ def few_colours(image: Image.Image) -> bytes:
 
 def draw_figure(name: str) -> None:
     """Draw a picture of a study."""
+    import inside
     import studies
     import symmetry
 
-    (symmetry.PICTURES | studies.PICTURES)[f"{name}.png"]().savefig(f"{name}.png", dpi=130)
+    (inside.PICTURES | symmetry.PICTURES | studies.PICTURES)[f"{name}.png"]().savefig(
+        f"{name}.png", dpi=130
+    )
     shrink(Path(f"{name}.png"), ROOT / "scenarios" / "pictures" / f"{name}.png", most=WHOLE)
 
 

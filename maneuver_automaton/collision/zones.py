@@ -64,8 +64,8 @@ class Zone:
                 raise ValueError(f"zone: {name} must be a number of at least 0, got {value}")
         if self.trims is not None:
             object.__setattr__(self, "trims", tuple(self.trims))
-        open_to_all = self.max_speed is None and self.reverse and self.trims is None
-        if open_to_all and self.max_lateral_acceleration is None:
+        limits = (self.max_speed, self.max_lateral_acceleration, self.trims)
+        if limits == (None,) * 3 and self.reverse and type(self).admits is Zone.admits:
             raise ValueError(
                 "zone: forbids nothing, need max_speed, max_lateral_acceleration, reverse=False or "
                 "trims"
