@@ -255,7 +255,10 @@ JITCodeLibrary._raise_if_finalized = for_itself
         "AttributeError: no attribute '_raise_if_finalized'",
     ),
     "a part does something else": (
-        "import numba, types; numba._dynfunc = types.SimpleNamespace(make_function=lambda *parts: 1)",
+        """
+import numba, types
+numba._dynfunc = types.SimpleNamespace(make_function=lambda *parts: 1)
+""",
         "TypeError: must be builtin_function_or_method",
     ),
 }

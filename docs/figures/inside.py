@@ -70,8 +70,8 @@ def arrow(ax: Axes, start: tuple[float, float], end: tuple[float, float], what: 
     way = last - first
     with np.errstate(divide="ignore"):
         part = (half / np.abs(way)).min()
-    ax.annotate("", last - part * way, first + part * way, zorder=4,
-                arrowprops={"arrowstyle": "-|>", "color": BLUE, "shrinkA": 0, "shrinkB": 0})  # fmt: skip
+    look = {"arrowstyle": "-|>", "color": BLUE, "shrinkA": 0, "shrinkB": 0}
+    ax.annotate("", last - part * way, first + part * way, zorder=4, arrowprops=look)
     ax.text(*(first + last) / 2.0, what, ha="center", va="center", color=BLUE, fontsize=7.5,
             zorder=5, bbox={"facecolor": PAPER, "edgecolor": "none", "pad": 0.8})  # fmt: skip
 
