@@ -18,7 +18,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Drawn
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
-from maneuver_automaton.models.lateral import (
+from maneuver_automaton.models.speeds import (
     is_too_sharp,
     lateral_acceleration,
     lateral_limit,

@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import lateral_limit
+from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.problem import resampled
 from maneuver_automaton.optimal_control.rules import increments

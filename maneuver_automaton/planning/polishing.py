@@ -20,7 +20,7 @@ from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.greatest_speed import Interval
+from maneuver_automaton.models.speeds import Interval
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polish_values import Guard
 from maneuver_automaton.optimal_control.polishing import intervals_for

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import is_too_sharp, lateral_limit
+from maneuver_automaton.models.speeds import is_too_sharp, lateral_limit
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver
 from maneuver_automaton.primitives.trajectory import Trajectory

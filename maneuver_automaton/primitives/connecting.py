@@ -8,7 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import is_too_sharp
+from maneuver_automaton.models.speeds import is_too_sharp
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
     Transfer,

@@ -12,7 +12,7 @@ import numpy as np
 from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import pace_within
+from maneuver_automaton.models.speeds import pace_within
 from maneuver_automaton.primitives.bang_bang import check_limited_rates
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.maneuver import Maneuver

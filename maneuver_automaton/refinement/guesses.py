@@ -16,7 +16,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.models.lateral import lateral_limit
+from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.primitives import Trajectory
 

@@ -10,7 +10,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import pace_within
+from maneuver_automaton.models.speeds import pace_within
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.refinement.stop_and_steer import StopsAndSteers
 

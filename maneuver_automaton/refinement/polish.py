@@ -19,7 +19,7 @@ from maneuver_automaton.collision import Obstacle, Shape
 from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import lateral_limit
+from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.movers import MovingSolid
 from maneuver_automaton.optimal_control.polish_values import (

@@ -15,7 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import pace_within
+from maneuver_automaton.models.speeds import pace_within
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive
 
