@@ -29,7 +29,7 @@ from maneuver_automaton.automaton.courses import (
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory
-from maneuver_automaton.primitives.maneuver import CLOSED
+from maneuver_automaton.primitives.primitive import CLOSED
 
 WITHIN = 1e-9  # by which share of its size, at least 1, a value may exceed a limit
 NEEDED = ("name", "source", "target", "displacement", "duration")

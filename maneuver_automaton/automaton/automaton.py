@@ -24,9 +24,8 @@ from maneuver_automaton.models.speeds import (
     lateral_limit,
 )
 from maneuver_automaton.primitives import Maneuver, Trim, trims_of
-from maneuver_automaton.primitives.bang_bang import Pairs, has_limited_rates
-from maneuver_automaton.primitives.in_world import maneuver_in_world, trim_in_world
-from maneuver_automaton.primitives.quickest import quickest_maneuvers
+from maneuver_automaton.primitives.closed_form import Pairs, has_limited_rates, quickest_maneuvers
+from maneuver_automaton.primitives.symmetry import maneuver_in_world, trim_in_world
 from maneuver_automaton.primitives.turning import turns_between
 
 if TYPE_CHECKING:

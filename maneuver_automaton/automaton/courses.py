@@ -18,8 +18,8 @@ from maneuver_automaton.automaton._library_values import listed
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.primitives.connecting import pieces
 from maneuver_automaton.primitives.driving import drive_all
-from maneuver_automaton.primitives.resimulation import pieces
 
 EVEN = 1e-12  # by which share of a maneuver's duration equal intervals may differ
 COURSE_TOLERANCE = 1e-9  # [m, rad, units of the reduced state] off its inputs driven again

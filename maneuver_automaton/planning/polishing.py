@@ -22,10 +22,9 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import Interval
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
-from maneuver_automaton.optimal_control.polish_values import Guard
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
-from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.optimal_control.scene import BodyPart, Guard
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.polished_price import (

@@ -29,9 +29,9 @@ from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, TransferSettings
-from maneuver_automaton.primitives.bang_bang import has_limited_rates
+from maneuver_automaton.primitives.closed_form import has_limited_rates
 from maneuver_automaton.primitives.equilibrium import MissingTrim, trims_of
-from maneuver_automaton.primitives.trim import Trim
+from maneuver_automaton.primitives.primitive import Trim
 from maneuver_automaton.scenario.automata import MAX_STEADY_TRIMS
 from maneuver_automaton.scenario.parts import (
     Count,

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton.stock import stock_libraries
 from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
 from maneuver_automaton.models.speeds import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.primitives.quickest import quickest_maneuvers
+from maneuver_automaton.primitives.closed_form import quickest_maneuvers
 
 Controls = Mapping[str, tuple[float, float]]
 

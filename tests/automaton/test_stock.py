@@ -11,7 +11,7 @@ import maneuver_automaton as ma
 from maneuver_automaton.automaton.stock import stock_libraries
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from tests.reference_dynamics import trim_defect
 
 LEAST = {  # trims, maneuvers
