@@ -46,10 +46,10 @@ from maneuver_automaton.refinement.guesses import (
     car_guess,
     pace_of_car,
     pace_of_unicycle,
+    path_guesses,
     timed,
     unicycle_guess,
 )
-from maneuver_automaton.refinement.path_guesses import path_guesses
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishTask,

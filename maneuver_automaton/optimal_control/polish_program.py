@@ -12,10 +12,10 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
 from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.problem import (
-    Components,
     Grid,
     OptimalControlProblem,
     RunningCost,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
@@ -12,11 +12,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.vehicle import Components
 
-Components = Sequence[Any]
-"""Components of a state or control: each a number, an array over instants, or a symbol."""
-
-Rates = Callable[[Components, Components], Sequence[Any]]
+Rates = Callable[[Components, Components], Components]
 """``f(x, u)``: the rate of each component of the state."""
 
 RunningCost = Callable[[Components, Components], Any]

@@ -17,8 +17,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
-from maneuver_automaton.optimal_control.problem import Components, Guess
+from maneuver_automaton.optimal_control.problem import Guess
 
 Solid = tuple[Array, float]
 """Corners (n, 2) of a convex polygon, and the radius that rounds it: one corner makes a disc."""

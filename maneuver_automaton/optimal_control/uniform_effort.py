@@ -10,9 +10,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.ipopt import SolverSettings
 from maneuver_automaton.optimal_control.problem import (
-    Components,
     Grid,
     Guess,
     OptimalControlProblem,

@@ -91,7 +91,7 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
     from maneuver_automaton.planning.polishing import why_not_polished
-    from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+    from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
     from maneuver_automaton.search.lattice_query import lattice_query
 
     model, cost = problem.automaton.model, problem.cost

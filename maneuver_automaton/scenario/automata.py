@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.library import load_library
-from maneuver_automaton.automaton.stock import load_stock_library, stock_libraries
+from maneuver_automaton.automaton.library import load_library, load_stock_library, stock_libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit

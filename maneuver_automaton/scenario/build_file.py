@@ -13,7 +13,6 @@ from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton._library_models import model_of as model_of_entry
 from maneuver_automaton.automaton.building import (
     Failure,
     LibraryBuild,
@@ -23,6 +22,7 @@ from maneuver_automaton.automaton.building import (
     nearest_pairs,
     neighbour_pairs,
 )
+from maneuver_automaton.automaton.library import model_of as model_of_entry
 from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.design import DesignedLibrary, design_library
 from maneuver_automaton.formats.text_source import read_text

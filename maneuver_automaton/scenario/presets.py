@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.stock import stock_libraries
+from maneuver_automaton.automaton.library import stock_libraries
 from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
 from maneuver_automaton.models.speeds import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import rollout
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.automaton.stock import stock_libraries
+from maneuver_automaton.automaton.library import stock_libraries
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.primitives.connecting import maneuver_defect
