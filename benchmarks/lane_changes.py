@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.optimal_control import Grid, OptimalControlProblem, moving_frame, solve
 from maneuver_automaton.planning import plan

@@ -20,9 +20,8 @@ from pathlib import Path
 import maneuver_automaton
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.journal import journal_path, read_journal
-from maneuver_automaton.automaton.library import load_library
-from maneuver_automaton.automaton.stock import stock_libraries
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.automaton.library import load_library, stock_libraries
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.scenario.build_file import load_build_file
 from tests.reference_dynamics import trim_defect
 

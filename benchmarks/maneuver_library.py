@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library, save_library
 from maneuver_automaton.models import SecondOrderCar, rollout
-from maneuver_automaton.primitives.resimulation import pieces
+from maneuver_automaton.primitives.connecting import pieces
 
 CAR = SecondOrderCar(
     wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5

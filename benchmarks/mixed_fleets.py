@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 import maneuver_automaton as ma
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.fleet import FleetProblem
 from tests.fleet.robots import ROBOT

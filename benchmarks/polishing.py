@@ -33,9 +33,8 @@ from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import CarWithTrailer, Model, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess
-from maneuver_automaton.optimal_control.polish_values import PolishSettings
 from maneuver_automaton.optimal_control.polishing import intervals_for
-from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.optimal_control.scene import BodyPart, PolishSettings
 from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
@@ -47,10 +46,10 @@ from maneuver_automaton.refinement.guesses import (
     car_guess,
     pace_of_car,
     pace_of_unicycle,
+    path_guesses,
     timed,
     unicycle_guess,
 )
-from maneuver_automaton.refinement.path_guesses import path_guesses
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishTask,

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.automaton import Plan as Plan
     from maneuver_automaton.automaton.building import build_library as build_library
     from maneuver_automaton.automaton.library import load_library as load_library
+    from maneuver_automaton.automaton.library import load_stock_library as load_stock_library
     from maneuver_automaton.automaton.library import save_library as save_library
-    from maneuver_automaton.automaton.stock import load_stock_library as load_stock_library
     from maneuver_automaton.collision import Box as Box
     from maneuver_automaton.collision import Disc as Disc
     from maneuver_automaton.collision import Motion as Motion
@@ -163,7 +163,7 @@ _HOMES = {
     "load_plan": "formats.plan_json",
     "load_plans": "formats.plan_json",
     "load_scenario": "scenario",
-    "load_stock_library": "automaton.stock",
+    "load_stock_library": "automaton.library",
     "lower_bound": "planning.lower_bound",
     "plan": "planning",
     "plan_road": "roads",

@@ -6,7 +6,7 @@ import numpy as np
 
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import rollout, vector_field
-from maneuver_automaton.optimal_control.vehicles import moving_frame
+from maneuver_automaton.optimal_control.problem import moving_frame
 
 
 def trim_defect(model, trim, *, duration=5.0):

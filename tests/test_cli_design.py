@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from maneuver_automaton.automaton.library import load_library, save_library
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_library, load_stock_library, save_library
 from maneuver_automaton.cli import run
 from maneuver_automaton.scenario import load_scenario
 

@@ -11,8 +11,8 @@ from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygo
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.closed_form import strokes
 from maneuver_automaton.primitives.driving import drive_all
-from maneuver_automaton.primitives.strokes import strokes
 from maneuver_automaton.problem import Goal, Horizon
 from maneuver_automaton.receding_horizon import simulate
 from maneuver_automaton.scenario.scenario import scenario_of_text
@@ -98,7 +98,7 @@ def test_a_step_of_a_loop_far_shorter_than_its_plan_takes_no_memory():
 
 
 def test_rides_that_need_elements_without_number_are_refused_together(monkeypatch):
-    monkeypatch.setattr("maneuver_automaton.primitives._collocation.MOST_ELEMENTS", 1000)
+    monkeypatch.setattr("maneuver_automaton.primitives.driving.MOST_ELEMENTS", 1000)
     car = SecondOrderCar(
         wheelbase=2.8, max_steering=0.75, max_speed=9.0, max_acceleration=1.0, max_steering_rate=0.5
     )
@@ -112,7 +112,7 @@ def test_a_library_of_maneuvers_without_number_is_refused(monkeypatch):
     model = SecondOrderCar(
         wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
     )
-    monkeypatch.setattr(sys.modules["maneuver_automaton.primitives.bang_bang"], "MOST", 100)
+    monkeypatch.setattr(sys.modules["maneuver_automaton.primitives.closed_form"], "MOST", 100)
     trims = {"speed": np.linspace(0.0, 2.0, 6), "steering": [0.0, 0.1]}
     with pytest.raises(ValueError, match="got 132 maneuvers between 12 trims, need at most 100"):
         Automaton.of_model(model, trims, pairs="all")

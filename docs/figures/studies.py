@@ -31,7 +31,7 @@ from maneuver_automaton.analysis import (
 from maneuver_automaton.optimal_control import UniformEffortExample, solve_uniform_effort_example
 from maneuver_automaton.optimal_control.uniform_effort import END_NODES
 from maneuver_automaton.primitives import trims_of
-from maneuver_automaton.primitives.bang_bang import bang_bang
+from maneuver_automaton.primitives.closed_form import bang_bang
 from maneuver_automaton.receding_horizon import (
     FixedHorizon,
     MixedOrderCost,

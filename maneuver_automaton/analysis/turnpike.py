@@ -19,8 +19,7 @@ from maneuver_automaton.optimal_control import (
     moving_frame,
     solve,
 )
-from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.rules import increments
+from maneuver_automaton.optimal_control.problem import RunningCost, increments
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 
 

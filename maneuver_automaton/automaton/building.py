@@ -36,9 +36,13 @@ from maneuver_automaton.optimal_control.maneuvers import (
     transfer_program,
 )
 from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.primitives.connecting import ADMITTED_DEFECT, Inputs, connect
-from maneuver_automaton.primitives.mirror import Mirror, mirror_of
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.connecting import (
+    ADMITTED_DEFECT,
+    Inputs,
+    connect,
+    maneuver_defect,
+)
+from maneuver_automaton.primitives.symmetry import Mirror, mirror_of
 
 SIDEWAYS = 1  # place of the lateral speed in a twist
 Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton.plan import Plan
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver
-from maneuver_automaton.primitives.trajectory import Trajectory
+from maneuver_automaton.primitives.primitive import Trajectory
 
 
 def carried(plan: Plan, model: Model, part: str) -> Plan:

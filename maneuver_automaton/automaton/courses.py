@@ -1,4 +1,4 @@
-"""The courses of maneuvers in library files: inputs, from which they are driven again.
+"""Maneuvers in library files: read, driven along their inputs, and held against the model.
 
 A course of a few hundred samples is a few numbers: what was put in, and until when. Where the
 inputs do not lead along the course, because it came from elsewhere, its samples are written.
@@ -6,6 +6,7 @@ inputs do not lead along the course, because it came from elsewhere, its samples
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -14,12 +15,75 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.automaton._library_values import listed
+from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.primitives.connecting import pieces
 from maneuver_automaton.primitives.driving import drive_all
-from maneuver_automaton.primitives.resimulation import pieces
+from maneuver_automaton.primitives.primitive import CLOSED
+
+
+def rows_of(document: Mapping[str, Any], key: str) -> list[Any]:
+    """The list at a key, empty if there is none."""
+    found = document.get(key, [])
+    if not isinstance(found, list):
+        raise InvalidLibrary(f"{key}: got {found!r:.60}, need a list")
+    return found
+
+
+def check_keys(label: str, entry: Any, *, known: Sequence[str], needed: Sequence[str]) -> None:
+    """Refuse an entry that is no object, has an unknown key, or lacks one."""
+    if not isinstance(entry, dict):
+        raise InvalidLibrary(f"{label}: got {entry!r:.60}, need an object")
+    for key in entry:
+        if key not in known:
+            raise InvalidLibrary(f"{label}: unknown key {key!r}, need {', '.join(known)}")
+    for key in needed:
+        if key not in entry:
+            raise InvalidLibrary(f"{label}: the key {key!r} is missing")
+
+
+def text_of(label: str, value: Any) -> str:
+    """A text."""
+    if not isinstance(value, str):
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a text")
+    return value
+
+
+def number_of(label: str, value: Any) -> float:
+    """A finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a number")
+    huge = isinstance(value, int) and abs(value) > 2**63
+    if huge or not math.isfinite(value):
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a finite number")
+    return float(value)
+
+
+def numbers_of(label: str, value: Any) -> Array:
+    """A list of numbers."""
+    if not isinstance(value, list):
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a list of numbers")
+    return np.array([number_of(label, item) for item in value], dtype=np.float64)
+
+
+def table_of(label: str, value: Any, *, width: int | None = None) -> Array:
+    """Rows (n, width) of numbers, at least one."""
+    if not isinstance(value, list) or not value:
+        raise InvalidLibrary(f"{label}: got {value!r:.60}, need a list of rows of numbers")
+    rows = [numbers_of(f"{label}[{k}]", row) for k, row in enumerate(value)]
+    width = rows[0].size if width is None else width
+    for k, row in enumerate(rows):
+        if row.size != width:
+            raise InvalidLibrary(f"{label}[{k}]: got {row.size} numbers, need {width}")
+    return np.array(rows, dtype=np.float64).reshape(len(rows), width)
+
+
+def listed(array: Array) -> list[float]:
+    """Numbers of an array as a file has them: -0.0 is 0.0."""
+    return [value + 0.0 for value in array.tolist()]
+
 
 EVEN = 1e-12  # by which share of a maneuver's duration equal intervals may differ
 COURSE_TOLERANCE = 1e-9  # [m, rad, units of the reduced state] off its inputs driven again
@@ -135,3 +199,119 @@ def _drivable(model: Model, starts: Mapping[str, Array], maneuver: Maneuver) -> 
         and course.control.shape[1:] == (len(model.control_names),)
         and starts[maneuver.source].shape == (len(model.reduced_names),)
     )
+
+
+WITHIN = 1e-9  # by which share of its size, at least 1, a value may exceed a limit
+
+
+NEEDED = ("name", "source", "target", "displacement", "duration")
+
+
+KNOWN = (*NEEDED, "control", "until", "samples", "cost_multiplier", "comment")
+
+
+def maneuver_entry(maneuver: Maneuver, inputs: Inputs | None) -> dict[str, Any]:
+    """The maneuver as a file states it; without inputs it has no course, or one of samples."""
+    entry: dict[str, Any] = {
+        "name": maneuver.name,
+        "source": maneuver.source,
+        "target": maneuver.target,
+        "displacement": listed(maneuver.displacement),
+        "duration": float(maneuver.duration),
+    }
+    if maneuver.cost_multiplier != 1.0:  # what says nothing new keeps its hash
+        entry["cost_multiplier"] = float(maneuver.cost_multiplier)
+    if inputs is None:
+        inputs = None if maneuver.course is None else inputs_of(maneuver.course)
+    return entry if inputs is None else entry | inputs_entry(*inputs)
+
+
+def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Inputs | None]:
+    """Entry k of a file, with the course of its samples, if it has them; else with its inputs."""
+    label = f"maneuvers[{k}]"
+    check_keys(label, entry, known=KNOWN, needed=NEEDED)
+    maneuver = Maneuver(
+        name=text_of(f"{label}: name", entry["name"]),
+        source=text_of(f"{label}: source", entry["source"]),
+        target=text_of(f"{label}: target", entry["target"]),
+        displacement=numbers_of(f"{label}: displacement", entry["displacement"]),
+        duration=number_of(f"{label}: duration", entry["duration"]),
+        cost_multiplier=number_of(f"{label}: cost_multiplier", entry.get("cost_multiplier", 1.0)),
+    )
+    if "samples" in entry:
+        return replace(maneuver, course=_samples(label, entry["samples"])), None
+    if "control" in entry:
+        return maneuver, _inputs(label, entry, model, maneuver.duration)
+    return maneuver, None
+
+
+def driven(automaton: Automaton, inputs: Sequence[Inputs | None]) -> tuple[Maneuver, ...]:
+    """The maneuvers of an automaton, those with inputs along the courses these lead.
+
+    Raises
+    ------
+    InvalidLibrary
+        If the inputs of one, or the reduced states of its course, break a limit of the model.
+    ValueError
+        If one leads elsewhere than it says.
+    """
+    model = automaton.model
+    given = {k: one for k, one in enumerate(inputs) if one is not None}
+    labels = {k: f"maneuvers[{k}] {automaton.maneuvers[k].name!r}" for k in given}
+    for k, (_, control) in given.items():
+        _check_within(labels[k], model.control_limits, control, model.control_names)
+    starts = [automaton[automaton.maneuvers[k].source].reduced_state for k in given]
+    rides = driven_courses(model, starts, list(given.values()))
+    courses = dict(zip(given, rides, strict=True))
+    for k, course in courses.items():
+        _check_within(labels[k], model.reduced_limits, course.reduced_state, model.reduced_names)
+    return tuple(
+        replace(maneuver, course=courses[k]) if k in courses else maneuver
+        for k, maneuver in enumerate(automaton.maneuvers)
+    )
+
+
+def _inputs(label: str, entry: Any, model: Model, duration: float) -> Inputs:
+    """Until when each control of a maneuver holds, and the controls."""
+    control = table_of(f"{label}: control", entry["control"], width=len(model.control_names))
+    if "until" not in entry:
+        return even_times(duration, len(control)), control
+    until: Array = numbers_of(f"{label}: until", entry["until"])
+    if until.shape != (len(control),) or not (np.diff(until, prepend=0.0) > 0.0).all():
+        raise InvalidLibrary(
+            f"{label}: until: got {until.tolist()!r:.60}, need {len(control)} rising times, one "
+            "for each control"
+        )
+    if not abs(until[-1] - duration) <= CLOSED * max(1.0, duration):
+        raise InvalidLibrary(
+            f"{label}: until: ends with {until[-1]} s, need the duration {duration} s"
+        )
+    return until, control
+
+
+def _samples(label: str, entry: Any) -> Trajectory:
+    label = f"{label}: samples"
+    check_keys(label, entry, known=SAMPLED, needed=SAMPLED)
+    time = numbers_of(f"{label}: time", entry["time"])
+    tables: dict[str, Any] = {
+        name: table_of(f"{label}: {name}", entry[name]) for name in SAMPLED[1:]
+    }
+    for name, table in tables.items():
+        if len(table) != time.size or not time.size:
+            raise InvalidLibrary(
+                f"{label}: {name}: got {len(table)} rows, need one for each of {time.size} times, "
+                "and at least one"
+            )
+    return Trajectory(time=time, **tables)
+
+
+def _check_within(label: str, limits: Array, values: Array, names: Sequence[str]) -> None:
+    low, high = limits.T
+    beyond = np.maximum(low - values, values - high)
+    outside = beyond > WITHIN * np.maximum(1.0, np.abs(values))
+    if outside.any():
+        row, i = np.argwhere(outside)[0]
+        raise InvalidLibrary(
+            f"{label}: {names[i]} = {values[row, i]:.6g} is outside the limits "
+            f"[{low[i]:.6g}, {high[i]:.6g}]"
+        )

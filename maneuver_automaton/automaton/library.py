@@ -1,37 +1,85 @@
 """Automata as files: JSON that can be read and edited, with a hash of what it says.
 
 Numbers are written so that they read back to the last bit. The hash covers everything but
-`name`, `comment` and itself; a file without `hash` is taken as it is.
+`name`, `comment` and itself; a file without `hash` is taken as it is. Some come with the package:
+built once, so that planning with them needs no solver.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import difflib
 import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from importlib import resources
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._files import open_input, write_text_atomically
-from maneuver_automaton.automaton._library_maneuvers import driven, maneuver_entry, maneuver_of
-from maneuver_automaton.automaton._library_models import model_entry, model_of
-from maneuver_automaton.automaton._library_values import (
+from maneuver_automaton.automaton.automaton import Automaton
+from maneuver_automaton.automaton.courses import (
+    Inputs,
     check_keys,
+    driven,
+    is_reproduced,
     listed,
+    maneuver_entry,
+    maneuver_of,
     number_of,
     numbers_of,
     rows_of,
+    samples_entry,
     text_of,
 )
-from maneuver_automaton.automaton.automaton import Automaton
-from maneuver_automaton.automaton.courses import Inputs, is_reproduced, samples_entry
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.models import Model
+from maneuver_automaton.models import Model, in_world
+from maneuver_automaton.models.kinds import KINDS, is_of_a_kind
 from maneuver_automaton.primitives import Trim
+
+
+def model_entry(model: Model) -> dict[str, Any]:
+    """The model as a file states it: its parameters; of a user's own model, its names."""
+    if not is_of_a_kind(model):
+        names = {"controls": model.control_names, "reduced": model.reduced_names}
+        return {"kind": model.name, **{key: list(value) for key, value in names.items()}}
+    parameters = [field.name for field in dataclasses.fields(KINDS[model.name])]
+    values = {name: getattr(model, name) for name in parameters}
+    return {"kind": model.name} | {k: float(v) for k, v in values.items() if v is not None}
+
+
+def model_of(entry: Any, *, own: Model | None) -> Model:
+    """The model that a file states; `own` where it is a user's."""
+    kind = entry.get("kind") if isinstance(entry, dict) else entry
+    if not isinstance(kind, str) or not isinstance(entry, dict):
+        raise InvalidLibrary(f"model: got the kind {kind!r}, need one of {', '.join(KINDS)}")
+    if own is not None:
+        own = in_world(own)
+        stated = model_entry(own)
+        if entry != stated:
+            raise InvalidLibrary(
+                f"model: got {entry!r:.200}, but the model given is {stated!r:.200}"
+            )
+        return own
+    if kind not in KINDS:
+        raise InvalidLibrary(
+            f"model: got the kind {kind!r}, need one of {', '.join(KINDS)}; "
+            "a model of your own has to be given: to load_library, or by --model MODULE:OBJECT"
+        )
+    fields = dataclasses.fields(KINDS[kind])
+    known = tuple(field.name for field in fields)
+    needed = tuple(field.name for field in fields if field.default is dataclasses.MISSING)
+    check_keys("model", entry, known=("kind", *known), needed=needed)
+    model: Model = KINDS[kind](
+        **{k: number_of(f"model: {k}", v) for k, v in entry.items() if k != "kind"}
+    )
+    return model
+
 
 FORMAT = "maneuver-automaton library"
 SCHEMA = 1
@@ -261,3 +309,44 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
             raise ValueError(f"the key {key!r} stands twice")
         entry[key] = value
     return entry
+
+
+def stock_libraries() -> tuple[str, ...]:
+    """Names of the libraries that come with the package, in order.
+
+    Examples
+    --------
+    >>> "second_order_car" in stock_libraries()
+    True
+    """
+    names = (entry.name for entry in _folder().iterdir())
+    return tuple(sorted(name.removesuffix(".json") for name in names if name.endswith(".json")))
+
+
+def load_stock_library(name: str) -> Automaton:
+    """The automaton of a library that comes with the package.
+
+    Beside each library lies the build file it is made of, with the vehicle's parameters.
+
+    Raises
+    ------
+    InvalidLibrary
+        If there is none of that name.
+
+    Examples
+    --------
+    >>> car = load_stock_library("second_order_car")
+    >>> len(car) >= 40, len(car.maneuvers) >= 300
+    (True, True)
+    """
+    known = stock_libraries()
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else ""
+        raise InvalidLibrary(f"no stock library {name!r} among {', '.join(known)}{hint}")
+    with resources.as_file(_folder() / f"{name}.json") as path:
+        return load_library(path)
+
+
+def _folder() -> Traversable:
+    return resources.files("maneuver_automaton") / "libraries"

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Car, CarWithTrailer, Model
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
+from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.limits import rest_rate
 
 MOST_DIRECTIONS = 8  # of driving; more are replaced by the rectangle around them

@@ -68,7 +68,7 @@ def disperse_library(
 
     Examples
     --------
-    >>> from maneuver_automaton.automaton.stock import load_stock_library
+    >>> from maneuver_automaton.automaton.library import load_stock_library
     >>> car = load_stock_library("second_order_car")
     >>> fewer = disperse_library(car, most=200)
     >>> len(car.maneuvers), len(fewer.automaton.maneuvers)

@@ -38,7 +38,7 @@ from maneuver_automaton.formats.yaml_source import (
     value_at,
 )
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, Unicycle
-from maneuver_automaton.primitives.hitching import connect_hitches, hitch_trims
+from maneuver_automaton.primitives.turning import connect_hitches, hitch_trims
 from maneuver_automaton.problem import Bounds
 
 _SECOND = {"max_vel": 0.5, "min_vel": -0.5, "max_angular_vel": 0.5, "min_angular_vel": -0.5}

@@ -22,7 +22,7 @@ from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, wrappe
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models.lattice_body import LatticeBody
+from maneuver_automaton.models.robots import LatticeBody
 from maneuver_automaton.primitives import Maneuver, Trim
 
 SPEED, TURN_RATE = 1.0, 1.0  # [m/s, rad/s] at which poses follow each other unless others are given

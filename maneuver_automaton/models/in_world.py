@@ -10,8 +10,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, translations
-from maneuver_automaton.models._components import Components
 from maneuver_automaton.models.model import Model, OnlyTranslated
+from maneuver_automaton.models.vehicle import Components
 
 HEADING = "heading"  # name of the component of a reduced state that is the heading [rad]
 GROUPS: dict[type[LieGroup], type[LieGroup]] = {translations(2): SE2, translations(3): SE2xR}

@@ -5,18 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from maneuver_automaton.models.accelerating_car import AcceleratingCar
-from maneuver_automaton.models.car import Car
-from maneuver_automaton.models.car_with_trailer import CarWithTrailer
-from maneuver_automaton.models.helicopter import Helicopter
-from maneuver_automaton.models.hovercraft import Hovercraft
-from maneuver_automaton.models.lattice_body import LatticeBody
+from maneuver_automaton.models.cars import AcceleratingCar, Car, CarWithTrailer, SecondOrderCar
+from maneuver_automaton.models.dynamic import Helicopter, Hovercraft, SingleTrack
 from maneuver_automaton.models.model import Model
-from maneuver_automaton.models.omnidirectional import Omnidirectional
-from maneuver_automaton.models.second_order_car import SecondOrderCar
-from maneuver_automaton.models.second_order_unicycle import SecondOrderUnicycle
-from maneuver_automaton.models.single_track import SingleTrack
-from maneuver_automaton.models.unicycle import Unicycle
+from maneuver_automaton.models.robots import (
+    LatticeBody,
+    Omnidirectional,
+    SecondOrderUnicycle,
+    Unicycle,
+)
 
 KINDS: Mapping[str, Any] = {
     kind.name: kind

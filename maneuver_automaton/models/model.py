@@ -6,7 +6,7 @@ from typing import Protocol, runtime_checkable
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import LieGroup
-from maneuver_automaton.models._components import Components
+from maneuver_automaton.models.vehicle import Components
 
 
 class Model(Protocol):

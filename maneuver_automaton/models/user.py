@@ -13,14 +13,15 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.errors import BrokenSymmetry
 from maneuver_automaton.groups import LieGroup
-from maneuver_automaton.models._components import (
+from maneuver_automaton.models.state import VectorField, equivariance_defect
+from maneuver_automaton.models.vehicle import (
+    UNLIMITED,
     ComponentFunction,
     Components,
+    limits_of,
     no_parts,
     no_rates,
 )
-from maneuver_automaton.models._limits import limits_of, unlimited
-from maneuver_automaton.models.state import VectorField, equivariance_defect
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -69,8 +70,8 @@ class UserModel:
     velocity: ComponentFunction
     reduced_names: tuple[str, ...] = ()
     dynamics: ComponentFunction = no_rates
-    control_limits: Array = field(default_factory=unlimited)  # (n_u, 2)
-    reduced_limits: Array = field(default_factory=unlimited)  # (n_z, 2)
+    control_limits: Array = field(default_factory=lambda: np.array(UNLIMITED))  # (n_u, 2)
+    reduced_limits: Array = field(default_factory=lambda: np.array(UNLIMITED))  # (n_z, 2)
     part_names: tuple[str, ...] = ()
     part_poses: Callable[[Array], Array] = no_parts
 

@@ -9,19 +9,34 @@ from __future__ import annotations
 import itertools
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import lateral_limit
-from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
-from maneuver_automaton.optimal_control.problem import resampled
-from maneuver_automaton.optimal_control.rules import increments
-from maneuver_automaton.optimal_control.solution import SolveStatus
-from maneuver_automaton.optimal_control.transcription import STATUS, SolverSettings, ipopt_options
+from maneuver_automaton.models.speeds import lateral_limit
+from maneuver_automaton.optimal_control.ipopt import (
+    STATUS,
+    SolverSettings,
+    SolveStatus,
+    ipopt_options,
+    load_casadi,
+    numpy_on_symbols,
+)
+from maneuver_automaton.optimal_control.problem import (
+    Grid,
+    OptimalControlProblem,
+    control_scale,
+    resampled,
+)
+from maneuver_automaton.optimal_control.transcription import (
+    Transcription,
+    bounds_of,
+    transcribe,
+    unpacked,
+)
 
 WITHIN_GRIP = 1e-3  # share of the squared lateral acceleration that is kept between nodes
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
@@ -95,6 +110,7 @@ class TransferProgram:
     model: Model
     objective: ManeuverObjective
     settings: TransferSettings
+    written: Transcription
     solver: Any
     build_s: float
 
@@ -143,54 +159,47 @@ def transfer_program(
     began = time.perf_counter()
     casadi = load_casadi()
     objective, settings = objective or ManeuverObjective(), settings or TransferSettings()
-    n_z, n_u = len(model.reduced_names), len(model.control_names)
+    n_z, scale = len(model.reduced_names), control_scale(model)
     if not n_z:
         raise ValueError(f"{model.name}: has no reduced state, so its trims need no maneuvers")
-    count = settings.intervals * settings.steps
-    state = casadi.SX.sym("z", n_z, count + 1)
-    control = casadi.SX.sym("u", n_u, settings.intervals)
-    ends = casadi.SX.sym("p", n_u, 2)
-    duration = casadi.SX.sym("T")
-    scale = control_scale(model)
-
-    def rates(z: Any, u: Any) -> Any:
-        us = casadi.vertsplit(u)
-        rows = list(model.dynamics(casadi.vertsplit(z), us))
-        if len(rows) != n_z:
-            raise ValueError(
-                f"{model.name}: dynamics returned {len(rows)} rates, need {n_z} "
-                f"({', '.join(model.reduced_names)})"
-            )
-        effort = sum((u_i / s) ** 2 for u_i, s in zip(us, scale, strict=True))
-        return casadi.vertcat(*(casadi.SX(row) + 0 * z[0, :] for row in rows), effort)
-
-    with numpy_on_symbols(casadi):
-        held = casadi.kron(control, casadi.DM.ones(1, settings.steps))
-        added = increments("rk4", rates, state=state, control=held, step=duration / count)
-    around = casadi.horzcat(ends[:, 0], control, ends[:, 1])
-    changes = (around[:, 1:] - around[:, :-1]) / casadi.repmat(
-        casadi.DM(scale), 1, settings.intervals + 1
+    problem = OptimalControlProblem(
+        state_names=model.reduced_names,
+        control_names=model.control_names,
+        dynamics=model.dynamics,
+        start=(None,) * n_z,
+        end=(None,) * n_z,
+        duration=settings.duration,
+        stage_cost=lambda z, u: (
+            objective.effort * sum((u_i / s) ** 2 for u_i, s in zip(u, scale, strict=True))
+        ),
+        state_limits=model.reduced_limits,
+        control_limits=model.control_limits,
     )
+    nodes = settings.intervals * settings.steps + 1
+    written = transcribe(problem, Grid(n_nodes=nodes, rule="rk4", held=settings.steps))
+    ends = casadi.SX.sym("p", problem.n_controls, 2)
+    around = casadi.horzcat(ends[:, 0], written.control, ends[:, 1])
+    sizes = casadi.repmat(casadi.DM(scale), 1, settings.intervals + 1)
+    changes = (around[:, 1:] - around[:, :-1]) / sizes
     cost = (
-        objective.time * duration
-        + objective.effort * casadi.sum2(added[n_z, :])
+        objective.time * written.duration
+        + written.objective
         + objective.smoothness * casadi.sumsqr(changes)
     )
-    defects = casadi.vec(state[:, :-1] + added[:n_z, :] - state[:, 1:])
     beyond = casadi.SX(0, 1)
     if math.isfinite(lateral_limit(model)):
         with numpy_on_symbols(casadi):  # with the control before and after each node
             twists = [
-                model.velocity(casadi.vertsplit(z), casadi.vertsplit(held))[:3]
-                for z in (state[:, :-1], state[:, 1:])
+                model.velocity(casadi.vertsplit(z), casadi.vertsplit(written.inputs))[:3]
+                for z in (written.state[:, :-1], written.state[:, 1:])
             ]
         most = lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)
         rows = [(v_x * v_x + v_y * v_y) * turn * turn / most - 1.0 for v_x, v_y, turn in twists]
         beyond = casadi.vertcat(*map(casadi.vec, rows))
     functions = {
-        "x": casadi.vertcat(casadi.vec(state), casadi.vec(control), duration),
+        "x": written.variables,
         "f": cost,
-        "g": casadi.vertcat(defects, beyond),
+        "g": casadi.vertcat(written.constraints, beyond),
         "p": casadi.vec(ends),
     }
     solver = casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
@@ -198,6 +207,7 @@ def transfer_program(
         model=model,
         objective=objective,
         settings=settings,
+        written=written,
         solver=solver,
         build_s=time.perf_counter() - began,
     )
@@ -235,14 +245,23 @@ def solve_transfer(
         then to the other, and the states are where that leads. Where nothing moves on the straight
         line, the solver does not leave it.
     """
-    model, settings = program.model, program.settings
+    model, written = program.model, program.written
     limits = model.control_limits if control_limits is None else control_limits
     controls_within = drawn_in(limits, tightening)
-    bounds = _bounds(program, start, end, controls_within, tightening)
-    count = settings.intervals * settings.steps
+    within = drawn_in(model.reduced_limits, tightening)
+    within[:, 0] = np.minimum(within[:, 0], np.minimum(start, end))
+    within[:, 1] = np.maximum(within[:, 1], np.maximum(start, end))
+    problem = replace(
+        written.problem,
+        start=tuple(start.tolist()),
+        end=tuple(end.tolist()),
+        state_limits=within,
+        control_limits=controls_within,
+    )
+    bounds = bounds_of(problem, written.grid)
     guess_s = duration_guess(model, start, end) if duration is None else duration
-    inputs = resampled(controls, settings.intervals)
-    path = resampled(np.array([start, end]), count + 1)
+    inputs = resampled(controls, written.grid.n_controls)
+    path = resampled(np.array([start, end]), written.grid.n_nodes)
     if swing:
         inputs = _swung(inputs, controls_within, swing)
         path = _led_to(model, path, inputs, guess_s)
@@ -253,52 +272,23 @@ def solve_transfer(
         p=controls.ravel(),
         lbx=bounds[:, 0],
         ubx=bounds[:, 1],
-        lbg=np.where(np.arange(program.solver.size1_out("g")) < count * start.size, 0.0, -np.inf),
+        lbg=np.where(np.arange(program.solver.size1_out("g")) < len(written.limits), 0.0, -np.inf),
         ubg=0.0,
     )
     solve_s = time.perf_counter() - began
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
     stats = program.solver.stats()
-    n_states = (count + 1) * start.size
+    state, control, seconds = unpacked(problem, written.grid, values)
     return Transfer(
         status=STATUS.get(str(stats["return_status"]), SolveStatus.FAILED),
         reason=str(stats["return_status"]),
-        duration=float(values[-1]),
-        control=values[n_states:-1].reshape(settings.intervals, -1),
-        reduced_state=values[:n_states].reshape(count + 1, -1),
+        duration=seconds,
+        control=control,
+        reduced_state=state,
         cost=float(answer["f"]),
         iterations=int(stats["iter_count"]),
         solve_s=solve_s,
     )
-
-
-def _bounds(
-    program: TransferProgram, start: Array, end: Array, controls_within: Array, tightening: float
-) -> Array:
-    """Least and greatest value (n, 2) of every unknown: reduced states, controls, the duration."""
-    settings = program.settings
-    within = drawn_in(program.model.reduced_limits, tightening)
-    within[:, 0] = np.minimum(within[:, 0], np.minimum(start, end))
-    within[:, 1] = np.maximum(within[:, 1], np.maximum(start, end))
-    states = np.tile(within, (settings.intervals * settings.steps + 1, 1, 1))
-    states[0], states[-1] = start[:, None], end[:, None]
-    controls = np.tile(controls_within, (settings.intervals, 1, 1))
-    return np.concatenate(
-        [states.reshape(-1, 2), controls.reshape(-1, 2), np.array([settings.duration])]
-    )
-
-
-def control_scale(model: Model) -> Array:
-    """Greatest value (n_u,) of each control by size, 1 where there is no limit.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> control_scale(Unicycle(max_speed=3.0)).tolist()
-    [3.0, 1.0]
-    """
-    greatest = np.abs(model.control_limits).max(axis=-1)
-    return np.where(np.isfinite(greatest) & (greatest > 0.0), greatest, 1.0)
 
 
 def drawn_in(limits: Array, share: float) -> Array:

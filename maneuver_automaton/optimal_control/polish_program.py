@@ -12,26 +12,105 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.models import Model
-from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
+from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
-from maneuver_automaton.optimal_control.movers import Pieces
-from maneuver_automaton.optimal_control.paths import Frames, paths
-from maneuver_automaton.optimal_control.polish_values import (
+from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.problem import (
+    Grid,
+    OptimalControlProblem,
+    RunningCost,
+    control_scale,
+    moving_frame,
+)
+from maneuver_automaton.optimal_control.scene import (
+    BodyPart,
     Ends,
     Guard,
+    Pieces,
     Point,
     PolishSettings,
     Scene,
 )
-from maneuver_automaton.optimal_control.problem import (
-    Components,
-    Grid,
-    OptimalControlProblem,
-    RunningCost,
-)
-from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.optimal_control.transcription import bounds_of, transcribe
-from maneuver_automaton.optimal_control.vehicles import moving_frame
+
+
+class Paths(NamedTuple):
+    """Control points of the paths of m corners: first all begins, all ends, then those between."""
+
+    x: Any  # (4 m, n - 1)
+    y: Any  # (4 m, n - 1)
+
+
+class Frames(NamedTuple):
+    """Where the vehicle is and how it moves, in symbols: at one node of each interval."""
+
+    pose: Any  # (dof, n - 1)
+    twist: Sequence[Any]  # dof rows (1, n - 1)
+    reduced: Any  # (n_z, n - 1)
+    reduced_rates: Any  # (n_z, n - 1)
+
+
+def paths(
+    casadi: Any, parts: Sequence[BodyPart], begin: Frames, end: Frames, *, step: Any
+) -> list[Paths]:
+    """Control points of every solid's corners in every interval, in symbols.
+
+    Source: Farin (2002), *Curves and Surfaces for CAGD*, Sec. 7.5 (cubic Hermite interpolation in
+    Bernstein form).
+
+    Parameters
+    ----------
+    casadi : module
+    parts : sequence of BodyPart
+    begin, end : Frames
+        At the begin and at the end of each interval, with the control of the interval.
+    step : (1, n - 1) symbols
+        Duration of each interval [s].
+    """
+    found = []
+    for part in parts:
+        for corners, _ in part.solids:
+            x_0, y_0, v_0, w_0 = _corners(casadi, part, corners, begin)
+            x_1, y_1, v_1, w_1 = _corners(casadi, part, corners, end)
+            third = casadi.repmat(step / 3.0, len(corners), 1)
+            x = casadi.vertcat(x_0, x_1, x_0 + third * v_0, x_1 - third * v_1)
+            y = casadi.vertcat(y_0, y_1, y_0 + third * w_0, y_1 - third * w_1)
+            found.append(Paths(x, y))
+    return found
+
+
+def _corners(casadi: Any, part: BodyPart, corners: Array, at: Frames) -> tuple[Any, ...]:
+    """Places x, y and velocities (m, n - 1) of the corners of a part."""
+    count = at.pose.shape[1]
+    ones = casadi.SX.ones(1, count)
+    along, aside = casadi.DM(corners[:, 0]), casadi.DM(corners[:, 1])
+    if part.pose is None:
+        x, y = along @ ones, aside @ ones
+        v = w = casadi.SX.zeros(len(corners), count)
+    else:
+        place = part.pose(casadi.vertsplit(at.reduced))
+        p_x, p_y, turn = (casadi.SX(value) * ones for value in place)
+        every = casadi.SX.ones(len(corners), 1)
+        x = every @ p_x + along @ casadi.cos(turn) - aside @ casadi.sin(turn)
+        y = every @ p_y + along @ casadi.sin(turn) + aside @ casadi.cos(turn)
+        v = casadi.jtimes(x, at.reduced, at.reduced_rates)
+        w = casadi.jtimes(y, at.reduced, at.reduced_rates)
+    ahead, sideways, turning = (
+        casadi.repmat(casadi.SX(at.twist[k]) * ones, len(corners), 1) for k in range(3)
+    )
+    v, w = ahead - turning * y + v, sideways + turning * x + w
+    cosine, sine, p_x, p_y = (
+        casadi.repmat(row, len(corners), 1)
+        for row in (casadi.cos(at.pose[2, :]), casadi.sin(at.pose[2, :]), at.pose[0, :],
+                    at.pose[1, :])
+    )  # fmt: skip
+    return (
+        p_x + cosine * x - sine * y,
+        p_y + sine * x + cosine * y,
+        cosine * v - sine * w,
+        sine * v + cosine * w,
+    )
+
 
 POINT = BodyPart(solids=((np.zeros((1, 2)), 0.0),))  # the reference point alone
 LEAST_PACE, MOST_PACE = 0.02, 50.0  # of a phase, against the even pace of the guess
@@ -263,7 +342,7 @@ def _kinds(
     every = casadi.vertcat(first, last, control, duration)
     nothing = casadi.SX.sym("nothing", 0)
     before, after = casadi.SX.sym("before", own), casadi.SX.sym("after", own)
-    changed = casadi.sumsqr((after - before) / casadi.DM(_scales(model)))
+    changed = casadi.sumsqr((after - before) / casadi.DM(control_scale(model)))
     wall, place, sign = casadi.SX.sym("w", 3), casadi.SX.sym("p", 2), casadi.SX.sym("sign")
     beyond = [wall[0] * swing.x[k] + wall[1] * swing.y[k] - wall[2] for k in (2, 3)]
     paces = casadi.SX.sym("paces", 2)
@@ -337,7 +416,7 @@ def _problem(
 ) -> OptimalControlProblem:
     """Least time, a little effort, and what else is asked for."""
     dof = model.group.dof
-    scale = _scales(model)
+    scale = control_scale(model)
     rates = _ends_in_rates(model)
 
     def cost(x: Components, u: Components) -> Any:
@@ -358,7 +437,7 @@ def _problem(
         duration=ends.duration,
         stage_cost=cost,
         state_limits=limits,
-        control_limits=_within(model.control_limits, settings.tightening),
+        control_limits=model.control_limits + settings.tightening * np.array([1.0, -1.0]),
     )
 
 
@@ -390,12 +469,6 @@ def _frames(casadi: Any, model: Model, state: Any, control: Any) -> Frames:
     )
 
 
-def _scales(model: Model) -> Array:
-    """Sizes (n_u,) of the controls: their greatest values, 1 where there is no limit."""
-    most = np.abs(model.control_limits).max(axis=1)
-    return np.where(np.isfinite(most), most, 1.0)
-
-
 def _ends_in_rates(model: Model) -> list[int]:
     """Numbers of the controls that the velocity does not depend on: accelerations and such."""
     casadi = load_casadi()
@@ -406,7 +479,3 @@ def _ends_in_rates(model: Model) -> list[int]:
     twist = casadi.vertcat(*(casadi.SX(v) for v in velocity))
     depends = casadi.which_depends(twist, u, 1, False)
     return [k for k, used in enumerate(depends) if not used]
-
-
-def _within(limits: Array, by: float) -> Array:
-    return np.asarray(limits + np.array([by, -by]))

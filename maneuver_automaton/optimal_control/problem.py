@@ -1,20 +1,20 @@
-"""The optimal control problem, the grid it is put on, and a first guess: all as values."""
+"""The optimal control problem, the grid and rule it is put on, and a first guess: all as values."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, get_args
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton.groups import SE2, LieGroup, SE2xR
+from maneuver_automaton.models import Model
+from maneuver_automaton.models.vehicle import Components
 
-Components = Sequence[Any]
-"""Components of a state or control: each a number, an array over instants, or a symbol."""
-
-Rates = Callable[[Components, Components], Sequence[Any]]
+Rates = Callable[[Components, Components], Components]
 """``f(x, u)``: the rate of each component of the state."""
 
 RunningCost = Callable[[Components, Components], Any]
@@ -131,6 +131,7 @@ class Grid:
 
     n_nodes: int
     rule: Rule = "trapezoidal"  # controls at the nodes; "rk4": constant between them
+    held: int = 1  # with "rk4", the steps from node to node in which one control holds
 
     def __post_init__(self) -> None:
         if self.n_nodes < 2:
@@ -141,7 +142,7 @@ class Grid:
     @property
     def n_controls(self) -> int:
         """Instants or intervals that have a control."""
-        return self.n_nodes if self.rule == "trapezoidal" else self.n_nodes - 1
+        return self.n_nodes if self.rule == "trapezoidal" else (self.n_nodes - 1) // self.held
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -223,3 +224,124 @@ def _limits(what: str, limits: Array | None, names: tuple[str, ...]) -> Array | 
             )
     array.setflags(write=False)
     return array
+
+
+Field = Callable[[Any, Any], Any]
+"""Rates (m, n) of states (n_x, n) under controls (n_u, n), matrices of numbers or of symbols.
+
+The first n_x rates are those of the state; the others are integrands that ride along."""
+
+
+def increments(rule: Rule, field: Field, *, state: Any, control: Any, step: Any) -> Any:
+    """What each rate adds up to over each interval (m, n - 1), with `step` [s] between nodes.
+
+    Source: Betts (2010), *Practical Methods for Optimal Control*, Sec. 3.4 (trapezoidal), Sec. 3.5
+    (Runge-Kutta).
+
+    Parameters
+    ----------
+    rule : "trapezoidal" or "rk4"
+        Controls at the n nodes (n_u, n), or constant over the n - 1 intervals (n_u, n - 1).
+    field : callable
+        The rates.
+    state : (n_x, n) matrix
+        States at the nodes.
+    control : matrix
+        See `rule`.
+    step : number or symbol
+        Time between nodes [s].
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> field = lambda x, u: np.stack([u[0], x[0] ** 2])  # x' = u, and x^2 rides along
+    >>> x, u = np.array([[0.0, 1.0, 2.0]]), np.ones((1, 3))
+    >>> increments("trapezoidal", field, state=x, control=u, step=1.0).tolist()
+    [[1.0, 1.0], [0.5, 2.5]]
+    >>> increments("rk4", field, state=x, control=u[:, :2], step=1.0).round(3).tolist()
+    [[1.0, 1.0], [0.333, 2.333]]
+    """
+    return _RULES[rule](field, state, control, step)
+
+
+def _trapezoidal(field: Field, state: Any, control: Any, step: Any) -> Any:
+    rates = field(state, control)
+    return (step / 2.0) * (rates[:, :-1] + rates[:, 1:])
+
+
+def _rk4(field: Field, state: Any, control: Any, step: Any) -> Any:
+    n_states, begin = state.shape[0], state[:, :-1]
+    k_1 = field(begin, control)
+    k_2 = field(begin + (step / 2.0) * k_1[:n_states, :], control)
+    k_3 = field(begin + (step / 2.0) * k_2[:n_states, :], control)
+    k_4 = field(begin + step * k_3[:n_states, :], control)
+    return (step / 6.0) * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+
+
+_RULES: Mapping[Rule, Callable[[Field, Any, Any, Any], Any]] = {
+    "trapezoidal": _trapezoidal,
+    "rk4": _rk4,
+}
+
+
+def moving_frame(
+    group: type[LieGroup],
+    *,
+    velocity: Callable[[Components, Components], Any],
+    reduced: Callable[[Components, Components], Any] | None = None,
+) -> Rates:
+    """Rates of the state (pose, reduced state) of a vehicle: ``g' = g xi(z, u), z' = f(z, u)``.
+
+    The models of the package work on arrays; the solver needs the same formulas on symbols, and
+    the tests compare the two. For a `UserModel` they are its `velocity` and `dynamics`.
+
+    Source: Frazzoli, Dahleh, Feron (2005), Sec. II; the paper, Example 1.
+
+    Parameters
+    ----------
+    group : type[LieGroup]
+        SE(2) or SE(2) x R.
+    velocity : callable
+        ``xi(z, u)``: the twist (dof) in the body frame, component by component.
+    reduced : callable, optional
+        ``f(z, u)``: rates of the reduced state; none for a kinematic vehicle.
+
+    Raises
+    ------
+    ValueError
+        If the group is another one.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> f = moving_frame(SE2, velocity=lambda z, u: [u[0], 0.0, u[1]])
+    >>> [float(rate) for rate in f([3.0, 1.0, 0.0], [2.0, 0.5])]
+    [2.0, 0.0, 0.5]
+    """
+    if group.coordinates not in (SE2.coordinates, SE2xR.coordinates):
+        raise ValueError(
+            f"moving_frame: got the group {group.__name__} with poses "
+            f"({', '.join(group.coordinates)}), need SE2 or SE2xR"
+        )
+    dof = group.dof
+
+    def rates(state: Components, control: Components) -> list[Any]:
+        ahead, aside, *others = velocity(state[dof:], control)
+        cosine, sine = np.cos(state[2]), np.sin(state[2])
+        drift = [] if reduced is None else reduced(state[dof:], control)
+        return [cosine * ahead - sine * aside, sine * ahead + cosine * aside, *others, *drift]
+
+    return rates
+
+
+def control_scale(model: Model) -> Array:
+    """Greatest value (n_u,) of each control by size, 1 where there is no limit.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> control_scale(Unicycle(max_speed=3.0)).tolist()
+    [3.0, 1.0]
+    """
+    greatest = np.abs(model.control_limits).max(axis=-1)
+    return np.where(np.isfinite(greatest) & (greatest > 0.0), greatest, 1.0)

@@ -1,11 +1,8 @@
-"""Direct transcription: states and controls at nodes, solved all at once by IPOPT.
-
-Monotone barrier, small at the start: a large one pushes the iterate away from its guess, and with
-it out of the sequence of moves that the guess stands for.
-"""
+"""Direct transcription: states and controls at nodes, solved all at once by IPOPT."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,49 +11,132 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.ipopt import (
+    STATUS,
+    SolverSettings,
+    SolveStatus,
+    ipopt_options,
+    load_casadi,
+    numpy_on_symbols,
+)
 from maneuver_automaton.optimal_control.problem import (
     Grid,
     Guess,
     OptimalControlProblem,
+    increments,
     limits_of,
     resampled,
     straight_guess,
 )
-from maneuver_automaton.optimal_control.rules import increments
-from maneuver_automaton.optimal_control.solution import (
-    OptimalControlSolution,
-    SolveStatus,
-    evaluate,
-)
-
-MU_INIT = 1e-3  # first barrier parameter
-STATUS = {
-    "Solve_Succeeded": SolveStatus.SOLVED,
-    "Solved_To_Acceptable_Level": SolveStatus.SOLVED,
-    "Infeasible_Problem_Detected": SolveStatus.INFEASIBLE,
-    "Maximum_Iterations_Exceeded": SolveStatus.OUT_OF_BUDGET,
-    "Maximum_CpuTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
-    "Maximum_WallTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
-    "User_Requested_Stop": SolveStatus.OUT_OF_BUDGET,  # by what is asked between iterations
-}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SolverSettings:
-    """When the solver stops, and what is believed of its answer."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class OptimalControlSolution:
+    """States and controls on the grid, whatever the status; the numbers say how good they are."""
 
-    tolerance: float = 1e-9  # of the scaled optimality conditions [-]
-    max_iterations: int = 300
-    max_seconds: float | None = None  # [s]
-    admitted_defect: float = 1e-7  # of defects and violations, computed again, in their units
+    status: SolveStatus
+    reason: str  # the solver's own word, or what did not hold
+    time: Array  # (n,) [s]
+    state: Array  # (n, n_x)
+    control: Array  # (n, n_u) at the nodes; (n - 1, n_u) between them with "rk4"
+    cost: float
+    integrals: Mapping[str, Array]  # (n,) each: of the problem's integrals, from zero
+    iterations: int
+    build_s: float  # [s] to set the problem up, derivatives included
+    solve_s: float  # [s] in the solver
+    worst_defect: float  # greatest difference between a step of the rule and the next node
+    worst_violation: float  # greatest excess over start, end and limits
 
-    def __post_init__(self) -> None:
-        for name in ("tolerance", "max_iterations", "admitted_defect"):
-            if not getattr(self, name) > 0:
-                raise ValueError(f"solver: {name} must be positive, got {getattr(self, name)}")
-        if self.max_seconds is not None and not self.max_seconds > 0.0:
-            raise ValueError(f"solver: max_seconds must be positive, got {self.max_seconds} s")
+    @property
+    def duration(self) -> float:
+        """Final time [s]."""
+        return float(self.time[-1])
+
+    @property
+    def as_guess(self) -> Guess:
+        """Guess for another grid, or another problem with the same state and control."""
+        return Guess(state=self.state, control=self.control, duration=self.duration)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Evaluation:
+    """A candidate, computed in floating-point numbers by NumPy: see `evaluate`."""
+
+    cost: float
+    integrals: Mapping[str, Array]
+    worst_defect: float
+    worst_violation: float
+
+
+def evaluate(
+    problem: OptimalControlProblem, grid: Grid, *, state: Array, control: Array, duration: float
+) -> Evaluation:
+    """Cost, defects and violations of states (n, n_x) and controls (m, n_u) on a grid.
+
+    Nothing of the solver is used: the functions of the problem are called on arrays.
+
+    Examples
+    --------
+    >>> cart = OptimalControlProblem(
+    ...     state_names=("x",), control_names=("u",), dynamics=lambda x, u: [u[0]],
+    ...     start=(0.0,), end=(1.0,), duration=(1.0, 1.0), stage_cost=lambda x, u: u[0] ** 2)
+    >>> found = evaluate(cart, Grid(n_nodes=2), state=np.array([[0.0], [1.0]]),
+    ...                  control=np.ones((2, 1)), duration=1.0)
+    >>> found.cost, found.worst_defect, found.worst_violation
+    (1.0, 0.0, 0.0)
+    """
+    integrands = [problem.stage_cost or _nothing, *problem.integrals.values()]
+    n_states = problem.n_states
+
+    def field(x: Array, u: Array) -> Array:
+        count = x.shape[1]
+        xs, us = list(x), list(u)
+        rates = [*problem.dynamics(xs, us), *(integrand(xs, us) for integrand in integrands)]
+        rows = [np.broadcast_to(row, (count,)) for row in rates]
+        return np.array(rows, dtype=np.float64)
+
+    inputs = np.repeat(control, grid.held, axis=0).T
+    step = duration / (grid.n_nodes - 1)
+    added = increments(grid.rule, field, state=state.T, control=inputs, step=step)
+    defects = state[:-1].T + added[:n_states] - state[1:].T
+    sums = np.concatenate([np.zeros((len(integrands), 1)), added[n_states:].cumsum(axis=1)], axis=1)
+    terminal = 0.0 if problem.terminal_cost is None else problem.terminal_cost(list(state[-1]))
+    return Evaluation(
+        cost=float(sums[0, -1]) + float(terminal),
+        integrals=dict(zip(problem.integrals, sums[1:], strict=True)),
+        worst_defect=_largest(np.abs(defects)),
+        worst_violation=_violation(problem, state, control, duration),
+    )
+
+
+def _nothing(x: Sequence[Any], u: Sequence[Any]) -> float:
+    return 0.0
+
+
+def _violation(
+    problem: OptimalControlProblem, state: Array, control: Array, duration: float
+) -> float:
+    ends = [
+        abs(value - wanted)
+        for row, values in ((state[0], problem.start), (state[-1], problem.end))
+        for value, wanted in zip(row.tolist(), values, strict=True)
+        if wanted is not None
+    ]
+    excesses = [
+        np.maximum(low - rows, rows - high)
+        for rows, (low, high) in (
+            (state, limits_of(problem.state_limits, problem.n_states).T),
+            (control, limits_of(problem.control_limits, problem.n_controls).T),
+        )
+    ]
+    late = max(problem.duration[0] - duration, duration - problem.duration[1])
+    return float(max(0.0, late, *ends, *(_largest(excess) for excess in excesses)))
+
+
+def _largest(values: Array) -> float:
+    """Greatest value; infinite if one is no number."""
+    worst = float(values.max(initial=0.0))
+    return worst if math.isfinite(worst) else math.inf
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -73,9 +153,16 @@ class Transcription:
     control: Any  # (n_u, n) symbols, or (n_u, n - 1)
     duration: Any  # one symbol [s]
     objective: Any  # expression
+    inputs: Any  # the controls from node to node: (n_u, n - 1) if one holds for several steps
     constraints: Any  # (m,) expressions; first of all the defects
     limits: Array  # (m, 2) of the constraints
     bounds: Array  # (variables, 2)
+
+    @property
+    def variables(self) -> Any:
+        """All variables in one column."""
+        casadi = load_casadi()
+        return casadi.vertcat(casadi.vec(self.state), casadi.vec(self.control), self.duration)
 
 
 def transcribe(problem: OptimalControlProblem, grid: Grid) -> Transcription:
@@ -108,8 +195,10 @@ def transcribe(problem: OptimalControlProblem, grid: Grid) -> Transcription:
         return casadi.vertcat(*(_row(casadi, rate, x.shape[1]) for rate in [*rates, *running]))
 
     with numpy_on_symbols(casadi):
-        step = duration / (n - 1)
-        added = increments(grid.rule, field, state=state, control=control, step=step)
+        step, inputs = duration / (n - 1), control
+        if grid.held > 1:
+            inputs = casadi.kron(control, casadi.DM.ones(1, grid.held))
+        added = increments(grid.rule, field, state=state, control=inputs, step=step)
         objective = casadi.SX(0.0)
         if problem.stage_cost is not None:
             objective += casadi.sum2(added[n_states:, :])
@@ -123,6 +212,7 @@ def transcribe(problem: OptimalControlProblem, grid: Grid) -> Transcription:
         control=control,
         duration=duration,
         objective=objective,
+        inputs=inputs,
         constraints=defects,
         limits=np.zeros((n_states * (n - 1), 2)),
         bounds=bounds_of(problem, grid),
@@ -177,8 +267,7 @@ def solve(
     guess = guess or straight_guess(problem)
     _check_guess(problem, guess)
     program = transcribe(problem, grid)
-    parts = (casadi.vec(program.state), casadi.vec(program.control), program.duration)
-    functions = {"x": casadi.vertcat(*parts), "f": program.objective, "g": program.constraints}
+    functions = {"x": program.variables, "f": program.objective, "g": program.constraints}
     solver = casadi.nlpsol("solver", "ipopt", functions, ipopt_options(settings))
     first = np.concatenate(
         [
@@ -211,24 +300,14 @@ def _row(casadi: Any, value: Any, count: int) -> Any:
     return row if row.shape == (1, count) else casadi.repmat(row, 1, count)
 
 
-def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
-    """Options of IPOPT."""
-    options: dict[str, Any] = {
-        "print_time": False,
-        "error_on_fail": False,
-        "ipopt.print_level": 0,
-        "ipopt.sb": "yes",  # no banner
-        "ipopt.mu_strategy": "monotone",
-        "ipopt.mu_init": MU_INIT,
-        "ipopt.tol": settings.tolerance,
-        "ipopt.constr_viol_tol": settings.tolerance,
-        "ipopt.acceptable_tol": 1e3 * settings.tolerance,
-        "ipopt.max_iter": settings.max_iterations,
-        "ipopt.bound_relax_factor": 0.0,  # limits are limits
-    }
-    if settings.max_seconds is not None:
-        options["ipopt.max_wall_time"] = settings.max_seconds
-    return options
+def unpacked(
+    problem: OptimalControlProblem, grid: Grid, values: Array
+) -> tuple[Array, Array, float]:
+    """States (n, n_x), controls (m, n_u) and duration from the values of all variables."""
+    split = grid.n_nodes * problem.n_states
+    state = values[:split].reshape(grid.n_nodes, problem.n_states)
+    control = values[split:-1].reshape(grid.n_controls, problem.n_controls)
+    return state, control, float(values[-1])
 
 
 def bounds_of(problem: OptimalControlProblem, grid: Grid) -> Array:
@@ -268,12 +347,7 @@ def _solution(
     seconds: tuple[float, float],
 ) -> OptimalControlSolution:
     problem, grid = program.problem, program.grid
-    n_x, n_u = problem.n_states, problem.n_controls
-    states, controls, (duration,) = np.split(
-        values, [grid.n_nodes * n_x, grid.n_nodes * n_x + grid.n_controls * n_u]
-    )
-    state, control = states.reshape(grid.n_nodes, n_x), controls.reshape(grid.n_controls, n_u)
-    duration = float(duration)
+    state, control, duration = unpacked(problem, grid, values)
     checked = evaluate(problem, grid, state=state, control=control, duration=duration)
     reason = str(stats["return_status"])
     status = STATUS.get(reason, SolveStatus.FAILED)

@@ -10,17 +10,17 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.models.vehicle import Components
+from maneuver_automaton.optimal_control.ipopt import SolverSettings
 from maneuver_automaton.optimal_control.problem import (
-    Components,
     Grid,
     Guess,
     OptimalControlProblem,
     Rule,
     RunningCost,
+    moving_frame,
 )
-from maneuver_automaton.optimal_control.solution import OptimalControlSolution
-from maneuver_automaton.optimal_control.transcription import SolverSettings, solve
-from maneuver_automaton.optimal_control.vehicles import moving_frame
+from maneuver_automaton.optimal_control.transcription import OptimalControlSolution, solve
 
 START, END, DURATION_S = (0.1, 1.0, 0.8), (0.0, 0.0, 0.0), 50.0
 NORM_WEIGHT = 0.1

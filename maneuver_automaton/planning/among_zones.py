@@ -29,7 +29,7 @@ from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import lateral_limit
+from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents
 from maneuver_automaton.planning.polishing import (

@@ -12,7 +12,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
-from maneuver_automaton.models.greatest_speed import greatest_speed
+from maneuver_automaton.models.speeds import greatest_speed
 from maneuver_automaton.planning.needs import rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
@@ -91,7 +91,7 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
     from maneuver_automaton.planning.polishing import why_not_polished
-    from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
+    from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
     from maneuver_automaton.search.lattice_query import lattice_query
 
     model, cost = problem.automaton.model, problem.cost

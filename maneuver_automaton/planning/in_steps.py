@@ -33,9 +33,8 @@ from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
 from maneuver_automaton.planning.steps import Steps, steps_of
 from maneuver_automaton.planning.tracking import Tracked, track
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.kinematic_paths import kinematic_problem
-from maneuver_automaton.refinement.path_guesses import path_guesses
-from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.refinement.guesses import path_guesses
+from maneuver_automaton.refinement.stop_and_steer import kinematic_problem, stop_and_steer
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.search.result import plan_of

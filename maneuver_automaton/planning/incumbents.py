@@ -22,9 +22,9 @@ from maneuver_automaton.planning.result import (
     Workspace,
 )
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.refinement.fitting import (
     COSTLIER,
+    broken_condition,
     fitted_plans,
     has_short_coasts,
     nearly_met,

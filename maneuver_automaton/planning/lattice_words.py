@@ -27,10 +27,9 @@ from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.planning.steps import BY_TIME, Steps
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whole_of
-from maneuver_automaton.refinement.improve import Improved, Patience, improve
+from maneuver_automaton.refinement.improve import Improved, Patience, improve, restarts_of
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
-from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan

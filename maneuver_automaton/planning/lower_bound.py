@@ -27,7 +27,7 @@ from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound,
 from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
+from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.prepared import RECENT
 

@@ -20,12 +20,12 @@ from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.greatest_speed import Interval
+from maneuver_automaton.models.speeds import Interval
+from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
-from maneuver_automaton.optimal_control.polish_values import Guard
 from maneuver_automaton.optimal_control.polishing import intervals_for
-from maneuver_automaton.optimal_control.problem import Components, RunningCost
-from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.optimal_control.problem import RunningCost
+from maneuver_automaton.optimal_control.scene import BodyPart, Guard
 from maneuver_automaton.planning.incumbents import Incumbents
 from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.polished_price import (
@@ -36,15 +36,14 @@ from maneuver_automaton.planning.polished_price import (
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
-from maneuver_automaton.refinement.guesses import course_guess, timed
-from maneuver_automaton.refinement.kinematic_paths import follows_paths, simpler_problem
-from maneuver_automaton.refinement.path_guesses import PathGuesses, path_guesses
+from maneuver_automaton.refinement.guesses import PathGuesses, course_guess, path_guesses, timed
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishResult,
     PolishTask,
     polish_guesses,
 )
+from maneuver_automaton.refinement.stop_and_steer import follows_paths, simpler_problem
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup, sub_library

@@ -20,8 +20,8 @@ from maneuver_automaton.planning.polished_price import prices_metres_alone
 from maneuver_automaton.planning.polishing import load_polishing, why_not_polished
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
 from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
+from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
 from maneuver_automaton.search.choose import load_insertion_kernels, load_search, load_times_kernels
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import is_too_sharp, lateral_limit
-from maneuver_automaton.primitives.trim import Trim
+from maneuver_automaton.models.speeds import is_too_sharp, lateral_limit
+from maneuver_automaton.primitives.primitive import Trim
 
 TWIST_NAMES = ("speed", "lateral_speed", "turn_rate", "climb")
 WORLD_NAMES = ("v_x", "v_y", "v_z")  # of a vehicle that translations alone move

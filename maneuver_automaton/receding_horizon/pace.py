@@ -11,8 +11,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.effort import effort_report
-from maneuver_automaton.refinement.retiming import retime
+from maneuver_automaton.refinement.retiming import effort_report, retime
 from maneuver_automaton.refinement.shooting import least_effort
 
 PACE = re.compile(r"( x[-+.e0-9]+)+$")

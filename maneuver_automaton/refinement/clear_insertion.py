@@ -23,7 +23,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.chain import coasted
-from maneuver_automaton.refinement.conditions import TIME_TOLERANCE
+from maneuver_automaton.refinement.fitting import TIME_TOLERANCE
 from maneuver_automaton.refinement.work import SNAP, VIA
 from maneuver_automaton.search.lattice_library import library_with
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query

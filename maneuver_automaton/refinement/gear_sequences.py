@@ -20,7 +20,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Car, Model, Unicycle
 from maneuver_automaton.optimal_control import Guess
-from maneuver_automaton.optimal_control.polish_values import Polished
+from maneuver_automaton.optimal_control.scene import Polished
 from maneuver_automaton.problem import STANDING, Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.cost_to_go import cost_to_go_table

@@ -7,8 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.refinement.improve import Improvement, Patience
-from maneuver_automaton.refinement.restarts import FINER
+from maneuver_automaton.refinement.improve import FINER, Improvement, Patience
 from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.result import SearchStatus

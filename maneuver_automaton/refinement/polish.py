@@ -19,21 +19,21 @@ from maneuver_automaton.collision import Obstacle, Shape
 from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import lateral_limit
+from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.movers import MovingSolid
-from maneuver_automaton.optimal_control.polish_values import (
+from maneuver_automaton.optimal_control.polishing import polish
+from maneuver_automaton.optimal_control.problem import RunningCost, resampled
+from maneuver_automaton.optimal_control.scene import (
     LEAST_DURATION,
     MOST_DURATION,
+    BodyPart,
     Ends,
     Guard,
+    MovingSolid,
     Polished,
     PolishSettings,
     Scene,
 )
-from maneuver_automaton.optimal_control.polishing import polish
-from maneuver_automaton.optimal_control.problem import RunningCost, resampled
-from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.problem import Bounds
 from maneuver_automaton.refinement.closure import Closed, closed

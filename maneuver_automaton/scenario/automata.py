@@ -10,14 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.library import load_library
-from maneuver_automaton.automaton.stock import load_stock_library, stock_libraries
+from maneuver_automaton.automaton.library import load_library, load_stock_library, stock_libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.lateral import lateral_limit
+from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.primitives import Trim, trims_of
-from maneuver_automaton.primitives.bang_bang import has_limited_rates
-from maneuver_automaton.primitives.quickest import quickest_maneuvers
+from maneuver_automaton.primitives.closed_form import has_limited_rates, quickest_maneuvers
 from maneuver_automaton.scenario.parts import at
 from maneuver_automaton.scenario.presets import preset_automaton
 from maneuver_automaton.scenario.schema import (

@@ -13,7 +13,6 @@ from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton._library_models import model_of as model_of_entry
 from maneuver_automaton.automaton.building import (
     Failure,
     LibraryBuild,
@@ -23,15 +22,16 @@ from maneuver_automaton.automaton.building import (
     nearest_pairs,
     neighbour_pairs,
 )
+from maneuver_automaton.automaton.library import model_of as model_of_entry
 from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.design import DesignedLibrary, design_library
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, TransferSettings
-from maneuver_automaton.primitives.bang_bang import has_limited_rates
+from maneuver_automaton.primitives.closed_form import has_limited_rates
 from maneuver_automaton.primitives.equilibrium import MissingTrim, trims_of
-from maneuver_automaton.primitives.trim import Trim
+from maneuver_automaton.primitives.primitive import Trim
 from maneuver_automaton.scenario.automata import MAX_STEADY_TRIMS
 from maneuver_automaton.scenario.parts import (
     Count,

@@ -11,7 +11,7 @@ from maneuver_automaton.analysis import turnpike
 from maneuver_automaton.models import SecondOrderUnicycle
 from maneuver_automaton.optimal_control import SolveStatus
 from maneuver_automaton.primitives import trims_of
-from maneuver_automaton.primitives.bang_bang import bang_bang
+from maneuver_automaton.primitives.closed_form import bang_bang
 
 ROBOT = SecondOrderUnicycle(
     max_speed=2.0, max_turn_rate=2.0, max_acceleration=1.0, max_angular_acceleration=1.0

@@ -30,8 +30,8 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import CarWithTrailer, Hovercraft, UserModel
 from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, TransferSettings
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.primitives.equilibrium import trims_of
-from maneuver_automaton.primitives.resimulation import maneuver_defect
 
 CRAFT = Hovercraft(
     mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0,

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import rollout
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
-from maneuver_automaton.primitives.resimulation import _rates, pieces
+from maneuver_automaton.primitives.connecting import _rates, pieces
 
 AHEAD = Trim(name="ahead", body_velocity=[2.0, 0.0, 0.0], control=[2.0, 0.0])
 LEFT = Trim(name="left", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.automaton.stock import stock_libraries
+from maneuver_automaton.automaton.library import stock_libraries
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from tests.reference_dynamics import trim_defect
 
 LEAST = {  # trims, maneuvers

@@ -10,7 +10,7 @@ import pytest
 from maneuver_automaton import Box, Disc, Goal, Problem
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import begin_state, committed, end_state
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import FleetHorizon, FleetProblem, plan_fleet
 from maneuver_automaton.fleet.held import onward, rejoined, rest_of_plan, resting, stopping

@@ -20,8 +20,8 @@ from maneuver_automaton.formats.aroc import (
 from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.models import AcceleratingCar
 from maneuver_automaton.planning import plan
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.primitives.resimulation import maneuver_defect
 from maneuver_automaton.scenario import load_scenario
 from tests.search.cases import compiled_only
 

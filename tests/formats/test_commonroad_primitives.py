@@ -24,7 +24,7 @@ from maneuver_automaton.formats.commonroad_primitives import (
 )
 from maneuver_automaton.models import SecondOrderCar, Unicycle
 from maneuver_automaton.primitives import Maneuver
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from tests.formats.outside import DATA, message_of, needs_data
 
 CAR = SecondOrderCar(

@@ -33,7 +33,7 @@ from maneuver_automaton.formats.sbpl_mprim import (
 )
 from maneuver_automaton.models import LatticeBody, Unicycle
 from maneuver_automaton.planning import plan
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.problem import Problem
 from tests.formats.outside import DATA, message_of, needs_data
 

@@ -14,7 +14,7 @@ from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.tpcap import read_tpcap
 from maneuver_automaton.models import SecondOrderUnicycle
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.primitives.trim import Trim
+from maneuver_automaton.primitives.primitive import Trim
 from tests.scenario.files import SCENARIO
 
 MPRIM = """\

@@ -18,8 +18,7 @@ from maneuver_automaton.formats import load_plan, plan_to_dict, save_plan
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import Alternative, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.kinematic_paths import extreme_automaton
-from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, stop_and_steer
 from tests.inertia import CAR, rest_of, resting
 
 KEYS = {

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Shape
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Car, Unicycle, UserModel

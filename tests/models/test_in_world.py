@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.analysis import Region, check_vector_field
 from maneuver_automaton.groups import SE2, translations
 from maneuver_automaton.models import UserModel, as_stated, in_world, vector_field
-from maneuver_automaton.models.greatest_speed import greatest_speed
+from maneuver_automaton.models.speeds import greatest_speed
 
 RIVER = UserModel(
     name="boat",

@@ -214,7 +214,7 @@ def test_components_are_the_arrays(model, data):
 def test_symbols_are_the_numbers(model):
     import casadi
 
-    from maneuver_automaton.optimal_control._casadi import numpy_on_symbols
+    from maneuver_automaton.optimal_control.ipopt import numpy_on_symbols
 
     dof, n_z, n_u = sizes(model)
     rng = np.random.default_rng(6)

@@ -9,16 +9,16 @@ import pytest
 
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.models import Car, Hovercraft, SecondOrderCar
+from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
     TransferSettings,
-    control_scale,
     drawn_in,
     duration_guess,
     solve_transfer,
     transfer_program,
 )
-from maneuver_automaton.optimal_control.solution import SolveStatus
+from maneuver_automaton.optimal_control.problem import control_scale
 
 CAR = SecondOrderCar(
     wheelbase=2.5, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.optimal_control.movers import ALWAYS, NEVER, MovingSolid, pieces_during
+from maneuver_automaton.optimal_control.scene import ALWAYS, NEVER, MovingSolid, pieces_during
 from maneuver_automaton.optimal_control.separation import Pairs, near_pairs
 
 BOX = np.array([[1.0, 0.5], [-1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]])

@@ -11,10 +11,9 @@ import shapely
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.polish_values import Ends, PolishSettings, Scene
 from maneuver_automaton.optimal_control.polishing import intervals_for, polish
+from maneuver_automaton.optimal_control.scene import BodyPart, Ends, PolishSettings, Scene
 from maneuver_automaton.optimal_control.separation import (
-    BodyPart,
     Facing,
     Lines,
     Pairs,

@@ -23,7 +23,7 @@ from maneuver_automaton.optimal_control import (
     straight_guess,
     transcribe,
 )
-from maneuver_automaton.optimal_control._casadi import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
 from tests.reference_dynamics import dynamics_defect
 
 RULES = ("trapezoidal", "rk4")

@@ -17,7 +17,7 @@ from maneuver_automaton.planning.checking import Condition, check_plan
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.refinement.conditions import broken_condition
+from maneuver_automaton.refinement.fitting import broken_condition
 from tests import scenes
 from tests.inertia import ROBOT, resting
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.among_zones import coasts_through

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost

@@ -12,7 +12,7 @@ from maneuver_automaton.cli.tables import print_result
 from maneuver_automaton.fleet import FleetProblem, plan_fleet
 from maneuver_automaton.formats.fleet_json import fleet_to_dict
 from maneuver_automaton.formats.plan_json import load_plan, load_result, plan_to_dict, save_plan
-from maneuver_automaton.optimal_control._casadi import why_no_casadi
+from maneuver_automaton.optimal_control.ipopt import why_no_casadi
 from maneuver_automaton.planning import plan, plans
 from maneuver_automaton.problem import Problem, SearchSettings
 from tests.inertia import CAR, resting, unicycle_automaton

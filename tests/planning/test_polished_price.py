@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan

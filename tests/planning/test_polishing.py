@@ -9,7 +9,7 @@ from unittest.mock import patch
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost

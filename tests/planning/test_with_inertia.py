@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.costs import Cost

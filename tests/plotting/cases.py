@@ -10,7 +10,7 @@ from PIL import Image
 
 from maneuver_automaton.audit import TerminalError
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle

@@ -28,7 +28,7 @@ from maneuver_automaton.primitives import (
     trims_of,
     turns,
 )
-from maneuver_automaton.primitives.bang_bang import differing, has_limited_rates
+from maneuver_automaton.primitives.closed_form import differing, has_limited_rates
 
 CAR = SecondOrderCar(
     wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5

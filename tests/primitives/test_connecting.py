@@ -8,9 +8,8 @@ import pytest
 from maneuver_automaton.models import CarWithTrailer, Helicopter, Hovercraft, SingleTrack, UserModel
 from maneuver_automaton.optimal_control.maneuvers import transfer_program
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.primitives.connecting import Inputs, closed, connect
+from maneuver_automaton.primitives.connecting import Inputs, closed, connect, maneuver_defect
 from maneuver_automaton.primitives.equilibrium import trims_of
-from maneuver_automaton.primitives.resimulation import maneuver_defect
 from tests.reference_dynamics import trim_defect
 
 CRAFT = Hovercraft(

@@ -7,8 +7,8 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.models import CarWithTrailer, rollout
-from maneuver_automaton.primitives.hitching import connect_hitches, hitch_trims
-from maneuver_automaton.primitives.resimulation import maneuver_defect
+from maneuver_automaton.primitives.connecting import maneuver_defect
+from maneuver_automaton.primitives.turning import connect_hitches, hitch_trims
 from tests.reference_dynamics import trim_defect
 
 TRUCK = CarWithTrailer(

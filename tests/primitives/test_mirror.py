@@ -18,7 +18,7 @@ from maneuver_automaton.models import (
 )
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.primitives.mirror import mirror_of
+from maneuver_automaton.primitives.symmetry import mirror_of
 
 CRAFT = Hovercraft(
     mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0, max_torque=0.2

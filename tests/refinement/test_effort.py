@@ -7,7 +7,7 @@ import pytest
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.refinement.effort import effort_report, effort_threshold
+from maneuver_automaton.refinement.retiming import effort_report, effort_threshold
 
 MATRIX = np.array([[4.0, -1.5], [-1.5, 1.0]])
 ROBOT = Automaton.of_controls(

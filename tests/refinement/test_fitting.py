@@ -11,8 +11,13 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.models import Car
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.refinement.conditions import broken_condition
-from maneuver_automaton.refinement.fitting import COSTLIER, SHORT, fitted_plans, with_lasting_coasts
+from maneuver_automaton.refinement.fitting import (
+    COSTLIER,
+    SHORT,
+    broken_condition,
+    fitted_plans,
+    with_lasting_coasts,
+)
 from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton

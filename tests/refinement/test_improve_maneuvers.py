@@ -12,9 +12,8 @@ import pytest
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
-from maneuver_automaton.refinement.improve import Improvement, Patience
+from maneuver_automaton.refinement.improve import FINER, Improvement, Patience
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
-from maneuver_automaton.refinement.restarts import FINER
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps

@@ -8,7 +8,7 @@ import pytest
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.models import CarWithTrailer, Unicycle
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.refinement.path_guesses import path_guesses
+from maneuver_automaton.refinement.guesses import path_guesses
 
 TRUCK = CarWithTrailer(
     wheelbase=2.5, hitch_length=4.0, max_steering=0.6, max_speed=2.0, max_hitch=0.7

@@ -15,10 +15,9 @@ from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import SecondOrderCar, SecondOrderUnicycle
-from maneuver_automaton.optimal_control.polish_values import Polished, PolishSettings
+from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.polishing import intervals_for
-from maneuver_automaton.optimal_control.separation import BodyPart
-from maneuver_automaton.optimal_control.solution import SolveStatus
+from maneuver_automaton.optimal_control.scene import BodyPart, Polished, PolishSettings
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.problem import Problem

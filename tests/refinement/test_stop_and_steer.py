@@ -14,8 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
-from maneuver_automaton.refinement.kinematic_paths import extreme_automaton
-from maneuver_automaton.refinement.stop_and_steer import stop_and_steer
+from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, stop_and_steer
 from tests.inertia import CAR, ROBOT, rest_of
 
 MODELS = {"car": CAR, "unicycle": ROBOT}

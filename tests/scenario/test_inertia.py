@@ -8,8 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton.library import automaton_hash, save_library
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import automaton_hash, load_stock_library, save_library
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario

@@ -13,7 +13,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
-from maneuver_automaton.primitives.bang_bang import connect_bang_bang
+from maneuver_automaton.primitives.closed_form import connect_bang_bang
 from maneuver_automaton.primitives.driving import drive
 
 

@@ -12,7 +12,7 @@ import shapely
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.collision.heights import Layer
 from maneuver_automaton.collision.layers import MOST_LAYERS, always, bands_of

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.automaton.stock import load_stock_library
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings

@@ -1,0 +1,308 @@
+"""Vehicles on steered wheels that roll without slip: car, with limited rates, with a trailer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array, plain_numbers
+from maneuver_automaton.models.vehicle import (
+    Components,
+    Vehicle,
+    check_parameters,
+    rows_of_limits,
+    speed_limits,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Car(Vehicle):
+    """``heading' = v tan(steering) / wheelbase``, driving along its heading; control [v, steering].
+
+    The pose is that of the middle of the rear axle.
+
+    Source: LaValle (2006), *Planning Algorithms*, Eq. (13.15).
+
+    Parameters
+    ----------
+    wheelbase : float
+        Distance from the rear to the front axle [m].
+    max_steering : float, optional
+        Greatest steering angle to either side, less than pi / 2 [rad]; pi / 2 itself if None.
+    max_speed : float, optional
+        Greatest speed, forward and in reverse [m/s]; no limit if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
+
+    Examples
+    --------
+    >>> car = Car(wheelbase=2.5, max_steering=0.6)
+    >>> car.body_velocity(np.zeros(0), np.array([2.0, 0.5])).round(3).tolist()
+    [2.0, 0.0, 0.437]
+    >>> round(car.turning_radius, 2)
+    3.65
+    """
+
+    wheelbase: float  # [m]
+    max_steering: float | None = None  # [rad]
+    max_speed: float | None = None  # [m/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
+    name: ClassVar[str] = "car"
+    control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
+        if not 0.0 < self.wheelbase < math.inf:
+            raise ValueError(f"car: wheelbase must be positive, got {self.wheelbase} m")
+        check_parameters(self)
+
+    @property
+    def turning_radius(self) -> float:
+        """Radius of the tightest circle of the rear axle [m]; zero if steering has no limit."""
+        if self.max_steering is None:
+            return 0.0
+        return self.wheelbase / math.tan(self.max_steering)
+
+    @property
+    def control_limits(self) -> Array:
+        """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
+        steering = math.pi / 2 if self.max_steering is None else self.max_steering
+        return rows_of_limits(self.max_speed, steering)
+
+    def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
+        return u[0], 0.0, u[0] * np.tan(u[1]) / self.wheelbase
+
+    def body_velocity(self, reduced_state: Array, control: Array) -> Array:
+        """Twist (..., 3) [m/s, m/s, rad/s]; see `velocity`."""
+        steering = np.abs(as_array("control", control, last=2)[..., 1])
+        if np.any(steering >= math.pi / 2):
+            worst = float(steering.max())
+            raise ValueError(f"car: steering must be less than pi / 2, got {worst:.6g} rad")
+        return Vehicle.body_velocity(self, reduced_state, control)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AcceleratingCar(Vehicle):
+    """``speed' = acceleration``, rolling without slip; control [acceleration, steering].
+
+    The reduced state is [speed]; ``heading' = speed tan(steering) / wheelbase``. The pose is that
+    of the middle of the rear axle.
+
+    Source: the car of the toolbox AROC; Kochdumper et al. (2021), *AROC: a toolbox for automated
+    reachset optimal controller synthesis*, HSCC.
+
+    Parameters
+    ----------
+    wheelbase : float
+        Distance from the rear to the front axle [m].
+    max_steering : float
+        Greatest steering angle to either side, less than pi / 2 [rad].
+    max_speed, max_acceleration : float
+        Greatest speed [m/s], greatest rate of it up and down [m/s^2].
+    min_speed : float, optional
+        Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
+
+    Examples
+    --------
+    >>> car = AcceleratingCar(wheelbase=2.3, max_steering=1.0, max_speed=30.0, max_acceleration=9.0)
+    >>> car.body_velocity(np.array([2.3]), np.array([1.0, np.pi / 4])).round(3).tolist()
+    [2.3, 0.0, 1.0]
+    """
+
+    wheelbase: float  # [m]
+    max_steering: float  # [rad]
+    max_speed: float  # [m/s]
+    max_acceleration: float  # [m/s^2]
+    min_speed: float | None = None  # [m/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
+    name: ClassVar[str] = "accelerating_car"
+    control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering")
+    reduced_names: ClassVar[tuple[str, ...]] = ("speed",)
+
+    @property
+    def control_limits(self) -> Array:
+        """Least and greatest acceleration [m/s^2] and steering angle [rad]: (2, 2)."""
+        return rows_of_limits(self.max_acceleration, self.max_steering)
+
+    @property
+    def reduced_limits(self) -> Array:
+        """Least and greatest speed [m/s]: (1, 2)."""
+        return rows_of_limits(speed_limits(self.name, self.min_speed, self.max_speed))
+
+    def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
+        return z[0], 0.0, z[0] * np.tan(u[1]) / self.wheelbase
+
+    def dynamics(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Rate of [speed]: the acceleration."""
+        return (u[0],)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SecondOrderCar(Vehicle):
+    """``speed' = acceleration, steering' = steering_rate``, rolling without slip.
+
+    The reduced state is [speed, steering], the control [acceleration, steering_rate]; the pose is
+    that of the middle of the rear axle, and ``heading' = speed tan(steering) / wheelbase``.
+
+    Source: the *kinematic single-track model* of Althoff, Koschi, Manzinger (2017), CommonRoad:
+    composable benchmarks for motion planning on roads, and its vehicle models.
+
+    Parameters
+    ----------
+    wheelbase : float
+        Distance from the rear to the front axle [m].
+    max_steering : float
+        Greatest steering angle to either side, less than pi / 2 [rad].
+    max_speed : float
+        Greatest speed [m/s].
+    max_acceleration : float
+        Greatest rate of the speed, up and down [m/s^2].
+    max_steering_rate : float
+        Greatest rate of the steering angle to either side [rad/s].
+    min_speed : float, optional
+        Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
+
+    Examples
+    --------
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
+    ...                      max_acceleration=1.0, max_steering_rate=0.5)
+    >>> car.body_velocity(np.array([2.0, 0.5]), np.array([1.0, 0.0])).round(3).tolist()
+    [2.0, 0.0, 0.39]
+    >>> car.reduced_limits.tolist()
+    [[-2.5, 2.5], [-0.75, 0.75]]
+    """
+
+    wheelbase: float  # [m]
+    max_steering: float  # [rad]
+    max_speed: float  # [m/s]
+    max_acceleration: float  # [m/s^2]
+    max_steering_rate: float  # [rad/s]
+    min_speed: float | None = None  # [m/s]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
+    name: ClassVar[str] = "second_order_car"
+    control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering_rate")
+    reduced_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
+
+    @property
+    def turning_radius(self) -> float:
+        """Radius of the tightest circle of the rear axle [m]."""
+        return self.wheelbase / math.tan(self.max_steering)
+
+    @property
+    def control_limits(self) -> Array:
+        """Least and greatest acceleration [m/s^2] and steering rate [rad/s]: (2, 2)."""
+        return rows_of_limits(self.max_acceleration, self.max_steering_rate)
+
+    @property
+    def reduced_limits(self) -> Array:
+        """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
+        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
+        return rows_of_limits(speeds, self.max_steering)
+
+    @property
+    def kinematic(self) -> Car:
+        """The car whose paths it can follow if it stops where the curvature jumps."""
+        return Car(wheelbase=self.wheelbase, max_steering=self.max_steering)
+
+    def state_along(self, twist: Array, pace: float) -> Array:
+        """Reduced state (2,) in which it moves with ``pace * twist``: the wheel stays as it is.
+
+        Examples
+        --------
+        >>> car = SecondOrderCar(wheelbase=2.0, max_steering=1.0, max_speed=2.0,
+        ...                      max_acceleration=1.0, max_steering_rate=0.5)
+        >>> car.state_along(np.array([-1.0, 0.0, 0.5]), 0.0).round(4).tolist()
+        [-0.0, -0.7854]
+        """
+        steering = math.atan(self.wheelbase * float(twist[2]) / float(twist[0]))
+        return np.array([pace * float(twist[0]), steering])
+
+    def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
+        return z[0], 0.0, z[0] * np.tan(z[1]) / self.wheelbase
+
+    def dynamics(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Rates of [speed, steering]: the control."""
+        return u[0], u[1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CarWithTrailer(Vehicle):
+    """A kinematic car that pulls one trailer, hitched at its rear axle; control [speed, steering].
+
+    The reduced state is [hitch], the heading of the car less that of the trailer:
+    ``hitch' = speed tan(steering) / wheelbase - speed sin(hitch) / hitch_length``. The pose is
+    that of the middle of the car's rear axle. In reverse the hitch is unstable.
+
+    Source: LaValle (2006), *Planning Algorithms*, Eq. (13.19), for one trailer.
+
+    Parameters
+    ----------
+    wheelbase, hitch_length : float
+        Distance of the axles of the car; of the trailer's axle from the hitch [m].
+    max_steering : float
+        Greatest steering angle to either side, less than pi / 2 [rad].
+    max_speed : float
+        Greatest speed [m/s].
+    min_speed : float, optional
+        Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
+    max_hitch : float, optional
+        Greatest angle at the hitch to either side [rad]; no limit if None.
+    max_lateral_acceleration : float, optional
+        Greatest speed times turn rate [m/s^2]; no limit if None.
+
+    Examples
+    --------
+    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
+    >>> truck.reduced_dynamics(np.array([np.pi / 2]), np.array([0.5, 0.0])).tolist()
+    [-1.0]
+    >>> (truck.part_poses(np.array([np.pi / 2])).round(3) + 0.0).tolist()
+    [[0.0, 0.5, -1.571]]
+    """
+
+    wheelbase: float  # [m]
+    hitch_length: float  # [m]
+    max_steering: float  # [rad]
+    max_speed: float  # [m/s]
+    min_speed: float | None = None  # [m/s]
+    max_hitch: float | None = None  # [rad]
+    max_lateral_acceleration: float | None = None  # [m/s^2]
+    name: ClassVar[str] = "car_with_trailer"
+    control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
+    reduced_names: ClassVar[tuple[str, ...]] = ("hitch",)
+    part_names: ClassVar[tuple[str, ...]] = ("trailer",)
+
+    @property
+    def control_limits(self) -> Array:
+        """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
+        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
+        return rows_of_limits(speeds, self.max_steering)
+
+    @property
+    def reduced_limits(self) -> Array:
+        """Least and greatest angle at the hitch [rad]: (1, 2)."""
+        return rows_of_limits(self.max_hitch)
+
+    def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
+        return u[0], 0.0, u[0] * np.tan(u[1]) / self.wheelbase
+
+    def dynamics(self, z: Components, u: Components, /) -> tuple[Any, ...]:
+        """Rate of [hitch]: turn rate of the car less that of the trailer."""
+        return (u[0] * np.tan(u[1]) / self.wheelbase - u[0] * np.sin(z[0]) / self.hitch_length,)
+
+    def part_frames(self, z: Components, /) -> tuple[tuple[Any, Any, Any], ...]:
+        """Components of the pose of each part: the middle of the trailer's axle.
+
+        Source: turned back by the hitch angle, then back along the trailer by its length.
+        """
+        return ((-self.hitch_length * np.cos(z[0]), self.hitch_length * np.sin(z[0]), -z[0]),)
