@@ -15,7 +15,7 @@ from maneuver_automaton.audit.frames import Frames
 from maneuver_automaton.audit.outlines import body_outline
 from maneuver_automaton.audit.pairs import spans_within
 from maneuver_automaton.audit.passages import Body
-from maneuver_automaton.audit.sentences import what_is_hit
+from maneuver_automaton.audit.sentences import nearest_at, what_is_hit
 from maneuver_automaton.audit.surroundings import Surroundings, origin_of, surroundings_of
 from maneuver_automaton.audit.values import Audit, TerminalError, distance_to, seen_from
 from maneuver_automaton.audit.zones import zones_broken
@@ -147,9 +147,11 @@ def closest_to(
     obstacles: tuple[AnyObstacle, ...],
     *,
     footprint: tuple[Shape, ...],
+    parts: Mapping[str, tuple[Shape, ...]] | None = None,
     body_height: tuple[float, float] = (0.0, 0.0),
     within: tuple[float, float] = (-math.inf, math.inf),
     enough: float = 0.0,
+    ask: Callable[[], None] = lambda: None,
 ) -> Least:
     """The least clearance of a plan to obstacles, and when.
 
@@ -161,12 +163,16 @@ def closest_to(
     obstacles : tuple of Obstacle or OccupancyMap
     footprint : tuple of Shape
         Parts of the body; empty for a point.
+    parts : mapping of str to tuple of Shape, optional
+        What the vehicle carries, by name, each in its own frame.
     body_height : (float, float)
         From where to where the body of a plan in space reaches about its altitude [m].
     within : (float, float)
         First and last time that counts, on the plan's clock [s].
     enough : float
         Clearance [m] that decides: the bound is made sharp enough to tell on which side it is.
+    ask : callable
+        Called before each part of the work; it may raise to give it up.
 
     Returns
     -------
@@ -191,10 +197,17 @@ def closest_to(
     if not obstacles or first > last:
         return Least(math.inf, math.inf, clock)
     drive = driven(seen_from(plan, goal), model)
-    body = _body(drive.frames, footprint, plan, goal, body_height)
     around = surroundings_of(obstacles, origin_of(goal.pose))
-    least = least_clearance(body, around, spans_within(body, first, last), enough=enough)
-    return least._replace(time=clock + least.time)
+    found = []
+    for name, shapes in {"": footprint, **(parts or {})}.items():
+        ask()
+        frames = drive.part(name) if name else drive.frames
+        body = _body(frames, shapes, plan, goal, body_height)
+        spans = spans_within(body, first, last)
+        least = least_clearance(body, around, spans, enough=enough, ask=ask)
+        hit = -1 if _keeps(least, enough) else nearest_at(body, around, least.time).obstacle
+        found.append(least._replace(time=clock + least.time, obstacle=hit, part=name))
+    return min(found, key=lambda one: (one.obstacle < 0, one.distance))
 
 
 def _body(
@@ -220,18 +233,20 @@ def _clearance(
     margin: float,
     ask: Callable[[], None],
 ) -> tuple[Least, str]:
-    """The least clearance of a body, and what it hits; empty if it keeps the margin [m].
-
-    Where it cannot be told, to within a millimetre, it does.
-    """
+    """The least clearance of a body, and what it hits; empty if it keeps the margin [m]."""
     enough = max(CONTACT, margin - CONTACT)  # touching never is
     ask()
     spans = spans_within(body, 0.0, math.inf)
     least = least_clearance(body, around, spans, enough=enough, ask=ask)
-    if least.measured > enough and least.distance > enough - UNRESOLVED:
+    if _keeps(least, enough):
         return least, ""
     at = least.time
     return least, what_is_hit(body, around, obstacles, time=at, margin=margin, origin=origin)
+
+
+def _keeps(least: Least, enough: float) -> bool:
+    """Whether a clearance is enough [m], as far as it can be told."""
+    return least.measured > enough and least.distance > enough - UNRESOLVED
 
 
 def _off_the_goal(missed: TerminalError, goal: Goal) -> list[str]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from maneuver_automaton.audit.apart import directions, point_apart, points_of
@@ -10,6 +12,26 @@ from maneuver_automaton.audit.pairs import instant, overlapped
 from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
 from maneuver_automaton.audit.surroundings import Surroundings
 from maneuver_automaton.collision.shapes import AnyObstacle, name_of
+
+
+class Nearest(NamedTuple):
+    """The edge that is nearest to a body at a time."""
+
+    pairs: Pairs
+    row: int
+    obstacle: int
+    distance: float  # [m]
+
+
+def nearest_at(body: Body, around: Surroundings, time: float) -> Nearest:
+    """The edge that is nearest at a time since the start [s]."""
+    pairs = instant(body, around, time)
+    known = bounds_of(body, around, pairs, overlaps=True)
+    row, distance = int(np.argmin(known.measured)), float(known.measured.min())
+    held = overlapped(body, around, pairs.places)
+    if held >= 0:
+        row, distance = int(np.flatnonzero(pairs.edge == held)[0]), 0.0
+    return Nearest(pairs, row, int(around.owners[pairs.edge[row]]), distance)
 
 
 def what_is_hit(
@@ -22,16 +44,9 @@ def what_is_hit(
     origin: tuple[float, float],
 ) -> str:
     """A sentence on the obstacle that is nearest at a time since the start [s]."""
-    pairs = instant(body, around, time)
-    known = bounds_of(body, around, pairs, overlaps=True)
-    row, distance = int(np.argmin(known.measured)), float(known.measured.min())
-    held = overlapped(body, around, pairs.places)
-    if held >= 0:
-        row, distance = int(np.flatnonzero(pairs.edge == held)[0]), 0.0
-    index = int(around.owners[pairs.edge[row]])
+    pairs, row, index, distance = nearest_at(body, around, time)
     point = _nearest_point(body, around, pairs, row) + complex(*origin)
-    x, y = point.real, point.imag
-    name = name_of(obstacles[index], index, f"({x:.10g}, {y:.10g})")
+    name = name_of(obstacles[index], index, f"({point.real:.10g}, {point.imag:.10g})")
     if distance <= CONTACT:
         return f"at {body.clock + time:.6g} s the vehicle touches {name}"
     near = f"the vehicle is {distance:.6g} m from {name}, closer than {margin:.6g} m"

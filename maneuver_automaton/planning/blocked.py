@@ -14,7 +14,7 @@ from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.all_round import touched_all_round
 from maneuver_automaton.collision.blocked import touched
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.checker import origin_near
+from maneuver_automaton.collision.fcl_checker import origin_near
 from maneuver_automaton.collision.heights import layers_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
