@@ -15,6 +15,8 @@ from maneuver_automaton.audit.apart import Points, points_of
 from maneuver_automaton.audit.stated import placed
 from maneuver_automaton.collision.shapes import Box, Disc, OccupancyMap, Shape
 
+LOST = 1e-9  # share of an area, that a union may lose
+
 
 class Outline(NamedTuple):
     """Edges of rings; a disc is an edge without length that has a radius."""
@@ -215,4 +217,8 @@ def _faces(ring: Array) -> Any:
     faces = shapely.get_parts(shapely.polygonize(lines))
     inner = [[face.representative_point().x, face.representative_point().y] for face in faces]
     around = _rings([ring]).holds(points_of(np.array(inner).reshape(-1, 2)))[0]
-    return shapely.union_all(faces[around])
+    whole = shapely.union_all(faces[around])
+    area = float(shapely.area(faces[around]).sum())
+    if abs(whole.area - area) > LOST * area:  # uniting all at once has lost a face
+        return functools.reduce(shapely.union, faces[around])
+    return whole

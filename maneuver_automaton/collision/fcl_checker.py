@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
+from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Obstacle,
@@ -34,16 +35,13 @@ from maneuver_automaton.collision.swept import (
     STANDING,
     GrownBody,
     Twist,
-    along,
     chunks,
     course_boxes,
-    course_hulls,
     cut_where_it_pivots,
-    fastest,
     grown_body,
     halves,
     slice_excess,
-    slice_hulls,
+    swept_hulls,
     windows,
 )
 from maneuver_automaton.groups import SE2
@@ -208,7 +206,7 @@ class FclChecker:
         x, y, turn = steps.sum(axis=0).tolist()
         pieces = cut_where_it_pivots(self._body, (x, y, turn))
         whole = np.concatenate([poses[0], poses[1, -1:]])
-        skin = body_skin(course_hulls(pieces, whole, steps))
+        skin = body_skin(swept_hulls(pieces, whole, steps))
         return bool(_touching([_object(skin)], np.zeros((1, 3)), self._ground.static))
 
     def _first_hit(
@@ -217,7 +215,8 @@ class FclChecker:
         """The first of some coasts that touches a static obstacle, and which."""
         if self._ground.static is None:
             return None
-        moving = fastest(self._body, twists) * durations > STANDING
+        speeds = point_speeds(twists, np.concatenate(self._body.pieces)).max(axis=1)
+        moving = speeds * durations > STANDING
         first = self._first_pose_hit(starts, np.flatnonzero(~moving))
         turning = np.abs(twists[:, 2])
         with np.errstate(divide="ignore", over="ignore"):
@@ -233,9 +232,8 @@ class FclChecker:
                 _sliced(self._body, kinds[k], level)
                 for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
             ]
-            begins, middles = along(
-                starts[of], twists[of], np.stack([parts.begins, parts.begins + 0.5 * parts.lengths])
-            )
+            times = np.stack([parts.begins, parts.begins + 0.5 * parts.lengths])
+            begins, middles = (SE2(starts[of]) @ SE2.exp(times[..., None] * twists[of])).pose
             objects = [solid.object for solid in solids]
             hits = _touching(objects, begins, self._ground.static)
             if not hits:
@@ -315,7 +313,8 @@ def _standing(body: GrownBody) -> Any:
 @functools.lru_cache(maxsize=1024)
 def _sliced(body: GrownBody, twist: Twist, level: int) -> _Sliced:
     duration, pieces = math.ldexp(1.0, -level), cut_where_it_pivots(body, twist)
-    hulls = slice_hulls(pieces, twist, duration)
+    step = duration * np.array([twist])
+    hulls = swept_hulls(pieces, np.concatenate([np.zeros((1, 3)), SE2.exp(step).pose]), step)
     return _Sliced(_object(body_skin(hulls)), slice_excess(pieces, twist, duration))
 
 

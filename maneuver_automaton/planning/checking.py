@@ -22,7 +22,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box, Obstacle, Zone
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.collision.fcl_checker import Course, FclChecker, origin_near
-from maneuver_automaton.collision.heights import Layer, layers_of
+from maneuver_automaton.collision.layers import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.planning.result import Workspace, workspace_of
