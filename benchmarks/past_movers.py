@@ -25,7 +25,7 @@ from benchmarks.cases import present
 from benchmarks.fleets import DATA
 from benchmarks.latency import planner_of
 from benchmarks.tables import show
-from maneuver_automaton.collision import slabs, world
+from maneuver_automaton.collision import world
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.fleet import FleetProblem, FleetResult, plan_fleet
 from maneuver_automaton.groups import SE2
@@ -89,8 +89,8 @@ def of_one_motion(problem: Problem, movers: list[ma.Obstacle], n: int = 4000) ->
     twists = problem.automaton.body_velocities[rng.integers(len(problem.automaton.trims), size=n)]
     more = {"durations": rng.uniform(0.2, 2.0, n), "times": rng.uniform(0.0, last, n)}
     found, answers = [], []
-    for few in (sys.maxsize, slabs.FEW_MOVING):
-        slabs.FEW_MOVING = few
+    for few in (sys.maxsize, world.FEW_MOVING):
+        world.FEW_MOVING = few
         worlds, motions = [], []
         for _ in range(5):
             world.world_of.cache_clear()

@@ -9,7 +9,7 @@ import pytest
 from rich.cells import cell_len
 
 from maneuver_automaton import Automaton, Plan, Problem, SecondOrderCar, Unicycle
-from maneuver_automaton.audit.values import TerminalError
+from maneuver_automaton.audit.judge import TerminalError
 from maneuver_automaton.cli.loop_tables import print_loop
 from maneuver_automaton.cli.tables import print_result, stretches
 from maneuver_automaton.collision import Box

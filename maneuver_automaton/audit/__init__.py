@@ -7,31 +7,12 @@ below, between samples too.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from maneuver_automaton._lazy import lazily
-
-if TYPE_CHECKING:
-    from maneuver_automaton.audit.clearance import Least as Least
-    from maneuver_automaton.audit.judge import audit_plan as audit_plan
-    from maneuver_automaton.audit.judge import closest_to as closest_to
-    from maneuver_automaton.audit.surroundings import Surroundings as Surroundings
-    from maneuver_automaton.audit.surroundings import origin_of as origin_of
-    from maneuver_automaton.audit.surroundings import surroundings_around as surroundings_around
-    from maneuver_automaton.audit.values import Audit as Audit
-    from maneuver_automaton.audit.values import TerminalError as TerminalError
-    from maneuver_automaton.audit.values import terminal_error as terminal_error
-
-_HOMES = {
-    "Least": "clearance",
-    "audit_plan": "judge",
-    "closest_to": "judge",
-    "Surroundings": "surroundings",
-    "origin_of": "surroundings",
-    "surroundings_around": "surroundings",
-    "Audit": "values",
-    "TerminalError": "values",
-    "terminal_error": "values",
-}
-
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+from maneuver_automaton.audit.clearance import Least as Least
+from maneuver_automaton.audit.judge import Audit as Audit
+from maneuver_automaton.audit.judge import TerminalError as TerminalError
+from maneuver_automaton.audit.judge import audit_plan as audit_plan
+from maneuver_automaton.audit.judge import closest_to as closest_to
+from maneuver_automaton.audit.judge import terminal_error as terminal_error
+from maneuver_automaton.audit.surroundings import Surroundings as Surroundings
+from maneuver_automaton.audit.surroundings import origin_of as origin_of
+from maneuver_automaton.audit.surroundings import surroundings_around as surroundings_around

@@ -33,6 +33,8 @@ class Least(NamedTuple):
     distance: float  # [m] no instant has less
     measured: float  # [m] the least one measured
     time: float  # [s] since the start, when that was
+    obstacle: int = -1  # which one is touched, or closer than enough; -1 if none is
+    part: str = ""  # what the vehicle carries, that it is of; empty for its own body
 
 
 NEVER = Least(math.inf, math.inf, 0.0)

@@ -5,23 +5,41 @@ Nothing of what made the plan is used: no group formula, no closed form, no pose
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.frames import Frames, Spans, frames_along, frames_through
-from maneuver_automaton.audit.legendre import SERIES, N, values_at
-from maneuver_automaton.audit.reduced import Reduced, reduced_states
-from maneuver_automaton.audit.stated import NOTHING, Stated, placed, stated_by
+from maneuver_automaton.audit.frames import (
+    INTEGRAL,
+    SERIES,
+    TO_END,
+    TO_NODES,
+    Frames,
+    N,
+    Spans,
+    frames_along,
+    frames_through,
+    placed,
+    values_at,
+)
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Maneuver, Trim
 
 TURN = 0.8  # [rad] per element at most: the last terms of its series are rounding
 EXACT = 1e-12  # [m, rad, model's units] what the last terms of a series may be
 HALVINGS = 10  # of a stretch at most
+NOTHING = 1e-12  # [s] shorter pieces lead nowhere
+ITERATIONS = 40  # of Picard; an element that needs more is cut
+SWEEPS = 8  # until each element begins where the one before it ends
+SAME = 1e-14  # relative, two states that are the same but for rounding
+FOLLOWED = 1e-9  # relative: a vehicle whose deviations grow is followed to that far from the plan
+NUDGE = 1e-6  # [model's units] for a derivative
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -215,3 +233,173 @@ def _standing(plan: Plan, model: Model, stated: Stated) -> Drive:
         controls=stated.controls,
         sampled_states=stated.states,
     )
+
+
+class Stated(NamedTuple):
+    """Stretches in order; what the plan states of them is compared, and never driven from."""
+
+    lengths: Array  # (n,) [s]
+    controls: Array  # (n, n_u)
+    states: Array  # (n, n_z) reduced states where they begin
+    end_states: Array  # (n, n_z)
+    ends: Array  # (n, dof) poses where they end
+    twists: Array  # (n, dof) of trims; NaN along maneuvers
+    pieces: IntArray  # (n,) number of the primitive
+
+
+def stated_by(plan: Plan) -> Stated:
+    """The stretches of a plan: trims whole, maneuvers from sample to sample.
+
+    Raises
+    ------
+    ValueError
+        If a maneuver has no course.
+    """
+    poses, lengths = plan.switching_poses, plan.primitive_durations
+    rows: list[Stated] = []
+    # Trims that follow each other are one run; every maneuver stands alone.
+    lasting = np.flatnonzero(lengths > NOTHING)
+    for _, run in groupby(
+        lasting.tolist(), key=lambda k: -1 if isinstance(plan.primitives[k], Trim) else k
+    ):
+        numbers = np.array(list(run))
+        pieces = [plan.primitives[k] for k in numbers]
+        trims = [one for one in pieces if isinstance(one, Trim)]
+        if trims:
+            rows.append(_trims(trims, numbers, lengths[numbers], poses[numbers + 1]))
+        rows += [
+            _maneuver(one, k, poses[k])
+            for one, k in zip(pieces, numbers.tolist(), strict=True)
+            if isinstance(one, Maneuver)
+        ]
+    if not rows:
+        return _nothing(plan)
+    if len(rows) == 1:
+        return rows[0]
+    return Stated(*(np.concatenate(column) for column in zip(*rows, strict=True)))
+
+
+def _trims(trims: Sequence[Trim], numbers: IntArray, lengths: Array, ends: Array) -> Stated:
+    states = np.array([trim.reduced_state for trim in trims])
+    controls = np.array([trim.control for trim in trims])
+    twists = np.array([trim.body_velocity for trim in trims])
+    return Stated(lengths, controls, states, states, ends, twists, numbers)
+
+
+def _maneuver(maneuver: Maneuver, number: int, begin: Array) -> Stated:
+    course = maneuver.course
+    if course is None:
+        raise ValueError(f"maneuver {maneuver.name!r}: has no course, so it cannot be audited")
+    lengths = np.diff(course.time)
+    lasting = lengths > 0.0
+    poses = placed(begin, course.pose[1:])
+    return Stated(
+        lengths[lasting],
+        course.control[:-1][lasting],
+        course.reduced_state[:-1][lasting],
+        course.reduced_state[1:][lasting],
+        poses[lasting],
+        np.full_like(poses[lasting], np.nan),
+        np.full(int(lasting.sum()), number),
+    )
+
+
+def _nothing(plan: Plan) -> Stated:
+    trim = plan.trims[0] if plan.trims else None
+    states = np.zeros((0, 0 if trim is None else trim.reduced_state.size))
+    controls = np.zeros((0, 0 if trim is None else trim.control.size))
+    poses = np.zeros((0, plan.start.size))
+    none = np.zeros(0, dtype=np.int64)
+    return Stated(np.zeros(0), controls, states, states, poses, poses, none)
+
+
+class Reduced(NamedTuple):
+    """Reduced states over elements; `nodes` is (e, 1, 0) for a vehicle without."""
+
+    nodes: Array  # (e, N, n_z)
+    series: Array  # (e, N + 1, n_z) Legendre series over the share of an element
+    error: Array  # (e,) what the last terms of a series are; inf where there is none
+    jumps: float  # what is left between elements, added up
+
+
+def reduced_states(
+    model: Model, controls: Array, lengths: Array, guess: Array, stated: NDArray[np.bool_]
+) -> Reduced:
+    """Reduced states from the first of `guess` (e, n_z) on, under controls (e, n_u).
+
+    Every element is driven from a guess of where it begins. The differences that remain between
+    elements are then carried forward by the linearised flow, and all are driven again, until each
+    begins where the one before ends: that is the integration from the start, by Newton's method.
+    A vehicle that amplifies deviations (a trailer pushed backwards) cannot be followed so for
+    long, by nobody: where it is 1e-9 from what the plan states, it goes on there, and the jump
+    counts. `stated` (e,) is where the guesses are what the plan states.
+    """
+    n = len(lengths)
+    if not guess.shape[1]:
+        return Reduced(np.zeros((n, 1, 0)), np.zeros((n, N + 1, 0)), np.zeros(n), 0.0)
+    begins, h = guess.copy(), lengths[:, None, None]
+    restarted = np.zeros(n - 1, dtype=np.bool_)
+    for sweep in range(SWEEPS):
+        nodes, rates, failed = _solved(model, begins, controls, lengths)
+        if failed.any():
+            return Reduced(nodes, nodes, np.where(failed, np.inf, 0.0), np.inf)
+        jumps = begins[:-1] + lengths[:-1, None] * (TO_END @ rates[:-1]) - begins[1:]
+        scale = 1.0 + np.abs(begins).max(axis=1)
+        open_ = np.abs(jumps).max(axis=1, initial=0.0) > SAME * scale[1:]
+        if not (open_ & ~restarted).any() or sweep == SWEEPS - 1:
+            break
+        flow = _flow(model, nodes[:, N // 2], controls, lengths)
+        begins, restarted = _carried_on(begins, jumps, flow, guess, FOLLOWED * scale * stated)
+    series = h * (INTEGRAL @ rates)
+    series[:, 0] += begins
+    error = np.abs(SERIES[-2:] @ rates).max(axis=(1, 2)) * lengths
+    return Reduced(nodes, series, error, float(np.abs(jumps).max(axis=1, initial=0.0).sum()))
+
+
+def _solved(
+    model: Model, begins: Array, controls: Array, lengths: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """States and rates (e, N, n_z) at the nodes, and which elements are too long to be solved."""
+    nodes = np.repeat(begins[:, None], N, axis=1)
+    rates = np.empty_like(nodes)
+    size = 1.0 + np.abs(begins).max(axis=1)
+    failed = np.zeros(len(begins), dtype=np.bool_)
+    open_: IntArray = np.arange(len(begins))
+    for _ in range(ITERATIONS):
+        rates[open_] = model.reduced_dynamics(nodes[open_], controls[open_, None])
+        new = begins[open_, None] + lengths[open_, None, None] * (TO_NODES @ rates[open_])
+        change = np.abs(new - nodes[open_]).max(axis=(1, 2))
+        wild = ~(change < 1e3 * size[open_])
+        failed[open_[wild]] = True
+        nodes[open_[~wild]] = new[~wild]
+        open_ = open_[(change > 0.1 * SAME * size[open_]) & ~wild]
+        if not open_.size:
+            return nodes, rates, failed
+    failed[open_] = True
+    return nodes, rates, failed
+
+
+def _flow(model: Model, middles: Array, controls: Array, lengths: Array) -> Array:
+    """How the end of each element depends on its begin: (e, n_z, n_z), to first order."""
+    n_z = middles.shape[1]
+    off = middles[:, None] + NUDGE * np.eye(n_z)
+    slopes = model.reduced_dynamics(off, controls[:, None])
+    slopes = (slopes - model.reduced_dynamics(middles, controls)[:, None]) / NUDGE
+    generator = lengths[:, None, None] * np.swapaxes(slopes, 1, 2)
+    flow = np.broadcast_to(np.eye(n_z), generator.shape)
+    for k in range(8, 0, -1):  # the exponential, by Horner
+        flow = np.eye(n_z) + generator @ flow / k
+    return np.asarray(flow)
+
+
+def _carried_on(
+    begins: Array, jumps: Array, flow: Array, guess: Array, followed: Array
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Where elements begin once the jumps are carried forward, and where that starts anew."""
+    new = begins.copy()
+    restarted = np.zeros(len(jumps), dtype=np.bool_)
+    for k, jump in enumerate(jumps):
+        new[k + 1] += jump + flow[k] @ (new[k] - begins[k])
+        if 0.0 < followed[k + 1] < np.abs(new[k + 1] - guess[k + 1]).max():
+            new[k + 1], restarted[k] = guess[k + 1], True
+    return new, restarted

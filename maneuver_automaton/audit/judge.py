@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import TypeAlias
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
-from maneuver_automaton.audit.clearance import CONTACT, Least, least_clearance
+from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
 from maneuver_automaton.audit.drive import Drive, driven
-from maneuver_automaton.audit.frames import Frames
-from maneuver_automaton.audit.outlines import body_outline
-from maneuver_automaton.audit.pairs import spans_within
-from maneuver_automaton.audit.passages import Body
-from maneuver_automaton.audit.sentences import what_is_hit
-from maneuver_automaton.audit.surroundings import Surroundings, origin_of, surroundings_of
-from maneuver_automaton.audit.values import Audit, TerminalError, distance_to, seen_from
-from maneuver_automaton.audit.zones import zones_broken
+from maneuver_automaton.audit.frames import Frames, Spans
+from maneuver_automaton.audit.outlines import body_outline, directions, point_apart, points_of
+from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
+from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
+from maneuver_automaton.audit.surroundings import (
+    Surroundings,
+    origin_of,
+    surroundings_around,
+    surroundings_of,
+)
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision.shapes import AnyObstacle, Shape
+from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
 
 DEFECT_TOLERANCE = 1e-8  # [m, rad] between plan and integration, per metre, radian, second driven
@@ -30,9 +36,60 @@ TERMINAL_TOLERANCE = 1e-9  # [m, rad] of the last pose, beyond the goal's own to
 LIMIT_TOLERANCE = 1e-9  # relative to the limit, at least to 1, by which a value may exceed it
 STATE_TOLERANCE = 1e-9  # [model's units] of the first and the last reduced state
 MOST_TURNED = 2e4  # [rad] of a plan that is driven again, in elements of less than a radian each
+EXCEEDED = 1e-9  # relative, by which a limit may be exceeded
 UNRESOLVED = 1e-3  # [m] by which a distance may not be known sharply enough to decide
 
 Around: TypeAlias = Callable[[tuple[AnyObstacle, ...], tuple[float, float]], Surroundings]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TerminalError:
+    """Distance to the goal, and absolute heading difference modulo a full turn."""
+
+    position_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Audit:
+    """Findings of the audit of one plan."""
+
+    passed: bool
+    max_dynamics_defect: float  # [m, rad, model's units] to where the controls lead
+    min_clearance_m: float | None  # guaranteed: never more than the true one
+    terminal_position_m: float
+    terminal_heading_rad: float
+    reason: str = ""
+
+
+def terminal_error(plan: Plan, goal: Goal) -> TerminalError:
+    """How far a plan's last pose is from a goal, computed from the goal's place.
+
+    Examples
+    --------
+    >>> terminal_error(Plan([1.0, 0.0, 0.0], (), durations=[]), Goal(pose=[1.0, 2.0, 0.0]))
+    TerminalError(position_m=2.0, heading_rad=0.0)
+    """
+    return distance_to(seen_from(plan, goal).end, goal)
+
+
+@kept_by_first
+def seen_from(plan: Plan, goal: Goal) -> Plan:
+    """The plan with the goal's place as origin and from time 0: no digit is lost."""
+    start = np.array(plan.start)
+    places = [0, 1, *range(3, start.size)]
+    start[places] -= goal.pose[places]
+    return plan.begun_at(start, start_time=0.0)
+
+
+def distance_to(end: Array, goal: Goal) -> TerminalError:
+    """How far a pose (dof,), counted from the goal's place, is from the goal."""
+    places = [0, 1, *range(3, end.size)]
+    heading = 0.0 if goal.free_heading else float(abs(wrapped(end[2] - goal.pose[2])))
+    return TerminalError(
+        position_m=float(np.linalg.norm(end[places])),
+        heading_rad=heading,
+    )
 
 
 def audit_plan(
@@ -147,9 +204,11 @@ def closest_to(
     obstacles: tuple[AnyObstacle, ...],
     *,
     footprint: tuple[Shape, ...],
+    parts: Mapping[str, tuple[Shape, ...]] | None = None,
     body_height: tuple[float, float] = (0.0, 0.0),
     within: tuple[float, float] = (-math.inf, math.inf),
     enough: float = 0.0,
+    ask: Callable[[], None] = lambda: None,
 ) -> Least:
     """The least clearance of a plan to obstacles, and when.
 
@@ -161,12 +220,16 @@ def closest_to(
     obstacles : tuple of Obstacle or OccupancyMap
     footprint : tuple of Shape
         Parts of the body; empty for a point.
+    parts : mapping of str to tuple of Shape, optional
+        What the vehicle carries, by name, each in its own frame.
     body_height : (float, float)
         From where to where the body of a plan in space reaches about its altitude [m].
     within : (float, float)
         First and last time that counts, on the plan's clock [s].
     enough : float
         Clearance [m] that decides: the bound is made sharp enough to tell on which side it is.
+    ask : callable
+        Called before each part of the work; it may raise to give it up.
 
     Returns
     -------
@@ -191,10 +254,17 @@ def closest_to(
     if not obstacles or first > last:
         return Least(math.inf, math.inf, clock)
     drive = driven(seen_from(plan, goal), model)
-    body = _body(drive.frames, footprint, plan, goal, body_height)
     around = surroundings_of(obstacles, origin_of(goal.pose))
-    least = least_clearance(body, around, spans_within(body, first, last), enough=enough)
-    return least._replace(time=clock + least.time)
+    found = []
+    for name, shapes in {"": footprint, **(parts or {})}.items():
+        ask()
+        frames = drive.part(name) if name else drive.frames
+        body = _body(frames, shapes, plan, goal, body_height)
+        spans = spans_within(body, first, last)
+        least = least_clearance(body, around, spans, enough=enough, ask=ask)
+        hit = -1 if _keeps(least, enough) else nearest_at(body, around, least.time).obstacle
+        found.append(least._replace(time=clock + least.time, obstacle=hit, part=name))
+    return min(found, key=lambda one: (one.obstacle < 0, one.distance))
 
 
 def _body(
@@ -220,18 +290,20 @@ def _clearance(
     margin: float,
     ask: Callable[[], None],
 ) -> tuple[Least, str]:
-    """The least clearance of a body, and what it hits; empty if it keeps the margin [m].
-
-    Where it cannot be told, to within a millimetre, it does.
-    """
+    """The least clearance of a body, and what it hits; empty if it keeps the margin [m]."""
     enough = max(CONTACT, margin - CONTACT)  # touching never is
     ask()
     spans = spans_within(body, 0.0, math.inf)
     least = least_clearance(body, around, spans, enough=enough, ask=ask)
-    if least.measured > enough and least.distance > enough - UNRESOLVED:
+    if _keeps(least, enough):
         return least, ""
     at = least.time
     return least, what_is_hit(body, around, obstacles, time=at, margin=margin, origin=origin)
+
+
+def _keeps(least: Least, enough: float) -> bool:
+    """Whether a clearance is enough [m], as far as it can be told."""
+    return least.measured > enough and least.distance > enough - UNRESOLVED
 
 
 def _off_the_goal(missed: TerminalError, goal: Goal) -> list[str]:
@@ -287,3 +359,114 @@ def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
         if off > STATE_TOLERANCE:
             reasons.append(f"it {what} in trim {trim.name!r}, {off:.3g} off the reduced state")
     return reasons
+
+
+class Nearest(NamedTuple):
+    """The edge that is nearest to a body at a time."""
+
+    pairs: Pairs
+    row: int
+    obstacle: int
+    distance: float  # [m]
+
+
+def nearest_at(body: Body, around: Surroundings, time: float) -> Nearest:
+    """The edge that is nearest at a time since the start [s]."""
+    pairs = instant(body, around, time)
+    known = bounds_of(body, around, pairs, overlaps=True)
+    row, distance = int(np.argmin(known.measured)), float(known.measured.min())
+    held = overlapped(body, around, pairs.places)
+    if held >= 0:
+        row, distance = int(np.flatnonzero(pairs.edge == held)[0]), 0.0
+    return Nearest(pairs, row, int(around.owners[pairs.edge[row]]), distance)
+
+
+def what_is_hit(
+    body: Body,
+    around: Surroundings,
+    obstacles: tuple[AnyObstacle, ...],
+    *,
+    time: float,
+    margin: float,
+    origin: tuple[float, float],
+) -> str:
+    """A sentence on the obstacle that is nearest at a time since the start [s]."""
+    pairs, row, index, distance = nearest_at(body, around, time)
+    point = _nearest_point(body, around, pairs, row) + complex(*origin)
+    name = name_of(obstacles[index], index, f"({point.real:.10g}, {point.imag:.10g})")
+    if distance <= CONTACT:
+        return f"at {body.clock + time:.6g} s the vehicle touches {name}"
+    near = f"the vehicle is {distance:.6g} m from {name}, closer than {margin:.6g} m"
+    return f"at {body.clock + time:.6g} s {near}"
+
+
+def _nearest_point(body: Body, around: Surroundings, pairs: Pairs, row: int) -> complex:
+    """The point of the edge of a pair that is nearest to the body."""
+    assert pairs.frames is not None
+    edge, frame, places = pairs.edge[row], pairs.frames[row, 0], pairs.places
+    a, b = around.outline.begins[edge], around.outline.ends[edge]
+    there, turned = points_of(frame), directions(frame[2])
+    along = b - a
+    seen = (places.corners[0, :, 0] - there) * turned.conj()
+    shares = ((seen - a) * along.conj()).real / max(float(np.abs(along)) ** 2, 1e-300)
+    shares = np.concatenate([[0.0, 1.0], np.clip(shares, 0.0, 1.0)])
+    world = there + turned * (a + shares * along)
+    from_body = (world - places.place[0, 0]) * places.turn[0, 0].conj()
+    own = body.outline.edges
+    apart = np.sqrt(point_apart(from_body[:, None], own.begins, own.ends)) - own.radius
+    best = world[int(np.argmin(apart.min(axis=1)))]
+    return complex(np.round(best, 3)) + 0.0
+
+
+def zones_broken(
+    drive: Drive, bodies: Sequence[Body], zones: tuple[Zone, ...], origin: tuple[float, float]
+) -> list[str]:
+    """Which zones a vehicle is in, with any part, while it moves as they do not admit."""
+    if not (zones and drive.ends.size):
+        return []
+    reasons = []
+    spans, pieces = drive.between_samples()
+    ends = np.concatenate([spans.begin, spans.end])
+    twists = drive.twists_at(np.tile(spans.element, 2), ends)
+    for zone in zones:
+        admitted = _admitted(zone, twists).reshape(2, -1).all(axis=0) & _named(drive, zone)[pieces]
+        around = surroundings_around((Obstacle(zone.shape),), origin)
+        found = [
+            least_clearance(body, around, run) for run in _runs(spans, ~admitted) for body in bodies
+        ]
+        least = min(found, key=lambda one: one.distance, default=NEVER)
+        if not least.distance > CONTACT:
+            reasons.append(
+                f"at {least.time:.6g} s the vehicle moves as {zone.words} does not admit"
+            )
+    return reasons
+
+
+def _runs(spans: Spans, kept: NDArray[np.bool_]) -> Iterator[Spans]:
+    """Runs of stretches that are kept, each without a break."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], kept, [False]]).astype(np.int8)))
+    for first, last in edges.reshape(-1, 2):
+        yield spans.of(slice(first, last))
+
+
+def _admitted(zone: Zone, twists: Array) -> NDArray[np.bool_]:
+    """Whether a zone's limits admit twists (m, dof)."""
+    speed = np.hypot(twists[:, 0], twists[:, 1])
+    good = np.ones(speed.size, dtype=np.bool_)
+    if zone.max_speed is not None:
+        good &= speed <= zone.max_speed * (1.0 + EXCEEDED) + EXCEEDED
+    if zone.max_lateral_acceleration is not None:
+        most = zone.max_lateral_acceleration * (1.0 + EXCEEDED) + EXCEEDED
+        good &= speed * np.abs(twists[:, 2]) <= most
+    if not zone.reverse:
+        good &= twists[:, 0] >= -EXCEEDED
+    return good
+
+
+def _named(drive: Drive, zone: Zone) -> NDArray[np.bool_]:
+    """Whether a zone admits each primitive by its names."""
+    names = [
+        {one.name} if isinstance(one, Trim) else {one.source, one.target}
+        for one in drive.plan.primitives
+    ]
+    return np.array([zone.trims is None or one <= set(zone.trims) for one in names])

@@ -11,9 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.apart import Points, crossed, directions, point_apart, points_of
 from maneuver_automaton.audit.frames import Spans
-from maneuver_automaton.audit.outlines import Outline
+from maneuver_automaton.audit.outlines import (
+    Outline,
+    Points,
+    crossed,
+    directions,
+    point_apart,
+    points_of,
+)
 from maneuver_automaton.audit.passages import (
     Body,
     Bounds,

@@ -17,7 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.apart import (
+from maneuver_automaton.audit.frames import Frames, Spans
+from maneuver_automaton.audit.outlines import (
+    BodyOutline,
     Points,
     crossed,
     directions,
@@ -25,8 +27,6 @@ from maneuver_automaton.audit.apart import (
     points_of,
     squared,
 )
-from maneuver_automaton.audit.frames import Frames, Spans
-from maneuver_automaton.audit.outlines import BodyOutline
 from maneuver_automaton.audit.surroundings import Surroundings
 
 AT_ONCE = 512  # pairs: with more, arrays no longer stay where they are quickly read

@@ -18,6 +18,7 @@ from maneuver_automaton.bounds.connectivity import (
     connectivity,
 )
 from maneuver_automaton.bounds.pose_scene import PoseScene, lasting_obstacles, pose_scene
+from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Problem
 
@@ -230,12 +231,12 @@ def _deepest(scene: PoseScene, path: Array, most: float) -> tuple[tuple[float, f
         blocked = np.flatnonzero(scene.states(boxes, give=middle) == 0)
         low, high = (middle, high) if len(blocked) else (low, middle)
         deepest = int(blocked[len(blocked) // 2]) if len(blocked) else deepest
-    body = shapely.union_all(_polygons(scene.arrays.body, scene.arrays.body_first))
+    body = united(_polygons(scene.arrays.body, scene.arrays.body_first))
     there = shapely.transform(body, lambda points: np.asarray(SE2(seen[deepest]).act(points)))
     near = [
         one for one in _polygons(scene.arrays.solids, scene.arrays.first) if there.intersects(one)
     ]
-    touched = shapely.get_parts(there.intersection(shapely.union_all(near)))
+    touched = shapely.get_parts(there.intersection(united(near)))
     if not len(touched):
         return (float(path[deepest, 0]), float(path[deepest, 1])), 1
     middles = shapely.get_coordinates(shapely.centroid(touched))

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.convex import convex_pieces
+from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.shapes import AnyObstacle, OccupancyMap, Shape, name_of
-from maneuver_automaton.collision.surroundings import Part, parts_of, runs_of, surroundings_of
+from maneuver_automaton.collision.surroundings import (
+    Part,
+    fastest_point,
+    parts_of,
+    runs_of,
+    surroundings_of,
+)
 from maneuver_automaton.groups import SE2
 
 CONTACT = 1e-9  # [m] what is closer touches: places are rounded
@@ -92,3 +103,192 @@ def _point_of(obstacle: AnyObstacle, body: list[Part], here: Array, time: float)
     which, part = np.unravel_index(int(np.argmin(apart)), apart.shape)
     line = shapely.shortest_line(cores[which], near[part])
     return np.asarray(np.round(shapely.get_coordinates(line)[0], 3) + 0.0)
+
+
+FIRST = 16  # headings that are looked at first, side by side
+MOST = 1024  # headings in all: with more, nothing is proven
+
+
+def touched_all_round(
+    footprint: tuple[Shape, ...],
+    obstacles: tuple[AnyObstacle, ...],
+    place: Array,
+    *,
+    margin: float = 0.0,
+) -> bool:
+    """Whether a footprint whose frame is at a place is too near to obstacles at every heading.
+
+    A point of the body that is deep inside an obstacle stays inside while the body turns a little,
+    which proves it for all headings about one. False also where that takes too many headings.
+    Obstacles that move do not count.
+
+    Parameters
+    ----------
+    footprint : tuple of Shape
+    obstacles : tuple of obstacles
+    place : (2,) array
+        Of the footprint's frame [m].
+    margin : float
+        Nearer than this is too near [m].
+
+    Examples
+    --------
+    >>> from maneuver_automaton.collision import Box, Disc, Obstacle
+    >>> walls = [Obstacle(Box([6.0, 0.2], [0.0, y])) for y in (-1.2, 1.2)]
+    >>> touched_all_round((Box([3.0, 2.0]),), tuple(walls), np.zeros(2))
+    False
+    >>> posts = [Obstacle(Box([0.2, 6.0], [x, 0.0])) for x in (-1.2, 1.2)]
+    >>> touched_all_round((Box([3.0, 2.0]),), (*walls, *posts), np.zeros(2))
+    True
+    """
+    import shapely
+
+    known = body_of(footprint)
+    reach = math.hypot(known.middle_x, known.middle_y) + known.reach + margin
+    solid = _solid_near(obstacles, place, reach)
+    if solid.is_empty:
+        return False
+    body = _joined((part.core, part.radius) for part in parts_of(footprint))
+    half = math.pi / FIRST
+    waiting = [((2 * k + 1) * half, half) for k in range(FIRST)]
+    for _ in range(MOST):
+        heading, half = waiting.pop()
+        turned = shapely.affinity.rotate(body, heading, origin=(0.0, 0.0), use_radians=True)
+        if turned.distance(solid) >= max(margin - CONTACT, CONTACT):
+            return False
+        if not any(
+            lever * half <= depth + margin - 2.0 * CONTACT for lever, depth in _held(turned, solid)
+        ):
+            waiting += [(heading - 0.5 * half, 0.5 * half), (heading + 0.5 * half, 0.5 * half)]
+        if not waiting:
+            return True
+    return False
+
+
+def _held(body: Any, solid: Any) -> Iterator[tuple[float, float]]:
+    """Points of a body: how far from its frame, and how deep in a solid, or less than 0 beside."""
+    import shapely
+
+    both = shapely.intersection(body, solid)
+    if both.is_empty or both.area == 0.0:
+        (x, y), _ = shapely.get_coordinates(shapely.shortest_line(body, solid))
+        yield math.hypot(x, y), -float(shapely.distance(body, solid))
+        return
+    inside = [shapely.get_coordinates(part.representative_point()) for part in _parts(both)]
+    points = np.concatenate([*inside, shapely.get_coordinates(both)])
+    depths = shapely.distance(shapely.points(points), shapely.boundary(solid))
+    yield from zip(np.hypot(*points.T).tolist(), depths.tolist(), strict=True)
+
+
+def _parts(whole: Any) -> list[Any]:
+    import shapely
+
+    return [one for one in shapely.get_parts(whole) if one.area > 0.0]
+
+
+def _solid_near(obstacles: tuple[AnyObstacle, ...], place: Array, reach: float) -> Any:
+    """Static obstacles within reach of a place, as one geometry counted from it."""
+    import shapely
+
+    seen = SE2(np.array([-place[0], -place[1], 0.0]))
+    solids: list[tuple[Any, float]] = []
+    for far in obstacles:
+        obstacle = far.moved(seen)
+        if isinstance(obstacle, OccupancyMap):
+            solids += [(run, 0.0) for run in runs_of(obstacle)]
+        elif obstacle.motion is None:
+            solids += [(part.core, part.radius) for part in parts_of((obstacle.shape,))]
+    here = shapely.Point(0.0, 0.0)
+    return _joined(
+        (core, radius) for core, radius in solids if core.distance(here) <= reach + radius
+    )
+
+
+def _joined(solids: Iterable[tuple[Any, float]]) -> Any:
+    """One geometry of cores, each grown by its radius [m]; discs as polygons inside them."""
+    return united([
+        core.buffer(radius, quad_segs=32) if radius else core for core, radius in solids
+    ])  # fmt: skip
+
+
+STEP, SLACK, LEAST = 0.04, 0.01, 1e-3  # of the body's radius: a sample, what it ends clear by; [m]
+FARTHEST = 12.0  # body radii that a coast out is long at most
+DEEPER, TURNS = 1e-9, 1e-9  # [m] of rounding; [rad/s] that are straight on
+
+
+class Contact:
+    """Bodies that overlap at a start, all seen from there, unturned."""
+
+    def __init__(
+        self,
+        footprint: tuple[Shape, ...],
+        start: Array,
+        touched: Iterable[AnyObstacle],
+        *,
+        margin: float,
+    ) -> None:
+        import shapely
+
+        self.reach = body_of(footprint).reach
+        self.step = max(STEP * self.reach, LEAST)
+        self.clear = margin + max(SLACK * self.reach, LEAST)
+        self.parts, self.start = parts_of(footprint), start
+        self.body = [piece for shape in footprint for piece in convex_pieces(shape)]
+        self.body = self.body or [(np.zeros((1, 2)), 0.0)]
+        away = SE2(np.array([-start[0], -start[1], 0.0]))
+        self.solids = [  # convex pieces (corners, rounding); of a map, its runs of cells
+            [(shapely.get_coordinates(run)[:-1], 0.0) for run in runs_of(one)]
+            if isinstance(one, OccupancyMap)
+            else convex_pieces(one.shape)
+            for one in (obstacle.moved(away) for obstacle in touched)
+        ]
+        self.boxes = [
+            np.array([[*(ring.min(axis=0) - r), *(ring.max(axis=0) + r)] for ring, r in pieces])
+            for pieces in self.solids
+        ]
+        self.within = FARTHEST * max(self.reach, self.clear)
+        self.depth = margin - float(self.off(self.start, within=self.within).min())
+
+    def off(self, pose: Array, *, within: float) -> Array:
+        """Distance to each obstacle, the depth with a minus where it overlaps; clipped [m]."""
+        import shapely
+
+        place = pose[:2] - self.start[:2]
+        near = within + max(float(np.hypot(*one.middle)) + one.reach for one in self.parts)
+        turned = SE2(np.array([0.0, 0.0, pose[2]]))
+        found = []
+        for pieces, boxes in zip(self.solids, self.boxes, strict=True):
+            gaps = np.maximum(np.maximum(boxes[:, :2] - place, place - boxes[:, 2:]), 0.0)
+            area = united(
+                [
+                    shapely.MultiPoint(
+                        (pieces[k][0][:, None] - turned.act(ring)).reshape(-1, 2)
+                    ).convex_hull.buffer(r + pieces[k][1])
+                    for k in np.flatnonzero(np.hypot(*gaps.T) <= near).tolist()
+                    for ring, r in self.body
+                ]
+            )  # where the body overlaps
+            point = shapely.Point(place)
+            aside = within if area.is_empty else area.distance(point)
+            found.append(aside or -float(shapely.distance(area.boundary, point)))
+        return np.clip(found, -within, within)
+
+    def coast(
+        self, twist: Array, begin: Array, until: float = math.inf
+    ) -> Iterator[tuple[float, float, Array, bool]]:
+        """Time, way of the fastest point, pose, and whether that is clear: while no deeper."""
+        speed = float(fastest_point(self.parts, twist[None])[0])
+        turn = abs(float(twist[2]))
+        if not speed > 0.0:
+            return
+        lasting = min(self.within / speed, math.tau / max(turn, TURNS))
+        before = self.off(begin, within=self.within)
+        samples = int(min(lasting, until) * speed / self.step)
+        times = [n * self.step / speed for n in range(1, samples + 1)]
+        for after in [*times, until] if until <= lasting else times:
+            here = (SE2(begin) @ SE2.exp(after * twist)).pose
+            off = self.off(here, within=max(-float(before.min()), self.clear) + self.step)
+            if (off < np.minimum(before, self.clear) - DEEPER).any():
+                return
+            yield after, speed * after, here, bool((off >= self.clear).all())
+            before = off

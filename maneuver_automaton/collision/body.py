@@ -10,7 +10,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import convex_pieces, solids_of
-from maneuver_automaton.collision.shapes import Shape
+from maneuver_automaton.collision.motion import point_speeds
+from maneuver_automaton.collision.outline import united
+from maneuver_automaton.collision.shapes import Disc, Shape
 
 MOST_DISCS = 6  # that cover one piece
 ON_EDGE = 1e-9  # [m] a pose so near to the rim of a body is on it
@@ -64,10 +66,9 @@ def body_of(footprint: tuple[Shape, ...]) -> Body:
 
 def fastest_points(body: Body, twists: Array) -> Array:
     """Greatest speed (m,) [m/s] of any point of the body under each twist (m, 3 or more)."""
-    v_x, v_y, turn = twists[:, 0, None], twists[:, 1, None], twists[:, 2, None]
     rounding = np.repeat(body.radius, np.diff(body.first))
-    speed = np.hypot(v_x - turn * body.edges[:, 1], v_y + turn * body.edges[:, 0])
-    return np.asarray((speed + np.abs(turn) * rounding).max(axis=1))
+    speeds = point_speeds(twists, body.edges[:, :2]) + np.abs(twists[:, 2, None]) * rounding
+    return np.asarray(speeds.max(axis=1))
 
 
 def _cover(ring: Array, rounding: float) -> tuple[Array, float]:
@@ -98,8 +99,6 @@ def _inscribed(footprint: tuple[Shape, ...]) -> float:
     """Radius of the largest disc around the pose inside the body; -inf if the pose is not in it."""
     import shapely
 
-    from maneuver_automaton.collision.shapes import Disc
-
     # A part alone bounds it from below; polygons are united, as the pose may be on a seam.
     discs = [one for one in footprint if isinstance(one, Disc)]
     radii = [one.radius - float(np.hypot(*one.center)) for one in discs]
@@ -111,7 +110,7 @@ def _inscribed(footprint: tuple[Shape, ...]) -> float:
         if len(ring) >= 3
     ]
     if parts:
-        union, pose = shapely.union_all(parts), shapely.Point(0.0, 0.0)
+        union, pose = united(parts), shapely.Point(0.0, 0.0)
         edge = float(union.boundary.distance(pose))
         radii.append(edge if union.contains(pose) or edge <= ON_EDGE else -1.0)
     return max(

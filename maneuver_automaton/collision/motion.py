@@ -274,6 +274,12 @@ REST = np.zeros((1, 3))
 STANDS = Motion([0.0], [[0.0, 0.0, 0.0]])
 
 
+def point_speeds(twists: Array, points: Array) -> Array:
+    """Speeds (m, n) [m/s] of points (n, 2) of a frame under twists (m, 3 or more) of it."""
+    v_x, v_y, turn = twists[:, 0, None], twists[:, 1, None], twists[:, 2, None]
+    return np.hypot(v_x - turn * points[:, 1], v_y + turn * points[:, 0])
+
+
 def planar(by: LieGroup) -> SE2:
     """The part of a group element in the plane."""
     return SE2(by.pose[..., :3])

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.shapes import Box, Polygon
+
+LOST = 1e-9  # share of a part's area, that a union may lose
 
 
 def outlines(shape: Polygon | Box) -> list[Any]:
@@ -45,11 +50,31 @@ def solid_parts(shape: Polygon | Box) -> list[Any]:
         return [shapely.Polygon(shape.corners)]
     whole = shapely.Polygon(shape.corners, shape.holes)
     if not whole.is_valid:
-        whole = shapely.union_all(_faces(shape.corners))
+        whole = united(_faces(shape.corners))
         for hole in shape.holes:
-            whole = shapely.difference(whole, shapely.union_all(_faces(hole)))
+            whole = shapely.difference(whole, united(_faces(hole)))
     parts = shapely.get_parts(whole)
     return [part for part in parts if part.geom_type == "Polygon" and part.area > 0.0]
+
+
+def united(parts: Iterable[Any]) -> Any:
+    """One geometry of all parts: united in turn where uniting them at once loses some of them.
+
+    Examples
+    --------
+    >>> import shapely
+    >>> united([shapely.box(0, 0, 2, 1), shapely.box(1, 0, 3, 1)]).area
+    3.0
+    """
+    import shapely
+
+    every = np.array(list(parts), dtype=object)
+    whole = shapely.union_all(every)
+    areas = shapely.area(every)
+    if abs(areas.sum() - whole.area) <= LOST * areas.sum():
+        return whole  # none lies over another, and all are there
+    lost = shapely.area(shapely.difference(every, whole)) > LOST * areas
+    return functools.reduce(shapely.union, every) if lost.any() else whole
 
 
 def triangles_of(polygon: Any) -> Array:
@@ -84,3 +109,30 @@ def _turns_around(ring: Array, point: Any) -> int:
     after = np.roll(to, -1, axis=0)
     cross = to[:, 0] * after[:, 1] - to[:, 1] * after[:, 0]
     return round(float(np.arctan2(cross, (to * after).sum(axis=1)).sum() / (2.0 * np.pi)))
+
+
+def blocked_rectangles(blocked: NDArray[np.bool_]) -> IntArray:
+    """Rectangles (n, 4) of cells [low column, low row, high column, high row), none twice.
+
+    Runs of blocked cells, joined with the run below where that has the same ends.
+
+    Examples
+    --------
+    >>> blocked_rectangles(np.array([[1, 1, 0], [1, 1, 1]], dtype=bool)).tolist()
+    [[0, 0, 2, 1], [0, 1, 3, 2]]
+    """
+    rows, columns = blocked.shape
+    padded = np.zeros((rows, columns + 2), dtype=np.int8)
+    padded[:, 1:-1] = blocked
+    edge = np.diff(padded, axis=1)
+    row, first = np.nonzero(edge == 1)
+    _, last = np.nonzero(edge == -1)
+    if not row.size:
+        return np.zeros((0, 4), dtype=np.int64)
+    order = np.lexsort((row, last, first))
+    row, first, last = row[order], first[order], last[order]
+    joined = (np.diff(first) == 0) & (np.diff(last) == 0) & (np.diff(row) == 1)
+    begins = np.flatnonzero(np.append(True, ~joined))
+    ends = np.append(begins[1:], row.size) - 1
+    boxes = np.stack([first[begins], row[begins], last[begins], row[ends] + 1], axis=1)
+    return boxes[np.lexsort((boxes[:, 0], boxes[:, 1]))].astype(np.int64)

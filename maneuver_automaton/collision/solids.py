@@ -17,8 +17,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.collision.outline import outlines, triangles_of
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.outline import blocked_rectangles, outlines, triangles_of
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.collision.motion import Motion
+from maneuver_automaton.collision.motion import STANDS, Motion, point_speeds
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
@@ -165,13 +165,19 @@ def surroundings_around(
                 cores.append(part.core)
                 owners.append(index)
             else:
-                moves = obstacle.motion or _AT_REST
+                moves = obstacle.motion or STANDS
                 singles.append(_Single(part, moves, index, obstacle.presence))
     return Surroundings(
         tree=shapely.STRtree(cores),
         owners=np.array(owners, dtype=np.int64),
         singles=tuple(singles),
-        speed=max((_speed(single) for single in singles), default=0.0),
+        speed=max(
+            (
+                one.motion.fastest(float(np.hypot(*one.part.middle)) + one.part.reach)
+                for one in singles
+            ),
+            default=0.0,
+        ),
     )
 
 
@@ -209,16 +215,9 @@ def fastest_point(body: Sequence[Part], twists: Array) -> Array:
     >>> fastest_point(parts_of((Disc(0.5),)), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])).tolist()
     [1.0, 1.0]
     """
-    v_x, v_y, turn_rate = twists.T
-    speeds = [
-        np.hypot(v_x - turn_rate * part.middle[1], v_y + turn_rate * part.middle[0])
-        + np.abs(turn_rate) * part.reach
-        for part in body
-    ]
-    return np.asarray(np.max(speeds, axis=0))
-
-
-_AT_REST = Motion([0.0], [[0.0, 0.0, 0.0]])
+    middles, reaches = np.array([part.middle for part in body]), [part.reach for part in body]
+    speeds = point_speeds(twists, middles) + np.abs(twists[:, 2, None]) * reaches
+    return np.asarray(speeds.max(axis=1))
 
 
 def _nearer(one: Nearest, other: Nearest) -> Nearest:
@@ -238,7 +237,3 @@ def runs_of(one: OccupancyMap) -> list[Any]:
     cells = np.array([[low, row], [high, row], [high, row + 1], [low, row + 1]], dtype=np.float64)
     corners = SE2(one.origin).act(one.resolution * np.moveaxis(cells, -1, 0))
     return list(shapely.polygons(corners))
-
-
-def _speed(single: _Single) -> float:
-    return single.motion.fastest(float(np.hypot(*single.part.middle)) + single.part.reach)

@@ -13,12 +13,13 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.shapes import Shape
 from maneuver_automaton.collision.solids import body_pieces, convex_hull
 from maneuver_automaton.groups import SE2
@@ -37,17 +38,9 @@ class GrownBody:
 
     pieces: tuple[Array, ...]  # (n, 2) each [m]
 
-    if TYPE_CHECKING:
-
-        def __init__(self, pieces: tuple[Array, ...]) -> None: ...
-
     middle: Array = field(init=False)  # (2,) of the box around the pieces [m]
     half: Array = field(init=False)  # (2,) half the sides of that box [m]
     reach: float = field(init=False)  # [m] no point is further from the middle
-
-    if TYPE_CHECKING:
-
-        def __init__(self, pieces: tuple[Array, ...]) -> None: ...
 
     def __post_init__(self) -> None:
         corners = np.concatenate(self.pieces)
@@ -133,46 +126,19 @@ def _halves_of(corners: Array, aside: Array) -> list[Array]:
     return [np.array(one) for one in halves]
 
 
-def slice_hulls(body: GrownBody, twist: Twist, duration: float) -> list[Array]:
-    """Convex polygons (m, 2) that hold every point of the body at every time of a short coast.
+def swept_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
+    """Convex polygons that hold every point of the body along a course.
 
+    It stands at `poses` (n + 1, 3) and moves from each to the next with a constant twist, which
+    makes the step of `steps` (n, 3) in the frame of the first; the hulls are seen as the poses are.
     A corner runs along an arc, which lies in the triangle of its ends and the point where the
     tangents there meet; points between corners are between such triangles.
 
     Examples
     --------
     >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
-    >>> (ahead,) = slice_hulls(square, (1.0, 0.0, 0.0), 3.0)
-    >>> ahead.min(axis=0).tolist(), ahead.max(axis=0).tolist()
-    ([-1.0, -1.0], [4.0, 1.0])
-    """
-    v_x, v_y, turn_rate = twist
-    end = SE2.exp(duration * np.array(twist))
-    half = 0.5 * turn_rate * duration
-    to_tangents = 0.5 * duration * (math.tan(half) / half if half else 1.0)
-    hulls = []
-    for corners in body.pieces:
-        points = [corners, end.act(corners)]
-        if turn_rate:
-            rates = np.stack([v_x - turn_rate * corners[:, 1], v_y + turn_rate * corners[:, 0]], 1)
-            points.append(corners + to_tangents * rates)
-        hulls.append(convex_hull(np.concatenate(points)))
-    return hulls
-
-
-def course_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
-    """Convex polygons that hold every point of the body along a course.
-
-    It stands at `poses` (n + 1, 3) and moves from each to the next with a constant twist, which
-    makes the step of `steps` (n, 3) in the frame of the first: hulls as in `slice_hulls`, in the
-    frame of the poses.
-
-    Examples
-    --------
-    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
-    >>> steps = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     >>> poses = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
-    >>> (ahead,) = course_hulls(square, poses, steps)
+    >>> (ahead,) = swept_hulls(square, poses, np.diff(poses, axis=0))
     >>> ahead.min(axis=0).tolist(), ahead.max(axis=0).tolist()
     ([-1.0, -1.0], [3.0, 1.0])
     """
@@ -265,16 +231,14 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
     against it at the mean time: the common velocity cancels, and the turning remains,
     at most ``reach * |turn| / 2``, the curvature of the arcs, and the tips of the triangles.
     """
-    v_x, v_y, turn_rate = twist
-    turn = abs(turn_rate) * duration
+    turn = abs(twist[2]) * duration
     if turn == 0.0:
         return 0.0
     excess = 0.0
     for corners in body.pieces:
         center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
         reach = float(np.hypot(*(corners - center).T).max())
-        speed = np.hypot(v_x - turn_rate * corners[:, 1], v_y + turn_rate * corners[:, 0]).max()
-        radius = float(speed) / abs(turn_rate)
+        radius = float(point_speeds(np.array([twist]), corners).max()) / abs(twist[2])
         arcs = radius * (0.125 * turn**2 + 2.0 * math.sin(0.25 * turn) ** 2 / math.cos(0.5 * turn))
         excess = max(excess, 0.5 * reach * turn + arcs)
     return excess
@@ -308,22 +272,3 @@ def halves(parts: Windows) -> Windows:
     second = np.stack([np.zeros(parts.begins.size), 0.5 * parts.lengths], axis=1)
     begins = (parts.begins[:, None] + second).reshape(-1)
     return Windows(np.repeat(parts.coast, 2), np.repeat(parts.level + 1, 2), begins)
-
-
-def along(starts: Array, twists: Array, times: Array) -> Array:
-    """Poses (..., n, 3) of coasts from `starts` (n, 3) after `times` (..., n) [s]."""
-    return (SE2(starts) @ SE2.exp(times[..., None] * twists)).pose
-
-
-def fastest(body: GrownBody, twists: Array) -> Array:
-    """Speeds (n,) [m/s] that no point of the body exceeds under twists (n, 3).
-
-    Examples
-    --------
-    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
-    >>> fastest(square, np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 2.0]])).round(3).tolist()
-    [3.0, 2.828]
-    """
-    x, y = np.concatenate(body.pieces).T
-    v_x, v_y, turn_rate = twists.T[:, :, None]
-    return np.asarray(np.hypot(v_x - turn_rate * y, v_y + turn_rate * x).max(axis=1))

@@ -9,13 +9,13 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import FEW, Array, wrapped
-from maneuver_automaton.collision import _kernels_field
-from maneuver_automaton.collision.arrays import Buckets, Field, MovingObstacles, WorldArrays
+from maneuver_automaton.collision import _kernels_field, _kernels_slabs
+from maneuver_automaton.collision.arrays import Buckets, Field, MovingObstacles, Slabs, WorldArrays
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
     DIGITS,
@@ -26,7 +26,7 @@ from maneuver_automaton.collision.convex import (
     solids_of,
 )
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.outline import blocked_rectangles
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
@@ -35,7 +35,6 @@ from maneuver_automaton.collision.shapes import (
     OccupancyMap,
     Shape,
 )
-from maneuver_automaton.collision.slabs import NO_SLABS, slabs_of
 from maneuver_automaton.groups import SE2
 
 MOST_FIELD_CELLS = 60_000
@@ -326,3 +325,33 @@ def _seen_poses(poses: Array, frame: Array) -> Array:
     there = SE2(np.array([-frame[0], -frame[1], 0.0])) @ SE2(poses)
     turned = SE2(np.array([0.0, 0.0, -frame[2]])) @ there
     return np.asarray(np.round(turned.pose, DIGITS))
+
+
+if TYPE_CHECKING:
+    from maneuver_automaton.collision.arrays import MovingObstacles
+
+FEW_MOVING = 4  # obstacles that are followed one by one sooner than looked up
+MOST_SLABS = 128  # of the shortest; a power of two
+OWN_SIZES = 2.0  # that an obstacle may cover in one of them
+
+
+NO_SLABS = Slabs(0.0, 1.0, 0, 0, np.zeros((0, 4)))
+
+
+def slabs_of(moving: MovingObstacles, reach: float) -> Slabs:
+    """The slabs of moving obstacles for a body of some reach [m]; none where there are few.
+
+    The shortest are about as long as an obstacle takes to cover its own size and the body's.
+    """
+    n = moving.speed.size
+    if n < FEW_MOVING:
+        return NO_SLABS
+    events = np.concatenate([moving.time, moving.present.ravel()])
+    events = events[np.isfinite(events)]
+    begin, span = float(events.min()), float(np.ptp(events))
+    covered = float(np.median(moving.speed * span / (moving.reach + reach))) / OWN_SIZES
+    leaves = 1 << math.ceil(math.log2(min(max(covered, 1.0), MOST_SLABS)))
+    width = span / leaves if span > 0.0 else 1.0
+    box = np.empty((2 * leaves * n, 4))
+    _kernels_slabs.write_slabs(moving, begin, width, leaves, box)
+    return Slabs(begin, width, leaves, 0, box)

@@ -8,8 +8,7 @@ from typing import Any
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Disc, OccupancyMap, Shape
-from maneuver_automaton.collision.outline import outlines
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.outline import blocked_rectangles, outlines, united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.obstacles import round_times
@@ -68,7 +67,7 @@ def solid(shape: Shape) -> Any:
 
     if isinstance(shape, Disc):
         return shapely.Polygon(footprint_polygons(shape)[0])
-    return shapely.union_all(outlines(shape))
+    return united(outlines(shape))
 
 
 def solid_map(cells: OccupancyMap) -> Any:
@@ -84,7 +83,7 @@ def solid_map(cells: OccupancyMap) -> Any:
     import shapely
 
     low_x, low_y, high_x, high_y = (cells.resolution * blocked_rectangles(cells.blocked)).T
-    whole = shapely.union_all(shapely.box(low_x, low_y, high_x, high_y))
+    whole = united(shapely.box(low_x, low_y, high_x, high_y))
     return shapely.transform(whole, SE2(cells.origin).act)
 
 

@@ -23,6 +23,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import OccupancyMap, Polygon
+from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import GreyImage, bounds_around, check_cell, read_grey_image
@@ -104,7 +105,7 @@ class Mask(NamedTuple):
         found = []
         for value in np.unique(self.values[self.values > 0]).tolist():
             cells = OccupancyMap(self.values == value, resolution=1.0)
-            for part in shapely.get_parts(shapely.union_all(runs_of(cells))):
+            for part in shapely.get_parts(united(runs_of(cells))):
                 rings = [part.exterior, *part.interiors]  # in cells: whole numbers, exactly
                 corners = [
                     SE2(np.array(self.origin)).act(

@@ -26,7 +26,7 @@ from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle, Zone
-from maneuver_automaton.collision.checker import origin_near
+from maneuver_automaton.collision.fcl_checker import origin_near
 from maneuver_automaton.collision.surroundings import fastest_point, parts_of, surroundings_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit

@@ -11,11 +11,10 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc
 from maneuver_automaton.collision.advancement import clearances
-from maneuver_automaton.collision.all_round import touched_all_round
-from maneuver_automaton.collision.blocked import touched
+from maneuver_automaton.collision.blocked import touched, touched_all_round
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.checker import origin_near
-from maneuver_automaton.collision.heights import layers_of
+from maneuver_automaton.collision.fcl_checker import origin_near
+from maneuver_automaton.collision.layers import layers_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves

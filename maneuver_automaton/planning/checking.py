@@ -1,4 +1,8 @@
-"""Nothing leaves the planner unchecked: FCL on every edge and zone, then the audit."""
+"""Nothing leaves the planner unchecked: FCL on every edge and zone, then the audit.
+
+FCL is the authority on static obstacles and zones. Of moving ones there are two opinions that share
+no code: the proof in the search, and the bounds of the audit, which are asked here.
+"""
 
 from __future__ import annotations
 
@@ -16,21 +20,20 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box, Obstacle, Zone
-from maneuver_automaton.collision.checker import origin_near
-from maneuver_automaton.collision.fcl_checker import Course, FclChecker
-from maneuver_automaton.collision.heights import Layer, layers_of
+from maneuver_automaton.collision.blocked import too_close
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker, origin_near
+from maneuver_automaton.collision.layers import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.planning.result import Workspace, workspace_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.primitive import Trajectory
-from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import broken_condition
+from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.limits import stays_inside
 from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 
 PROVEN = (1e-3, 2e-5)  # [m] a hit counts if it is one for the finer cover of round shapes too
-CONTACT = 1e-9  # [m] what is closer touches: places are rounded
 AUDIT_S, SAMPLE_S = 5e-3, 1.5e-5  # [s] that an audit takes, in all and a sample among obstacles
 
 
@@ -81,8 +84,8 @@ def check_plan(
     if not stays_inside(plan, problem.bounds):
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
     try:
-        reason = what_is_hit(problem, plan, goal, workspace, budget=budget)
-        reason = reason or what_passes_later(problem, plan, goal, workspace)
+        reason = _static_hit(problem, plan, goal, workspace, budget=budget)
+        reason = reason or what_passes_later(problem, plan)
         if reason:
             return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
         _ask(budget, _audit_takes(problem, plan))
@@ -103,16 +106,14 @@ def check_plan(
     except TooLate:
         return Checked(audit=None, broken=Condition.TIME)
     broken = None if audit.passed else Condition.AUDIT
+    clearance = math.inf if audit.min_clearance_m is None else audit.min_clearance_m
+    if problem.moves and broken and clearance <= too_close(problem.margin):
+        broken = Condition.COLLISION
     return Checked(audit=audit, broken=broken, reason=audit.reason)
 
 
-def what_passes_later(
-    problem: Problem, plan: Plan, goal: Goal, workspace: Workspace | None = None
-) -> str:
-    """What hits a vehicle that stays where its plan ends; empty if nothing does, or it need not.
-
-    By FCL, and in the plane by the audit's bounds, of every part.
-    """
+def what_passes_later(problem: Problem, plan: Plan) -> str:
+    """What comes too near to a vehicle that stays where its plan ends; empty if nothing does."""
     arrival = plan.start_time + plan.duration
     lasting = problem.quiet_after - arrival
     if not problem.horizon.stay or not 0.0 < lasting < math.inf:
@@ -121,17 +122,17 @@ def what_passes_later(
     for name, shapes in problem.parts.items():
         part = carried(plan, problem.automaton.model, name)
         bodies.append((f"the {name}: ", part.end, shapes))
-    still = Trim(name="at the goal", body_velocity=np.zeros(plan.start.size), control=np.zeros(2))
+    still = Trim(name="at the goal", body_velocity=np.zeros(3), control=np.zeros(2))
     for what, pose, shapes in bodies:
-        body = replace(problem, footprint=shapes, parts={}, zones=())
-        stands = Plan(pose, (still,), durations=[lasting], start_time=arrival)
-        if said := what_is_hit(body, stands, goal, workspace):
-            return f"{what}{said}"
-        if pose.size > 3:
-            continue
-        least = closest_to(stands, Unicycle(), problem.obstacles, footprint=shapes)
-        if least.distance <= max(problem.margin - CONTACT, CONTACT):
-            return f"{what}at {least.time:.6g} s an obstacle comes too near to where it stays"
+        stands = Plan(pose[:3], (still,), durations=[lasting], start_time=arrival)
+        for layer in layers_of(problem.obstacles, in_space=pose.size > 3):
+            height = pose[3:].sum(keepdims=True)
+            if layer.clearance(height, problem.body_height)[0] > problem.margin:
+                continue
+            moving = tuple(one for one in layer.obstacles if moves(one))
+            least = closest_to(stands, Unicycle(), moving, footprint=shapes)
+            if least.distance <= too_close(problem.margin):
+                return f"{what}at {least.time:.6g} s an obstacle comes too near to where it stays"
     return ""
 
 
@@ -178,13 +179,54 @@ def what_is_hit(
     *,
     budget: Budget = UNLIMITED,
 ) -> str:
-    """Which edge hits what, or what a zone does not admit, by FCL; empty if none does.
+    """Which edge hits what, or what a zone does not admit; empty if none does.
+
+    By FCL, and of moving obstacles by the audit's bounds.
 
     Raises
     ------
     TooLate
         A moment after the time of a `budget` is over.
     """
+    static = _static_hit(problem, plan, goal, workspace, budget=budget)
+    if static or not problem.moves:
+        return static
+    numbers = [k for k, one in enumerate(problem.obstacles) if moves(one)]
+    least = closest_to(
+        plan,
+        problem.automaton.model,
+        tuple(problem.obstacles[k] for k in numbers),
+        footprint=problem.footprint,
+        parts=problem.parts,
+        body_height=problem.body_height,
+        enough=too_close(problem.margin),
+        ask=lambda: _ask(budget),
+    )
+    if least.obstacle < 0:
+        return ""
+    what = f"the {least.part}: " if least.part else ""
+    met = f"{what}obstacle {numbers[least.obstacle]} is hit"
+    if not plan.primitives:
+        return f"{met} at the start"
+    k = int(np.searchsorted(plan.switching_times[1:], least.time))
+    return f"{met} in {_named(plan, min(k, len(plan.primitives) - 1))}"
+
+
+def _named(plan: Plan, number: int) -> str:
+    """What messages call a primitive of a plan."""
+    one = plan.primitives[number]
+    return f"{'trim' if isinstance(one, Trim) else 'maneuver'} {number}, {one.name!r}"
+
+
+def _static_hit(
+    problem: Problem,
+    plan: Plan,
+    goal: Goal,
+    workspace: Workspace | None = None,
+    *,
+    budget: Budget = UNLIMITED,
+) -> str:
+    """Which edge hits a static obstacle, or what a zone does not admit, by FCL."""
     workspace = workspace or workspace_of(problem.obstacles)
     forbidden = what_zone_forbids(problem, plan, _origin(goal)) if problem.zones else ""
     if forbidden or not problem.obstacles:
@@ -216,29 +258,21 @@ def _what_hits(
         height = plan.start[3:].sum(keepdims=True)
         if layer.clearance(height, problem.body_height)[0] > problem.margin:
             return ""
-        here = checker.pose_hit(plan.start[:3], time=plan.start_time)
+        here = checker.pose_hit(plan.start[:3])
         return "" if here is None else f"obstacle {layer.numbers[here]} is hit at the start"
     coasts = _coasts_within_reach(plan, layer, problem)
-    hit = checker.motions_hit(
-        coasts.start,
-        coasts.twist,
-        coasts.duration,
-        start_times=coasts.time,
-        ask=lambda: _ask(budget),
-    )
+    hit = checker.motions_hit(coasts.start, coasts.twist, coasts.duration, ask=lambda: _ask(budget))
     number = len(plan.primitives) if hit is None else int(coasts.number[hit[0]])
     numbers, courses, missing = _courses_within_reach(plan, layer, problem, before=number)
     sooner = checker.courses_hit(courses, ask=lambda: _ask(budget))
     if sooner is not None:
         number, obstacle = numbers[sooner[0]], sooner[1]
-        name = plan.primitives[number].name
-        return f"obstacle {layer.numbers[obstacle]} is hit in maneuver {number}, {name!r}"
+        return f"obstacle {layer.numbers[obstacle]} is hit in {_named(plan, number)}"
     if missing:
         return f"maneuver {missing!r} has no course, so it cannot be checked"
     if hit is None:
         return ""
-    name = plan.primitives[number].name
-    return f"obstacle {layer.numbers[hit[1]]} is hit in trim {number}, {name!r}"
+    return f"obstacle {layer.numbers[hit[1]]} is hit in {_named(plan, number)}"
 
 
 def _courses_within_reach(
@@ -253,10 +287,10 @@ def _courses_within_reach(
         course = primitive.course
         if course is None:
             return numbers, courses, primitive.name
-        start, begin = plan.switching_poses[k], float(plan.switching_times[k])
+        start = plan.switching_poses[k]
         for rows in _rows_within_reach(course, start, layer, problem):
             numbers.append(k)
-            courses.append(Course(start[:3], course.pose[rows, :3], course.time[rows], begin))
+            courses.append(Course(start[:3], course.pose[rows, :3]))
     return numbers, courses, ""
 
 
@@ -267,7 +301,6 @@ class _Coasts(NamedTuple):
     start: Array  # (m, 3)
     twist: Array  # (m, 3)
     duration: Array  # (m,) [s]
-    time: Array  # (m,) [s] when each begins
 
 
 def _coasts_within_reach(plan: Plan, layer: Layer, problem: Problem) -> _Coasts:
@@ -293,8 +326,7 @@ def _coasts_within_reach(plan: Plan, layer: Layer, problem: Problem) -> _Coasts:
         first, last = first[kept], last[kept]
         group = group_of(plan.start.size)
         start = (group(start) @ group.exp(first[:, None] * velocity)).pose
-    time = plan.switching_times[number] + first
-    return _Coasts(number, start[:, :3], velocity[:, :3], last - first, time)
+    return _Coasts(number, start[:, :3], velocity[:, :3], last - first)
 
 
 def _rows_within_reach(
@@ -340,9 +372,7 @@ def what_zone_forbids(problem: Problem, plan: Plan, origin: tuple[float, float])
             checker = FclChecker(shapes, (Obstacle(zone.shape),), origin=origin)
             number = _first_forbidden(zone, checker, plan, moving, model)
             if number is not None:
-                own = plan.primitives[number]
-                kind = "trim" if isinstance(own, Trim) else "maneuver"
-                return f"{zone.words} does not admit {kind} {number}, {own.name!r}"
+                return f"{zone.words} does not admit {_named(plan, number)}"
     return ""
 
 
@@ -374,7 +404,7 @@ def _first_forbidden(
         start = moving.switching_poses[k, :3]
         for rows in _forbidden_rows(zone, own, model):
             numbers.append(k)
-            courses.append(Course(start, seen.course.pose[rows, :3], seen.course.time[rows], 0.0))
+            courses.append(Course(start, seen.course.pose[rows, :3]))
     entered = checker.courses_hit(courses)
     found = [first, unknown, None if entered is None else numbers[entered[0]]]
     return min((one for one in found if one is not None), default=None)

@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined, tail_of
 from maneuver_automaton.collision import AnyObstacle
-from maneuver_automaton.collision.contact import Contact
+from maneuver_automaton.collision.blocked import Contact
 from maneuver_automaton.planning.blocked import where_touched
 from maneuver_automaton.planning.checking import Checked, Condition, check_plan
 from maneuver_automaton.planning.result import PlanResult, PlanStatus

@@ -13,9 +13,9 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, Box, Obstacle, Shape
-from maneuver_automaton.collision.checker import origin_near
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.fcl_checker import origin_near
+from maneuver_automaton.collision.outline import blocked_rectangles
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import LieGroup
 
 SAME_TIME = 1e-9  # [s]
@@ -196,9 +197,9 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
         rings += [_between(lanelet, known[k]) for k in lanelet.beside if k in known]
         rings += [_between(lanelet, known[k], opposite=True) for k in lanelet.against if k in known]
     parts = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
-    area = _flat(shapely.union_all([one for part in parts for one in _polygons(part)]))
+    area = _flat(united([one for part in parts for one in _polygons(part)]))
     grown = shapely.buffer(area, ROUNDED, join_style="mitre")
-    return _flat(shapely.union_all([area, shapely.buffer(grown, -ROUNDED, join_style="mitre")]))
+    return _flat(united([area, shapely.buffer(grown, -ROUNDED, join_style="mitre")]))
 
 
 def _between(one: Lanelet, other: Lanelet, *, opposite: bool = False) -> Array:
@@ -224,9 +225,8 @@ def _polygons(geometry: Any) -> list[Any]:
 
 
 def _flat(area: Any) -> Any:
-    import shapely
 
-    return shapely.union_all(_polygons(area))
+    return united(_polygons(area))
 
 
 def obstacles_in(land: Any) -> tuple[Obstacle, ...]:

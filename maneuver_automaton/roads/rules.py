@@ -16,6 +16,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
+from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area
 from maneuver_automaton.roads.plans import AT_REST
@@ -112,7 +113,7 @@ def _across(stop_line: StopLine, lanelets: dict[int, Lanelet], ours: set[int]) -
         drivable_area([own, *(lanelets[k] for k in against)]), GAPS, join_style="mitre"
     )
     others = drivable_area([lanelets[k] for k in ours - {stop_line.lanelet}])
-    area = shapely.union_all([shapely.difference(area, others), drivable_area([own])])
+    area = united([shapely.difference(area, others), drivable_area([own])])
     ends, center = stop_line.line, own.center
     middle = ends.mean(axis=0)
     along = (ends[1] - ends[0]) / np.hypot(*(ends[1] - ends[0]))

@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Disc, Obstacle, Shape
-from maneuver_automaton.collision.outline import outlines
+from maneuver_automaton.collision.outline import outlines, united
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.roads.arrays import (
     BeamArrays,
@@ -261,7 +261,7 @@ def _grown(shape: Shape, by: float) -> tuple[Obstacle, ...]:
 
     if isinstance(shape, Disc):
         return (Obstacle(Disc(shape.radius + by, shape.center)),)
-    outline = shapely.union_all(outlines(shape))
+    outline = united(outlines(shape))
     # Corners become four chords of a quarter circle each, which is that much too small in between.
     return obstacles_in(shapely.buffer(outline, by / math.cos(math.pi / 16.0), quad_segs=4))
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.collision.advancement import swept_areas
 from maneuver_automaton.collision.arrays import SweptAreas
 from maneuver_automaton.collision.body import Body, body_of
-from maneuver_automaton.collision.swept_areas import swept_areas
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search.part_motion import (
     BodyArrays,

@@ -13,8 +13,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
-from maneuver_automaton.collision.heights import Layer
-from maneuver_automaton.collision.layers import LayerArrays, always, bands_of, layer_arrays
+from maneuver_automaton.collision.layers import Layer, LayerArrays, always, bands_of, layer_arrays
 from maneuver_automaton.collision.world import World, frame_at_first, world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Problem

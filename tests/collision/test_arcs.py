@@ -14,7 +14,6 @@ from maneuver_automaton.audit.judge import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.collision.advancement import clearances, free_times
-from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.groups import SE2
@@ -101,7 +100,7 @@ def test_what_is_proven_free_is_free(parts, twist, duration, heading, backwards)
     here = SE2.exp(sign * times[:, None] * np.array(twist)).pose
     apart = distances(CAR, here, LONG, motion.at(clock + sign * times))
     assert (apart[times < free] > 0.0).all()
-    late = np.flatnonzero(apart <= MARGIN)
+    late = np.flatnonzero(apart <= 0.0)  # the margin is that of poses looked at
     near = np.flatnonzero(apart <= 3.0 * MARGIN + 0.02)
     if not near.size:
         assert free == duration
@@ -110,7 +109,7 @@ def test_what_is_proven_free_is_free(parts, twist, duration, heading, backwards)
 
 
 @given(runs, runs, st.floats(-3.0, 3.0))
-def test_the_audit_and_fcl_see_arcs(parts, own, heading):
+def test_the_audit_sees_arcs(parts, own, heading):
     motion = arcs([2.5, 0.5, heading], parts)
     trims = tuple(
         Trim(name=str(k), body_velocity=[v, 0.0, w], control=[v, w])
@@ -124,15 +123,6 @@ def test_the_audit_and_fcl_see_arcs(parts, own, heading):
     least = closest_to(plan, Unicycle(), obstacles, footprint=CAR)
     assert least.distance <= apart.min() + 1e-9
     assert least.distance >= 0.99 * (apart.min() - step) - 1e-3
-    checker = FclChecker(CAR, obstacles, proven=1e-3)
-    begins = plan.switching_times[:-1]
-    twists = [trim.body_velocity for trim in plan.trims]
-    poses = plan.switching_poses[:-1]
-    hit = checker.motions_hit(poses, twists, plan.durations, start_times=begins)
-    if apart.min() > 1e-3:
-        assert hit is None or apart.min() - step <= 1e-3
-    if np.count_nonzero(apart <= 0.0) > 1:  # more than to touch for an instant
-        assert hit is not None
 
 
 @pytest.mark.parametrize("moves", [False, True])
@@ -143,9 +133,6 @@ def test_what_is_there_for_a_while_is_met_then(moves):
     times = np.array([1.9, 2.0, 3.0, 3.1])
     near = clearances(world, np.zeros((4, 3)), times=times) <= 0.0
     assert near.tolist() == [False, True, True, False]
-    checker = FclChecker(CAR, door, proven=1e-3)
-    seen = [checker.pose_hit([0, 0, 0], time=time) is not None for time in times]
-    assert seen == near.tolist()
     around = surroundings_of(door, (0.0, 0.0))
     found = around.nearest(parts_of(CAR), np.zeros((4, 3)), times).distance
     assert (found <= 0.0).tolist() == near.tolist()
@@ -153,8 +140,6 @@ def test_what_is_there_for_a_while_is_met_then(moves):
         still = Trim(name="rest", body_velocity=[0.0, 0.0, 0.0], control=[0.0, 0.0])
         plan = Plan([0, 0, 0], (still,), durations=[lasting], start_time=clock)
         assert (closest_to(plan, Unicycle(), door, footprint=CAR).distance > 0.0) == free
-        hit = checker.motion_hit([0, 0, 0], [0, 0, 0], lasting, start_time=clock)
-        assert (hit is None) == free
         (held,) = free_times(
             world,
             np.zeros((1, 3)),

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import shapely
 
+from maneuver_automaton.audit.outlines import outline_of
 from maneuver_automaton.collision import Box, Polygon
-from maneuver_automaton.collision.outline import outlines, rings_of
+from maneuver_automaton.collision.outline import outlines, rings_of, united
 
 
 def area(corners, holes=()):
@@ -71,3 +72,16 @@ def test_no_area_is_lost_at_random():
         assert all(part.is_valid for part in parts)
         even_odd = shapely.make_valid(shapely.Polygon(corners))
         assert even_odd.difference(shapely.union_all(parts)).area < 1e-12
+
+
+def test_a_piece_that_a_union_loses_is_found_again(monkeypatch):
+    """Uniting many parts at once was seen to lose one of them."""
+    knot = Polygon([[0, 0], [2, 2], [2, 0], [0, 2]])
+    squares = [shapely.box(k, 0, k + 1.5, 1) for k in range(4)]
+    right = shapely.union_all
+    monkeypatch.setattr(shapely, "union_all", lambda parts: right(list(parts)[1:]))
+    assert united(squares).area == pytest.approx(4.5)
+    assert sum(part.area for part in outlines(knot)) == pytest.approx(2.0)
+    assert united([squares[0], squares[3]]).area == pytest.approx(3.0)
+    rings = outline_of((knot,))
+    assert rings.holds(np.array([0.3 + 1.0j, 1.7 + 1.0j])).tolist() == [[True, True]]

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.outline import blocked_rectangles
 
 
 @given(cells=arrays(np.bool_, st.tuples(st.integers(1, 12), st.integers(1, 12))))

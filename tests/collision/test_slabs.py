@@ -10,7 +10,7 @@ import pytest
 
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.collision.layers import layer_arrays
-from maneuver_automaton.collision.slabs import FEW_MOVING, NO_SLABS
+from maneuver_automaton.collision.world import FEW_MOVING, NO_SLABS
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.reference_collision import free_times_and_clearances, shapely_world, world_around

@@ -11,22 +11,28 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc
+from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.swept import (
     MOST_STEPS,
     MOST_TURN,
     chunks,
     course_boxes,
-    course_hulls,
     cut_where_it_pivots,
-    fastest,
     grown_body,
     halves,
     slice_excess,
-    slice_hulls,
+    swept_hulls,
     windows,
 )
 from maneuver_automaton.groups import SE2
 from tests.collision.scenes import ANGLE, CAR, FOOTPRINTS, TWISTS
+
+
+def slice_hulls(body, twist, duration):
+    """The hulls of one coast, from where its frame begins."""
+    step = duration * np.array([twist])
+    return swept_hulls(body, np.concatenate([np.zeros((1, 3)), SE2.exp(step).pose]), step)
+
 
 speeds = st.floats(-5.0, 5.0) | st.floats(-1e-7, 1e-7)
 twists = st.tuples(speeds, speeds, speeds)
@@ -163,7 +169,8 @@ def test_sizes_by_hand():
     body = grown_body((Box([4.0, 2.0], center=[1.0, 0.0]),), 0.0, 1e-3)
     assert body.middle.tolist() == [1.0, 0.0]
     assert body.reach == pytest.approx(np.sqrt(5.0))
-    speeds = fastest(body, np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]]))
+    coasts = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+    speeds = point_speeds(coasts, np.concatenate(body.pieces)).max(axis=1)
     assert speeds.tolist() == pytest.approx([1.0, 2.0 * np.sqrt(10.0)])
 
 
@@ -206,7 +213,7 @@ def test_rectangles_fall_to_the_body():
     poses = poses_along(steps)
     ends = np.stack([poses[:-1], poses[1:]])
     straight, turned = course_boxes(body, ends, steps, np.array([0, 1]), np.array([1, 2]))
-    (hull,) = course_hulls(body, poses[:2], steps[:1])
+    (hull,) = swept_hulls(body, poses[:2], steps[:1])
     assert shapely.Polygon(straight).symmetric_difference(shapely.Polygon(hull)).area < 1e-9
     assert shapely.Polygon(turned).area < shapely.Polygon(body.pieces[0]).area + 0.6
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision._kernels_swept import FREE, UNKNOWN, not_parted, overlaps
+from maneuver_automaton.collision.advancement import swept_areas
 from maneuver_automaton.collision.body import body_of, fastest_points
-from maneuver_automaton.collision.swept_areas import swept_areas
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.quickly import draws

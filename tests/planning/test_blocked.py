@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision.all_round import touched_all_round
+from maneuver_automaton.collision.blocked import touched_all_round
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.blocked import blocked_ends, why_goal_blocked

@@ -14,8 +14,7 @@ from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Obstacle
-from maneuver_automaton.collision.heights import Layer
-from maneuver_automaton.collision.layers import MOST_LAYERS, always, bands_of
+from maneuver_automaton.collision.layers import MOST_LAYERS, Layer, always, bands_of
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.problem import Bounds, Goal, Problem

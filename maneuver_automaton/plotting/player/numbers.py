@@ -15,8 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Polygon, Shape
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.collision.outline import outlines, rings_of
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.outline import blocked_rectangles, outlines, rings_of
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
