@@ -25,14 +25,8 @@ from maneuver_automaton._arrays import Array, freeze, wrapped
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
-from maneuver_automaton.formats.documents import (
-    Flag,
-    Number,
-    Positive,
-    Whole,
-    check_value,
-    misstated,
-)
+from maneuver_automaton.formats.documents import check_value, misstated
+from maneuver_automaton.formats.entries import Flag, Number, Positive, Whole
 from maneuver_automaton.formats.lattice import (
     ON_GRID,
     SPEED,
