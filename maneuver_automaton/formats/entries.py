@@ -196,7 +196,9 @@ def _meant(value: Any, kind: Any, hint: Any) -> Any:
         return np.array(value, dtype=np.float64)
     if origin is tuple:
         types = inner[:1] if inner[1:] == (...,) else inner
-        rows, hints = (value.items(), [tuple[its]]) if isinstance(value, dict) else (value, its)
+        rows, hints = value, its
+        if isinstance(value, dict):  # of names to numbers: pairs
+            rows, hints = value.items(), (tuple.__class_getitem__(its),)
         return tuple(
             _meant(one, types[k % len(types)], hints[k % len(hints)]) for k, one in enumerate(rows)
         )
