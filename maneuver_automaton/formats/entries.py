@@ -175,6 +175,8 @@ def _stated(value: Any, hint: Any) -> Any:
         return value.value
     if origin is dict:
         return {key: _stated(one, inner[1]) for key, one in dict(value).items()}
+    if isinstance(value, np.ndarray) and np.isfinite(value).all():
+        return value.tolist()
     if origin is list:
         rows = value.tolist() if isinstance(value, np.ndarray) else value
         return [_stated(one, inner[0]) for one in rows]
