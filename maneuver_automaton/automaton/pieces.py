@@ -1,4 +1,4 @@
-"""A plan as the pieces of its word, and back: what files state, and processes send each other.
+"""A plan as the pieces of its word, and back: by name in files, by number between processes.
 
 Whoever has the library makes the same plan of them, to the last bit.
 """
@@ -74,30 +74,74 @@ def plan_of(start: ArrayLike, time: float, words: Sequence[Piece], library: Auto
     if not primitives and library.rest is not None:
         at_rest = (library.trims[library.rest],)
         return Plan(start, at_rest, durations=[0.0], start_time=time)
-    return Plan.of_primitives(
-        start,
-        primitives,
-        durations=durations,
-        trims=_passed(primitives, library),
-        start_time=time,
+    passed = _passed(primitives, library)
+    return Plan.of_primitives(start, primitives, durations=durations, trims=passed, start_time=time)
+
+
+def packed(plan: Plan, library: Automaton) -> Any:
+    """The same between processes: start, word and durations; all of it if not of the library alone.
+
+    Primitives are numbers of the library, so that a plan takes some 200 bytes where `words_of` says
+    it in names.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1.0, 0.0), "left": (0.0, 1.0)})
+    >>> plan = Plan([0, 0, 0], [robot["on"], robot["left"]], durations=[2.0, 1.0])
+    >>> unpacked(packed(plan, robot), robot).end.tolist()
+    [2.0, 0.0, 1.0]
+    """
+    numbers = {id(one): n for n, one in enumerate(_numbered(library))}
+    rows = [numbers.get(id(one), -1) for one in (*plan.trims, *plan.maneuvers)]
+    if -1 in rows:
+        return plan
+    parts = plan.start, np.array(rows, dtype=np.uint32), plan.durations
+    return plan.start_time, len(plan.trims), *(one.tobytes() for one in parts)
+
+
+def unpacked(sent: Any, library: Automaton) -> Plan:
+    """The plan that `packed` was given, in a process that has the same library."""
+    if isinstance(sent, Plan):
+        return sent
+    begin, count, start, rows, durations = sent
+    known = _numbered(library)
+    word = tuple(known[n] for n in np.frombuffer(rows, dtype=np.uint32).tolist())
+    return Plan(
+        np.frombuffer(start),
+        word[:count],
+        durations=np.frombuffer(durations),
+        maneuvers=word[count:],
+        start_time=begin,
     )
+
+
+def _numbered(library: Automaton) -> tuple[Any, ...]:
+    """Trims and maneuvers by number, and None for a switch."""
+    return (*library.trims, *library.maneuvers, None)
 
 
 def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
     """A trim or maneuver by its name; with what it does if the library holds none such."""
+    entry: Piece
     if isinstance(primitive, Trim):
-        entry: Piece = {
+        entry = {
             "kind": "trim",
             "name": primitive.name,
             "control": primitive.control.tolist(),
             "duration_s": duration,
         }
         known = library[primitive.name] if primitive.name in library.trim_names else None
+        # At will, a trim at another pace is made of its control; one that noise moves is not.
+        disturbed = (
+            known is not None
+            and np.array_equal(primitive.control, known.control)
+            and not np.array_equal(primitive.body_velocity, known.body_velocity)
+        )
+        if disturbed if library.is_kinematic else known is None:
+            entry["body_velocity"] = primitive.body_velocity.tolist()
         if not library.is_kinematic and known is None:
-            entry["body_velocity"] = primitive.body_velocity.tolist()
             entry["reduced_state"] = primitive.reduced_state.tolist()
-        elif library.is_kinematic and known is not None and _is_disturbed(primitive, known):
-            entry["body_velocity"] = primitive.body_velocity.tolist()
         return entry
     entry = {
         "kind": "maneuver",
@@ -109,12 +153,6 @@ def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
     if primitive.course is not None and _in_library(entry, library) is None:
         entry["course"] = samples_entry(primitive.course)
     return entry
-
-
-def _is_disturbed(trim: Trim, known: Trim) -> bool:
-    """Whether a trim has another body velocity than that of the library at the same control."""
-    same = np.array_equal(trim.control, known.control)
-    return same and not np.array_equal(trim.body_velocity, known.body_velocity)
 
 
 def _passed(primitives: Sequence[Primitive], library: Automaton) -> dict[str, Trim]:
@@ -176,20 +214,11 @@ def _written(entry: Piece, library: Automaton) -> Maneuver:
     """A maneuver whose course is written in the log."""
     if "course" not in entry:
         raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
-    course = entry["course"]
-    samples = Trajectory(
-        time=np.array(course["time"], dtype=np.float64),
-        pose=np.array(course["pose"], dtype=np.float64),
-        reduced_state=np.array(course["reduced_state"], dtype=np.float64),
-        control=np.array(course["control"], dtype=np.float64),
-        model=library.model,
-    )
-    return Maneuver.along(
-        samples,
-        name=entry["name"],
-        source=entry["source"],
-        target=entry["target"],
-    )
+    columns = ("time", "pose", "reduced_state", "control")
+    samples = {name: np.array(entry["course"][name], dtype=np.float64) for name in columns}
+    course = Trajectory(**samples, model=library.model)
+    ends = {"source": entry["source"], "target": entry["target"]}
+    return Maneuver.along(course, name=entry["name"], **ends)
 
 
 def _trim(entry: Piece, library: Automaton) -> Trim:

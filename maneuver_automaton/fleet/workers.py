@@ -13,11 +13,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
 
-import numpy as np
-
 from maneuver_automaton._brief import brief
 from maneuver_automaton._parallel import Gathered
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.pieces import packed, unpacked
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.fleet.coordination import HeldPlans, Turns
@@ -49,43 +47,20 @@ def encoded(vehicle: FleetMember, found: OwnPlan) -> bytes:
     >>> len(said) < 100, decoded(vehicle, said).plan.start.tolist()
     (True, [1.0, 2.0, 3.0])
     """
-    plan = found.plan
-    numbers = {id(one): n for n, one in enumerate(_primitives(vehicle))}
-    rows = [numbers.get(id(one), -1) for one in (*plan.trims, *plan.maneuvers)]
-    word: Any = plan
-    if -1 not in rows:
-        parts = plan.start, np.array(rows, dtype=np.uint32), plan.durations
-        word = plan.start_time, len(plan.trims), *(one.tobytes() for one in parts)
     stays = found.course.until == math.inf
-    return pickle.dumps((word, found.cost, found.goal_index, stays), pickle.HIGHEST_PROTOCOL)
+    sent = (packed(found.plan, vehicle.problem.automaton), found.cost, found.goal_index, stays)
+    return pickle.dumps(sent, pickle.HIGHEST_PROTOCOL)
 
 
 def decoded(vehicle: FleetMember, message: bytes) -> OwnPlan:
     """The plan of a message; a ValueError if it is none."""
     try:  # of our own making, over a channel of our own
-        plan, cost, goal_index, stays = pickle.loads(message)
+        sent, cost, goal_index, stays = pickle.loads(message)
     except (pickle.UnpicklingError, EOFError) as error:
         raise ValueError(f"plan of {vehicle.name!r}: a message is cut off ({error})") from error
-    if not isinstance(plan, Plan):
-        begin, count, start, rows, durations = plan
-        known = _primitives(vehicle)
-        word = tuple(known[n] for n in np.frombuffer(rows, dtype=np.uint32).tolist())
-        times = np.frombuffer(durations)
-        plan = Plan(
-            np.frombuffer(start),
-            word[:count],
-            durations=times,
-            maneuvers=word[count:],
-            start_time=begin,
-        )
+    plan = unpacked(sent, vehicle.problem.automaton)
     found = vehicle.own(plan, goal_index, cost=cost)
     return replace(found, course=found.course.staying) if stays else found
-
-
-def _primitives(vehicle: FleetMember) -> tuple[Any, ...]:
-    """Trims and maneuvers by number, and None for a switch."""
-    automaton = vehicle.problem.automaton
-    return (*automaton.trims, *automaton.maneuvers, None)
 
 
 # -- a loop's vehicles that look for better plans

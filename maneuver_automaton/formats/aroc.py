@@ -17,7 +17,7 @@ synthesis*, HSCC.
 from __future__ import annotations
 
 import zipfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
-from maneuver_automaton.formats.lattice import levels_of, nearest_level
+from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level
 from maneuver_automaton.formats.xml_source import Element, read_xml
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import AcceleratingCar
@@ -213,7 +213,8 @@ def deviation_of(primitives: tuple[ArocPrimitive, ...], automaton: Automaton) ->
         assert maneuver.course is not None  # it was made with one
         times = one.time - one.time[0]
         nearest = np.abs(maneuver.course.time - times[:, None]).argmin(axis=1)
-        gap = np.abs(maneuver.course.pose[nearest] - _seen(one))
+        seen = (SE2(one.states[0, :3]).inverse() @ SE2(one.states[:, :3])).pose
+        gap = np.abs(maneuver.course.pose[nearest] - seen)
         speed = np.abs(maneuver.course.reduced_state[nearest, 0] - one.states[:, 3])
         off.append((float(np.hypot(gap[:, 0], gap[:, 1]).max()), gap[:, 2].max(), speed.max()))
     table = np.array(off)
@@ -293,12 +294,6 @@ def _controls(one: ArocPrimitive) -> Array:
     return np.repeat(one.inputs, (len(one.states) - 1) // len(one.inputs), axis=0)
 
 
-def _seen(one: ArocPrimitive) -> Array:
-    """Poses (n, 3) seen from the first one."""
-    poses = SE2(one.states[:, :3])
-    return (SE2(one.states[0, :3]).inverse() @ poses).pose
-
-
 def _course_between(
     model: AcceleratingCar, one: ArocPrimitive, begin: float, end: float
 ) -> Trajectory:
@@ -307,10 +302,7 @@ def _course_between(
     control = _controls(one).copy()
     missing = end - begin - float(control[:, 0] @ spans)
     control[:, 0] += missing / float(spans.sum())
-    course = drive(model, [begin], control=control, durations=spans)
-    states = course.reduced_state.copy()
-    states[-1] = end
-    return replace(course, reduced_state=states)
+    return ending_at(drive(model, [begin], control=control, durations=spans), end)
 
 
 def _check_successors(primitives: tuple[ArocPrimitive, ...], begins: Array, ends: Array) -> None:

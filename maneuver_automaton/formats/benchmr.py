@@ -15,12 +15,10 @@ of 1 m; their lower left corner is the origin.
 
 from __future__ import annotations
 
-import csv
 import glob
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
-from xml.parsers import expat
 
 import numpy as np
 
@@ -30,8 +28,8 @@ from maneuver_automaton.collision import Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.cells import bounds_around, read_grey_image
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.text_source import finite, lines_of, read_bytes, read_text
-from maneuver_automaton.formats.xml_source import parse
+from maneuver_automaton.formats.text_source import MAX_BYTES, finite, table_of
+from maneuver_automaton.formats.xml_source import read_xml
 from maneuver_automaton.problem import Bounds
 
 QUERIES = "queries.csv"
@@ -165,24 +163,13 @@ def read_queries(path: Path) -> tuple[Query, ...]:
     InvalidScenario
         If a column is missing, or holds what it may not.
     """
-    rows = list(csv.reader(lines_of(read_text(path, what="a table of queries"))))
-    head = [word.strip() for word in rows[0]] if rows else []
-    for name in COLUMNS:
-        if name not in head:
-            raise InvalidScenario(f"{path}:1: the column {name!r} is missing")
     queries = []
-    for k, row in enumerate(rows[1:]):
-        if not any(word.strip() for word in row):
-            continue
-        at = f"{path}:{k + 2}"
-        if len(row) != len(head):
-            raise InvalidScenario(f"{at}: got {len(row)} columns, need {len(head)}")
-        entry = dict(zip(head, row, strict=True))
-        numbers = np.array([finite(entry[name], at=f"{at}: {name}") for name in COLUMNS[2:]])
-        robot = entry["robot"].strip()
+    for at, row in table_of(path, COLUMNS, what="a table of queries"):
+        numbers = np.array([finite(row[name], at=f"{at}: {name}") for name in COLUMNS[2:]])
+        robot = row["robot"]
         if not robot or robot != Path(robot).name:
             raise InvalidScenario(f"{at}: robot: got {robot!r}, need the name of a drawing")
-        queries.append(Query(entry["world"].strip(), robot, numbers[:3], numbers[3:]))
+        queries.append(Query(row["world"], robot, numbers[:3], numbers[3:]))
     return tuple(queries)
 
 
@@ -239,50 +226,6 @@ class DrawnPath:
     line: int
 
 
-class _Reader:
-    """Collect the paths of a drawing: one use."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.shifts = [np.zeros(2)]  # of the elements around the current one
-        self.drawn: list[DrawnPath] = []
-        self.hidden = 0  # how deep inside definitions, which are not drawn
-        self.parser = expat.ParserCreate()
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.StartDoctypeDeclHandler = self._doctype
-
-    def read(self, content: bytes) -> list[DrawnPath]:
-        parse(self.parser, content, self.path)
-        return self.drawn
-
-    @property
-    def at(self) -> str:
-        return f"{self.path}:{self.parser.CurrentLineNumber}"
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        name = tag.rpartition(":")[2]
-        if name == "defs" or self.hidden:
-            self.hidden += 1
-            return
-        shift = self.shifts[-1]
-        if "transform" in attributes:
-            shift = shift + _translation(attributes["transform"], self.at)
-        self.shifts.append(shift)
-        if name == "path":
-            points = _points(attributes.get("d", ""), self.at)
-            self.drawn.append(DrawnPath(points + shift, self.parser.CurrentLineNumber))
-
-    def _end(self, tag: str) -> None:
-        if self.hidden:
-            self.hidden -= 1
-        else:
-            self.shifts.pop()
-
-    def _doctype(self, *_: object) -> None:
-        raise InvalidScenario(f"{self.at}: has a document type, need a drawing without one")
-
-
 def read_svg_paths(path: Path) -> tuple[DrawnPath, ...]:
     """The paths of a drawing, in their order.
 
@@ -291,7 +234,19 @@ def read_svg_paths(path: Path) -> tuple[DrawnPath, ...]:
     InvalidScenario
         If it is no XML, holds no path, or one that is not made of straight lines.
     """
-    drawn = _Reader(path).read(read_bytes(path, what="a drawing"))
+    drawn: list[DrawnPath] = []
+    left = [(read_xml(path, what="a drawing", most=MAX_BYTES), np.zeros(2))]
+    while left:
+        element, shift = left.pop()
+        at, name = f"{path}:{element.line}", element.tag.rpartition(":")[2]
+        if name == "defs":  # not drawn
+            continue
+        if "transform" in element.attributes:
+            shift = shift + _translation(element.attributes["transform"], at)
+        if name == "path":
+            points = _points(element.attributes.get("d", ""), at)
+            drawn.append(DrawnPath(points + shift, element.line))
+        left += [(child, shift) for child in reversed(element.children)]
     if not drawn:
         raise InvalidScenario(f"{path}: holds no path, need at least one")
     return tuple(drawn)

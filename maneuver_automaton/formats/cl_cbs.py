@@ -20,7 +20,14 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.yaml_source import Document, Where, numbers_at, shown, value_at
+from maneuver_automaton.formats.yaml_source import (
+    Document,
+    Where,
+    numbers_at,
+    positive_at,
+    shown,
+    value_at,
+)
 from maneuver_automaton.problem import Bounds
 
 FORMAT = "CL-CBS"
@@ -60,7 +67,8 @@ def read_cl_cbs(path: Path, document: Document) -> tuple[Statement, ...]:
                 f"got {shown(name)}, the name of agents[{names[name]}] too, need another one",
             )
         names[name] = k
-    width, height = _dimensions(document)
+    numbers_at(document, ("map", "dimensions"), 2, "[width, height]")
+    width, height = (positive_at(document, ("map", "dimensions", k)) for k in range(2))
     world = Statement(
         format=FORMAT,
         name=path.stem,
@@ -77,15 +85,6 @@ def read_cl_cbs(path: Path, document: Document) -> tuple[Statement, ...]:
         for name, k in names.items()
     )
     return (replace(world, fleet=tuple(fleet)),)
-
-
-def _dimensions(document: Document) -> tuple[float, ...]:
-    where: Where = ("map", "dimensions")
-    sizes = numbers_at(document, where, 2, "[width, height]")
-    for k, size in enumerate(sizes):
-        if not size > 0.0:
-            raise document.error((*where, k), f"got {size:g}, need a positive number")
-    return sizes
 
 
 def _obstacles(document: Document) -> tuple[Obstacle, ...]:

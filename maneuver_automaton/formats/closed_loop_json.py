@@ -6,7 +6,6 @@ from them as if it had not been.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -19,27 +18,31 @@ from pydantic import Discriminator, Field, Tag
 from typing_extensions import TypedDict
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
-    SCHEMA,
     DocumentHead,
+    ModelEntry,
+    document_if,
+    document_of,
+    library_entries,
+    misstated,
+    read_document,
+    told_of,
+    write_document,
+)
+from maneuver_automaton.formats.entries import (
     Flag,
     Known,
-    ModelEntry,
     Number,
+    Numbers,
     Whole,
-    document_if,
-    misstated,
-    package_version,
-    read_document,
+    entry,
+    made,
+    of,
     says,
-    told_of,
-    vehicle_entry,
-    write_document,
 )
 from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.groups import group_of
@@ -61,8 +64,6 @@ MOST_STEPS = 1_000_000
 FINEST_M, FINEST_RAD = 0.05, 0.05  # between samples of what was driven
 NOTHING = "nothing"  # the name of a step in which nothing was applied
 
-Numbers = list[Number]
-
 
 class BrokenEntry(TypedDict):
     """A guarantee that did not hold, and why."""
@@ -72,6 +73,9 @@ class BrokenEntry(TypedDict):
     reason: str
 
 
+VehiclePose = Annotated[Numbers, says("where it was, if pose is where it will be")]
+
+
 class PlaceEntry(TypedDict):
     """Where the vehicle was at a time, and what it had paid and had left to pay."""
 
@@ -79,7 +83,6 @@ class PlaceEntry(TypedDict):
     pose: Numbers
     value: Annotated[Known, says("cost of what is left; null if the plan does not arrive")]
     accumulated_cost: Annotated[Number, says("of all steps before")]
-    vehicle_pose: Annotated[Numbers, says("where it was, if pose is where it will be")]
 
 
 class AppliedEntry(PlaceEntry):
@@ -91,12 +94,17 @@ class AppliedEntry(PlaceEntry):
     replanned: Annotated[Flag, says("the word is not the rest of the previous one")]
     solve_s: Number
     number: Annotated[Whole, Field(ge=0, lt=MOST_STEPS, description="0 for the first")]
-    measured_pose: Annotated[Numbers | None, says("that was measured, if it is used a step later")]
-    goal: Annotated[Whole, says("which of several")]
+    vehicle_pose: VehiclePose
+    measured_pose: Annotated[
+        Numbers | None, of("measured"), says("that was measured, if it is used a step later")
+    ]
+    goal: Annotated[Whole, of("goal_index"), says("which of several")]
     applied_s: Annotated[Number, says("until the next step")]
     applied_cost: Number
     origin: Annotated[str, says("of the plan: " + ", ".join(one.value for one in Origin))]
-    value_of_the_rest: Annotated[Known, says("of the last plan; null if it has none here")]
+    value_of_the_rest: Annotated[
+        Known, of("shifted_value"), says("of the last plan; null if it has none here")
+    ]
     off_plan: Annotated[Known, says("m or rad between pose and the last plan's prediction")]
     lower_bound: Number
     gap: NotRequired[Annotated[Known, says("(value - lower_bound) / value")]]
@@ -106,7 +114,7 @@ class AppliedEntry(PlaceEntry):
     deed: NotRequired[Annotated[str, says("decision, in files of earlier versions")]]
     free_until_s: Annotated[Known, says("no contact is predicted until then")]
     clearance_m: Known
-    broken_guarantees: list[BrokenEntry]
+    broken_guarantees: Annotated[list[BrokenEntry], of("violations")]
     disturbed: NotRequired[Annotated[list[BrokenEntry], says("what noise took from it")]]
 
 
@@ -118,6 +126,7 @@ class EndedEntry(PlaceEntry):
     plan: None
     replanned: None
     solve_s: None
+    vehicle_pose: VehiclePose
 
 
 class PiecesEntry(TypedDict):
@@ -169,39 +178,43 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
     >>> document["reached"], document["cost"], [step["value"] for step in document["steps"]]
     (True, 1.0, [1.0, 0.5, 0.0])
     """
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "name": name,
-        "vehicle": vehicle_entry(loop.problem.automaton.model),
-        "automaton_hash": automaton_hash(loop.problem.automaton),
-        "status": loop.status,
-        "reason": loop.reason,
-        "notes": list(left_out(loop.problem)),
-        "reached": loop.reached,
-        "cost": loop.cost,
-        "duration_s": float(loop.times[-1] - loop.times[0]),
-        "step_s": loop.step,
-        "steps_bound": loop.steps_bound,
-        "audit": {
+    automaton, poses = loop.problem.automaton, loop.poses.tolist()
+    return document_of(
+        LoopDocument,
+        loop,
+        name=name,
+        **library_entries(automaton),
+        notes=left_out(loop.problem),
+        duration_s=loop.times[-1] - loop.times[0],
+        audit={
             "pieces": len(loop.audits),
             "failed": sum(not audit.passed for audit in loop.audits),
             "max_dynamics_defect": max(
                 (float(audit.max_dynamics_defect) for audit in loop.audits), default=None
             ),
         },
-        "min_clearance_m": loop.min_clearance_m,
-        "collisions": len(list(loop.collisions)),
-        "broken_guarantees": entries_of(loop.violations),
-        "disturbed": entries_of(loop.disturbed),
-        "steps": [
+        collisions=len(list(loop.collisions)),
+        broken_guarantees=entries_of(loop.violations),
+        disturbed=entries_of(loop.disturbed),
+        steps=[
             *(
-                _step(step, where.tolist(), loop.problem.automaton)
-                for step, where in zip(loop.steps, loop.poses, strict=False)
+                entry(
+                    AppliedEntry,
+                    step,
+                    word=step.plan.word,
+                    plan=words_of(step.plan, automaton),
+                    vehicle_pose=pose,
+                )
+                for step, pose in zip(loop.steps, poses, strict=False)
             ),
-            _last(loop),
+            ended_entry(
+                loop.times[-1],
+                poses[-1],
+                loop.value if math.isfinite(loop.value) else 0.0,
+                loop.cost,
+            ),
         ],
-    }
+    )
 
 
 def save_closed_loop(
@@ -219,52 +232,10 @@ def save_closed_loop(
     write_document(closed_loop_to_dict(loop, name=name), path, interrupted=interrupted)
 
 
-def _step(step: Step, vehicle_pose: list[float], automaton: Automaton) -> AppliedEntry:
-    return {
-        "time_s": step.time,
-        "pose": step.pose.tolist(),
-        "value": step.value,
-        "accumulated_cost": step.accumulated_cost,
-        "control": None if step.control is None else step.control.tolist(),
-        "word": list(step.plan.word),
-        "plan": words_of(step.plan, automaton),
-        "replanned": step.replanned,
-        "solve_s": step.solve_s,
-        "number": step.number,
-        "vehicle_pose": vehicle_pose,
-        "measured_pose": None if step.measured is None else step.measured.tolist(),
-        "goal": step.goal_index,
-        "applied_s": step.applied,
-        "applied_cost": step.applied_cost,
-        "origin": step.origin.value,
-        "value_of_the_rest": step.shifted_value,
-        "off_plan": step.off_plan,
-        "lower_bound": step.lower_bound,
-        "gap": step.gap,
-        "exhaustive": step.exhaustive,
-        "arrived": step.arrived,
-        "decision": step.decision.value,
-        "free_until_s": step.free_until,
-        "clearance_m": step.clearance_m,
-        "broken_guarantees": [_broken(one) for one in step.violations],
-        "disturbed": [_broken(one) for one in step.disturbed],
-    }
-
-
-def _last(loop: ClosedLoop) -> EndedEntry:
-    pose = loop.poses[-1].tolist()
-    return {
-        "time_s": float(loop.times[-1]),
-        "pose": pose,
-        "value": loop.value if math.isfinite(loop.value) else 0.0,
-        "accumulated_cost": loop.cost,
-        "control": None,
-        "word": None,
-        "plan": None,
-        "replanned": None,
-        "solve_s": None,
-        "vehicle_pose": pose,
-    }
+def ended_entry(time: float, pose: list[float], value: float, cost: float) -> EndedEntry:
+    """Where a vehicle ended, what it had left to pay, and what it had paid."""
+    place = {"time_s": time, "pose": pose, "value": value, "accumulated_cost": cost}
+    return entry(EndedEntry, None, **place, vehicle_pose=pose)
 
 
 # -- reading
@@ -322,32 +293,10 @@ def _check_rows(rows: list[dict[str, Any]], automaton: Automaton, path: Path | s
 
 
 def _step_of(row: Mapping[str, Any], automaton: Automaton) -> Step:
-    pose, measured = np.array(row["pose"], dtype=np.float64), row["measured_pose"]
-    return Step(
-        time=float(row["time_s"]),
-        pose=pose,
-        plan=plan_of(pose, float(row["time_s"]), row["plan"], automaton),
-        goal_index=row["goal"],
-        value=float(row["value"]),
-        applied=float(row["applied_s"]),
-        applied_cost=float(row["applied_cost"]),
-        accumulated_cost=float(row["accumulated_cost"]),
-        origin=Origin(row["origin"]),
-        replanned=row["replanned"],
-        shifted_value=row["value_of_the_rest"],
-        off_plan=row["off_plan"],
-        lower_bound=float(row["lower_bound"]),
-        exhaustive=row["exhaustive"],
-        solve_s=float(row["solve_s"]),
-        number=row["number"],
-        arrived=row["arrived"],
-        decision=Decision(row.get("decision") or row["deed"]),
-        free_until=row["free_until_s"],
-        clearance_m=row["clearance_m"],
-        measured=None if measured is None else np.array(measured, dtype=np.float64),
-        violations=tuple(map(_violation_of, row["broken_guarantees"])),
-        disturbed=tuple(map(_violation_of, row.get("disturbed", ()))),
-    )
+    plan = plan_of(row["pose"], float(row["time_s"]), row["plan"], automaton)
+    decision = Decision(row.get("decision") or row["deed"])
+    value = float(row["value"])  # of what is driven it is known
+    return made(Step, row, AppliedEntry, plan=plan, decision=decision, value=value)
 
 
 def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
@@ -363,22 +312,19 @@ def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
     steps, poses = load_steps(path, problem.automaton)
     document = read_document(path, "loop")
     with told_of(path):
-        return ClosedLoop(
+        return made(
+            ClosedLoop,
+            document,
+            LoopDocument,
             problem=problem,
-            step=float(document["step_s"]),
             steps=steps,
             poses=poses,
             times=np.array([row["time_s"] for row in document["steps"]], dtype=np.float64),
-            reached=document["reached"],
-            status=document["status"],
-            reason=document["reason"],
-            cost=float(document["cost"]),
             value=float(document["steps"][-1]["value"]),
             driven=tuple(
                 replace(step.piece, start=pose) for step, pose in zip(steps, poses, strict=False)
             ),
             inside=tuple(any(within(pose, goal) for goal in problem.goals) for pose in poses),
-            steps_bound=document["steps_bound"],
         )
 
 
@@ -393,20 +339,9 @@ def read_closed_loop_document(path: Path | str) -> dict[str, Any] | None:
     return document_if(path, "loop", "drive", "fleet-loop")
 
 
-# -- guarantees
-
-
 def entries_of(found: Iterable[tuple[int, Violation]]) -> list[BrokenEntry]:
     """Guarantees with the numbers of their steps, as the files have them."""
-    return [{"step": number, **_broken(one)} for number, one in found]
-
-
-def _broken(one: Violation) -> BrokenEntry:
-    return {"guarantee": one.guarantee.value, "reason": one.reason}
-
-
-def _violation_of(entry: Mapping[str, Any]) -> Violation:
-    return Violation(guarantee=Guarantee(entry["guarantee"]), reason=entry["reason"])
+    return [entry(BrokenEntry, one, step=number) for number, one in found]
 
 
 # -- what was driven, as a plan
@@ -493,7 +428,9 @@ class OutcomeEntry(TypedDict):
     seed: Whole
     start: Numbers
     reached: Flag
-    arrived_after_steps: Annotated[Whole | None, says("until the goal was first reached")]
+    arrived_after_steps: Annotated[
+        Whole | None, of("arrived_after"), says("until the goal was first reached")
+    ]
     stayed: Annotated[Flag, says("at the goal from then on")]
     share_inside: Annotated[Number, says("of the steps after the first arrival")]
     steps: Whole
@@ -511,7 +448,7 @@ class StatisticsDocument(DocumentHead):
     loops_run: Whole
     reached: Annotated[Number, says("share that reached the goal")]
     stayed: Annotated[Number, says("share that reached it and stayed")]
-    steps_with_a_broken_guarantee: Whole
+    steps_with_a_broken_guarantee: Annotated[Whole, of("broken")]
     loops: Annotated[list[OutcomeEntry], Field(min_length=1)]
 
 
@@ -523,37 +460,21 @@ def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bo
     OSError
         If the file cannot be written.
     """
-    head: dict[str, Any] = {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "loops_run": len(statistics.outcomes),
-        "reached": statistics.reached,
-        "stayed": statistics.stayed,
-        "steps_with_a_broken_guarantee": statistics.broken,
-        **({"interrupted": True} if interrupted else {}),
-    }
-    rows: list[OutcomeEntry] = [
-        {
-            "seed": one.seed,
-            "start": one.start.tolist(),
-            "reached": one.reached,
-            "arrived_after_steps": one.arrived_after,
-            "stayed": one.stayed,
-            "share_inside": one.share_inside,
-            "steps": one.steps,
-            "cost": one.cost,
-            "first_value": one.first_value,
-            "reason": one.reason,
-            "broken_guarantees": entries_of(one.violations),
-            "disturbed": entries_of(one.disturbed),
-            "solve_s": one.solve_s.tolist(),
-        }
-        for one in statistics.outcomes
-    ]
-    lines = [f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
-    loops = ",\n".join(f"    {json.dumps(row, allow_nan=False)}" for row in rows)
-    lines.append(f'  "loops": [\n{loops}\n  ]')
-    write_text_atomically(Path(path), "{\n" + ",\n".join(lines) + "\n}\n")
+    document = document_of(
+        StatisticsDocument,
+        statistics,
+        loops_run=len(statistics.outcomes),
+        loops=[
+            entry(
+                OutcomeEntry,
+                one,
+                broken_guarantees=entries_of(one.violations),
+                disturbed=entries_of(one.disturbed),
+            )
+            for one in statistics.outcomes
+        ],
+    )
+    write_document(document, path, interrupted=interrupted)
 
 
 def load_statistics(path: Path | str) -> Statistics:
@@ -571,17 +492,15 @@ def load_statistics(path: Path | str) -> Statistics:
 
 def _outcome_of(row: Mapping[str, Any]) -> Outcome:
     broken, disturbed = (
-        tuple((one["step"], _violation_of(one)) for one in row.get(key, ()))
+        tuple((one["step"], made(Violation, one, BrokenEntry)) for one in row.get(key, ()))
         for key in ("broken_guarantees", "disturbed")
     )
     failed = {step for step, one in broken if one.guarantee is Guarantee.NO_COLLISION}
-    same = ("seed", "reached", "stayed", "share_inside", "steps", "cost", "first_value", "reason")
-    return Outcome(
-        **{key: row[key] for key in same},
-        start=np.array(row["start"], dtype=np.float64),
-        arrived_after=row["arrived_after_steps"],
+    return made(
+        Outcome,
+        row,
+        OutcomeEntry,
         violations=broken,
         disturbed=disturbed,
         audits_failed=len(failed),
-        solve_s=np.array(row["solve_s"], dtype=np.float64),
     )

@@ -17,17 +17,18 @@ roads*, IV, and CommonRoad-search.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray, freeze
+from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton._limits import FASTEST, STEEPEST_STEERING
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
-from maneuver_automaton.formats.lattice import levels_of, nearest_level
+from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level
 from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -154,7 +155,7 @@ def commonroad_primitives_text(file: RoadPrimitives) -> str:
     older = file.vehicle is None
     lines = ['<?xml version="1.0" ?>']
     if not older:
-        lines += [f"<{ROOT}>", f"   <VehicleType>{_escaped(file.vehicle or '')}</VehicleType>"]
+        lines += [f"<{ROOT}>", f"   <VehicleType>{escape(file.vehicle or '')}</VehicleType>"]
     pad = "" if older else "   "
     lines.append(f"{pad}<{OLDER_ROOT}>")
     for one in file.primitives:
@@ -239,7 +240,8 @@ def deviation_of(file: RoadPrimitives, automaton: Automaton) -> Deviation:
     for one, step, maneuver in zip(file.primitives, file.steps(), automaton.maneuvers, strict=True):
         assert maneuver.course is not None  # it was made with one
         times = step * np.arange(len(one.states), dtype=np.float64)
-        gaps = np.abs(_poses_at(maneuver.course, times) - one.states[:, :3])
+        nearest = np.abs(maneuver.course.time - times[:, None]).argmin(axis=1)
+        gaps = np.abs(maneuver.course.pose[nearest] - one.states[:, :3])
         off.append((float(np.hypot(gaps[:, 0], gaps[:, 1]).max()), float(gaps[:, 2].max())))
         ends = (automaton[maneuver.source].reduced_state, automaton[maneuver.target].reduced_state)
         moved = np.maximum(moved, np.abs(np.array(ends) - one.states[[0, -1], 3:]).max(axis=0))
@@ -334,20 +336,10 @@ def _trajectory_lines(one: RoadPrimitive, *, older: bool) -> list[str]:
 
 def _state_lines(tag: str, state: Array, step: int, *, pad: str) -> list[str]:
     x, y, orientation, velocity, steering = state.tolist()
-    entries = {
-        "x": x,
-        "y": y,
-        "steering_angle": steering,
-        "velocity": velocity,
-        "orientation": orientation,
-        "time_step": step,
-    }
+    entries = {"x": x, "y": y, "steering_angle": steering, "velocity": velocity}
+    entries |= {"orientation": orientation, "time_step": step}
     inner = [f"{pad}   <{key}>{value!r}</{key}>" for key, value in entries.items()]
     return [f"{pad}<{tag}>", *inner, f"{pad}</{tag}>"]
-
-
-def _escaped(text: str) -> str:
-    return text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
 
 
 def _lengths_and_turns(file: RoadPrimitives) -> tuple[Array, Array]:
@@ -386,21 +378,7 @@ def _courses_between(
         durations[k, : len(states) - 1] = step
     begins = np.array([pair[0] for pair in ends])
     courses = drive_all(model, begins, control=control, durations=durations)
-    return [_arrived(course, pair[1]) for course, pair in zip(courses, ends, strict=True)]
-
-
-def _arrived(course: Trajectory, end: Array) -> Trajectory:
-    """A course whose last state is that of its trim, to the last bit."""
-    states = course.reduced_state.copy()
-    states[-1] = end
-    return replace(course, reduced_state=states)
-
-
-def _poses_at(course: Trajectory, times: Array) -> Array:
-    """Poses at times that are samples of the course."""
-    nearest: IntArray = np.abs(course.time - times[:, None]).argmin(axis=1)
-    poses: Array = course.pose[nearest]
-    return poses
+    return [ending_at(course, pair[1]) for course, pair in zip(courses, ends, strict=True)]
 
 
 def _stated(car: SecondOrderCar, maneuver: Maneuver) -> RoadPrimitive:
@@ -417,17 +395,12 @@ def _stated(car: SecondOrderCar, maneuver: Maneuver) -> RoadPrimitive:
             f"has whole tenths of a second"
         )
     times = STEP_UNIT * np.arange(tenths + 1, dtype=np.float64)
-    again = _driven_through(car, course, times)
+    marks = np.unique(np.concatenate([course.time, times[:-1]]).round(12))
+    spans = np.diff(marks)
+    which = np.searchsorted(course.time, marks[:-1] + 0.5 * spans, side="right") - 1
+    control = course.control[np.clip(which, 0, None)]
+    again = drive(car, course.reduced_state[0], control=control, durations=spans)
     keep = np.abs(again.time - times[:, None]).argmin(axis=1)
     states = np.concatenate([again.pose[keep], again.reduced_state[keep]], axis=1)
     states[-1] = np.concatenate([maneuver.displacement, course.reduced_state[-1]])
     return RoadPrimitive(duration=tenths, states=states + 0.0)
-
-
-def _driven_through(car: SecondOrderCar, course: Trajectory, times: Array) -> Trajectory:
-    """The motion along a course with samples at `times` too."""
-    marks = np.unique(np.concatenate([course.time, times[:-1]]).round(12))
-    spans = np.diff(marks)
-    middle = marks[:-1] + 0.5 * spans
-    which = np.clip(np.searchsorted(course.time, middle, side="right") - 1, 0, None)
-    return drive(car, course.reduced_state[0], control=course.control[which], durations=spans)

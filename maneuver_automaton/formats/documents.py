@@ -11,17 +11,19 @@ import contextlib
 import functools
 import importlib
 import json
-import math
 from collections.abc import Iterator, Mapping
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any, Final, NotRequired, cast
+from typing import Annotated, Any, Final, NotRequired, TypeVar, cast
 
-from pydantic import AllowInfNan, Field, Strict, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 from typing_extensions import TypedDict
 
 from maneuver_automaton._files import open_input, relative, write_text_atomically
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.entries import Flag, Known, Number, Whole, entry, says
 from maneuver_automaton.formats.yaml_source import shown, spelled
 from maneuver_automaton.models import Model
 
@@ -38,20 +40,13 @@ KINDS = {  # of documents: where it is stated, its file, and keys without which 
     "road-fleet": ("road_json.RoadFleetDocument", ("status", "vehicles")),
     "road-fleet-drive": ("road_json.RoadFleetDriveDocument", ("status", "vehicles")),
 }
-A_LINE_EACH = ("primitives", "stop", "alternatives", "steps", "broken_guarantees", "closest")
+A_LINE_EACH = (
+    *("primitives", "stop", "alternatives", "steps", "broken_guarantees", "closest", "loops"),
+)
+# Keys that stand first in what is written, in this order.
+HEAD = ("schema", "version", "kind", "name", "vehicle", "automaton_hash", "status", "reason")
 
-
-def says(text: str) -> Any:
-    """What a key means, for the JSON Schema."""
-    return Field(description=text)
-
-
-Number = Annotated[float, Strict(), AllowInfNan(False)]
-Known = Number | None  # null where there is none, or no limit
-Whole = Annotated[int, Strict()]
-Flag = Annotated[bool, Strict()]
-Positive = Annotated[float, Strict(), AllowInfNan(False), Field(gt=0.0)]
-Pairs = list[tuple[Number, Number]]
+T = TypeVar("T")
 
 
 class ModelEntry(TypedDict):
@@ -93,16 +88,6 @@ class DocumentHead(TypedDict):
     notes: NotRequired[Annotated[list[str], says("what was left out, and why")]]
     source: NotRequired[SourceEntry]
     interrupted: NotRequired[Annotated[Flag, says("only where a signal came before the end")]]
-
-
-def number(value: float | None) -> float | None:
-    """A number for strict JSON; None where there is none, or no limit."""
-    return None if value is None or math.isinf(value) else float(value)
-
-
-def or_inf(value: float | None) -> float:
-    """A number of a file, where null is no limit."""
-    return math.inf if value is None else float(value)
 
 
 @functools.cache
@@ -339,6 +324,22 @@ def _needed(schema: Mapping[str, Any], where: tuple[str | int, ...]) -> str:
 
 
 # -- writing
+
+
+def document_of(form: type[T], value: Any, /, **given: Any) -> T:
+    """What a file says of a value, by the keys of its kind; see `entry`."""
+    head = {"schema": SCHEMA, "version": package_version()}
+    said = entry(form, value, **head, **given)
+    assert isinstance(said, dict)
+    return cast("T", {key: said[key] for key in (*HEAD, "notes", *said) if key in said})
+
+
+def library_entries(automaton: Automaton) -> dict[str, Any]:
+    """The keys that name a vehicle and its library."""
+    return {
+        "vehicle": vehicle_entry(automaton.model),
+        "automaton_hash": automaton_hash(automaton),
+    }
 
 
 def write_document(

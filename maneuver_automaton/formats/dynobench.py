@@ -33,6 +33,7 @@ from maneuver_automaton.formats.yaml_source import (
     number_at,
     numbers_at,
     parse,
+    positive_at,
     shown,
     sizes_at,
     value_at,
@@ -107,11 +108,6 @@ class StatedModel:
     name: str
     dynamics: str
     document: Document
-
-    @property
-    def ends(self) -> str:
-        """What a start or goal holds, in words."""
-        return STATES[self.dynamics]
 
     def vehicle(self, states: Sequence[Array]) -> StatedVehicle:
         """The vehicle, with trims at reduced `states`, those of start and goal; or InvalidScenario.
@@ -192,11 +188,11 @@ def _second_order(name: str, model: Document, states: Sequence[Array]) -> Stated
             ("min_angular_vel",), f"got {least:g}, need {-most:g}, the opposite of max_angular_vel"
         )
     body = SecondOrderUnicycle(
-        max_speed=_positive(model, "max_vel"),
+        max_speed=positive_at(model, ("max_vel",)),
         min_speed=low,
         max_turn_rate=most,
-        max_acceleration=_positive(model, "max_acc_abs"),
-        max_angular_acceleration=_positive(model, "max_angular_acc"),
+        max_acceleration=positive_at(model, ("max_acc_abs",)),
+        max_angular_acceleration=positive_at(model, ("max_angular_acc",)),
     )
     stated = np.array(states).reshape(-1, 2)
     speeds = _with(np.append(np.linspace(low, high, LEVELS), 0.0), stated[:, 0])
@@ -214,15 +210,16 @@ def _with_trailer(name: str, model: Document, states: Sequence[Array]) -> Stated
     trailers = value_at(model, ("num_trailers",), int, "1")
     if trailers != 1:
         raise model.error(("num_trailers",), f"got {trailers}, need 1")
-    (length,) = numbers_at(model, ("hitch_lengths",), 1, "[length of the hitch]")
-    if not length > 0.0:
-        raise model.error(("hitch_lengths", 0), f"got {length:g}, need a positive number")
+    numbers_at(model, ("hitch_lengths",), 1, "[length of the hitch]")
+    steering = positive_at(model, ("max_steering_abs",))
+    if not steering < math.pi / 2.0:
+        raise model.error(("max_steering_abs",), f"got {steering:g}, need less than pi / 2")
     low, _ = _limits(model, "min_vel", "max_vel")
     car = CarWithTrailer(
-        wheelbase=_positive(model, "l"),
-        hitch_length=length,
-        max_steering=_steering(model),
-        max_speed=_positive(model, "max_vel"),
+        wheelbase=positive_at(model, ("l",)),
+        hitch_length=positive_at(model, ("hitch_lengths", 0)),
+        max_steering=steering,
+        max_speed=positive_at(model, ("max_vel",)),
         min_speed=low,
         max_hitch=MAX_HITCH,
     )
@@ -269,24 +266,10 @@ def _limits(model: Document, least: str, most: str) -> tuple[float, float]:
     return low, high
 
 
-def _positive(model: Document, key: str) -> float:
-    value = number_at(model, (key,))
-    if not value > 0.0:
-        raise model.error((key,), f"got {value:g}, need a positive number")
-    return value
-
-
-def _steering(model: Document) -> float:
-    value = _positive(model, "max_steering_abs")
-    if not value < math.pi / 2.0:
-        raise model.error(("max_steering_abs",), f"got {value:g}, need less than pi / 2")
-    return value
-
-
 def _body(model: Document, size: str, shape: str) -> Box | Disc:
     kind = value_at(model, (shape,), str, "box or sphere")
     if kind == "sphere":
-        return Disc(_positive(model, "radius"))
+        return Disc(positive_at(model, ("radius",)))
     if kind != "box":
         raise model.error((shape,), f"got {shown(kind)}, need box or sphere")
     return Box(sizes_at(model, (size,)))
@@ -324,7 +307,10 @@ def read_dynobench(path: Path, document: Document) -> tuple[Statement, ...]:
                 ("environment", "max", k), f"got {high[k]:g}, need more than min {name}, {low[k]:g}"
             )
     boxes = value_at(document, ("environment", "obstacles"), list, "a list of boxes")
-    ends = [_ends(document, k, model) for k, model in enumerate(models)]
+    ends = [
+        {what: _end(document, k, what, model) for what in ("start", "goal")}
+        for k, model in enumerate(models)
+    ]
     vehicles = _vehicles(models, ends)
     for k, vehicle in enumerate(vehicles):
         for what, (_, state) in ends[k].items():
@@ -350,16 +336,9 @@ Ends: TypeAlias = dict[str, tuple[Array, Array]]
 
 def _with_robot(world: Statement, vehicle: StatedVehicle, ends: Ends) -> Statement:
     """The problem of one robot alone."""
-    (start, start_state), (goal, goal_state) = ends.values()
-    return replace(
-        world,
-        start=start,
-        goal=goal,
-        start_state=start_state,
-        goal_state=goal_state,
-        footprint=vehicle.footprint,
-        vehicle=vehicle,
-    )
+    stated = {what: pose for what, (pose, _) in ends.items()}
+    states = {f"{what}_state": state for what, (_, state) in ends.items()}
+    return replace(world, footprint=vehicle.footprint, vehicle=vehicle, **stated, **states)
 
 
 def _vehicles(models: Sequence[StatedModel], ends: Sequence[Ends]) -> list[StatedVehicle]:
@@ -375,13 +354,9 @@ def _vehicles(models: Sequence[StatedModel], ends: Sequence[Ends]) -> list[State
     return vehicles
 
 
-def _ends(document: Document, robot: int, model: StatedModel) -> Ends:
-    return {what: _end(document, robot, what, model) for what in ("start", "goal")}
-
-
 def _end(document: Document, robot: int, what: str, model: StatedModel) -> tuple[Array, Array]:
     """Pose and reduced state of the start or the goal."""
-    need, where = model.ends, ("robots", robot, what)
+    need, where = STATES[model.dynamics], ("robots", robot, what)
     numbers = numbers_at(document, where, need.count(",") + 1, need)
     if abs(numbers[2]) > MOST_HEADING:
         raise document.error(

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NotRequired
 
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.fleet import Closest, FleetProblem, FleetResult, FleetStatus
+from maneuver_automaton.fleet import FleetProblem, FleetResult
 from maneuver_automaton.formats.documents import (
     FLEET,
-    SCHEMA,
     ClearanceEntry,
     ClosestEntry,
     DocumentHead,
+    document_of,
+    read_document,
+    source_entry,
+    told_of,
+    write_document,
+)
+from maneuver_automaton.formats.entries import (
     Known,
     Number,
     Pairs,
     Whole,
+    made,
     number,
     or_inf,
-    package_version,
-    read_document,
     says,
-    source_entry,
-    told_of,
-    write_document,
 )
 from maneuver_automaton.formats.plan_json import PlanDocument, plan_to_dict, result_of
 
@@ -71,41 +72,25 @@ def fleet_to_dict(result: FleetResult, *, name: str = "") -> FleetDocument:
     >>> document["kind"], document["status"], list(document["vehicles"]), document["sum_s"]
     ('fleet', 'found', ['low', 'high'], 8.0)
     """
-    to_obstacles = [
-        one.clearance_m for one in result.results.values() if one.clearance_m is not None
-    ]
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "kind": FLEET,
-        "name": name,
-        "status": result.status.value,
-        "reason": reason_of(result),
-        "notes": list(result.notes),
-        "objective": result.objective,
-        "cost": float(result.cost),
-        "alone_cost": float(result.alone_cost),
-        "sum_s": float(result.sum_s),
-        "last_s": float(result.last_s),
-        "lower_bound": float(result.lower_bound),
-        "gap": number(result.gap),
-        "clearance_m": {
+    to_obstacles = (one.clearance_m for one in result.results.values())
+    return document_of(
+        FleetDocument,
+        result,
+        kind=FLEET,
+        name=name,
+        reason=reason_of(result),
+        clearance_m={
             "between": number(result.clearance_m),
-            "to_obstacles": number(min(to_obstacles, default=math.inf)),
+            "to_obstacles": number(min(map(or_inf, to_obstacles), default=None)),
         },
-        "closest": [closest_entry(one) for one in result.closest],
-        "order": list(result.order),
-        "improvements": [(float(at), float(value)) for at, value in result.improvements],
-        "timing_s": {**dict.fromkeys(TIMINGS), **{k: float(v) for k, v in result.timing_s.items()}},
-        "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
-        "vehicles": {
-            vehicle: {
-                **plan_to_dict(one, name=vehicle),
-                "reason": result.reasons.get(vehicle, one.reason),
-            }
+        timing_s=dict.fromkeys(TIMINGS) | result.timing_s,
+        counts=dict.fromkeys(COUNTS, 0) | result.counts,
+        vehicles={
+            vehicle: plan_to_dict(one, name=vehicle)
+            | {"reason": result.reasons.get(vehicle, one.reason)}
             for vehicle, one in result.results.items()
         },
-    }
+    )
 
 
 def reason_of(result: FleetResult) -> str:
@@ -165,18 +150,16 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
         for name, problem in zip(fleet.names, fleet.problems, strict=True)
     }
     with told_of(path):
-        return FleetResult(
+        return made(
+            FleetResult,
+            document,
+            FleetDocument,
             problem=fleet,
-            status=FleetStatus(document["status"]),
             results=results,
-            objective=document.get("objective", "sum"),
-            lower_bound=float(document["lower_bound"]),
-            alone_cost=float(document["alone_cost"]),
             clearance_m=or_inf(document["clearance_m"]["between"]),
-            closest=tuple(map(closest_of, document["closest"])),
             reasons={name: one.reason for name, one in results.items() if one.plan is None},
-            order=tuple(document["order"]),
-            improvements=tuple((float(s), float(v)) for s, v in document["improvements"]),
+            timing_s={},
+            counts={},
         )
 
 
@@ -188,18 +171,3 @@ def read_of_fleet(path: Path | str, kind: str, fleet: FleetProblem) -> dict[str,
             f"{path}: vehicles: got {', '.join(stated)}, need {', '.join(fleet.names)}"
         )
     return document
-
-
-def closest_entry(one: Closest) -> ClosestEntry:
-    """A pair of vehicles, and where they are nearest to each other."""
-    return {
-        "pair": one.pair,
-        "time_s": float(one.time_s),
-        "distance_m": float(one.distance_m),
-    }
-
-
-def closest_of(entry: Mapping[str, Any]) -> Closest:
-    """A pair of vehicles from its entry."""
-    first, second = entry["pair"]
-    return Closest((first, second), float(entry["time_s"]), float(entry["distance_m"]))

@@ -21,44 +21,42 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.automaton.pieces import Piece, plan_of, words_of
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.fleet import (
-    FleetGuarantee,
-    FleetLog,
-    FleetProblem,
-    FleetStep,
-    FleetViolation,
-    Swap,
-)
+from maneuver_automaton.fleet import Closest, FleetLog, FleetProblem, FleetStep, Swap
 from maneuver_automaton.fleet.driven import DrivenVerdict
 from maneuver_automaton.formats.closed_loop_json import (
     Ended,
-    EndedEntry,
-    Numbers,
     PlaceEntry,
+    VehiclePose,
+    ended_entry,
     has_ended,
 )
 from maneuver_automaton.formats.documents import (
     FLEET,
-    SCHEMA,
     ClearanceEntry,
     ClosestEntry,
     DocumentHead,
-    Flag,
-    Known,
     ModelEntry,
-    Number,
-    Whole,
     document_if,
-    number,
-    or_inf,
-    package_version,
-    says,
+    document_of,
     source_entry,
     told_of,
     vehicle_entry,
     write_document,
 )
-from maneuver_automaton.formats.fleet_json import closest_entry, closest_of, read_of_fleet
+from maneuver_automaton.formats.entries import (
+    Flag,
+    Known,
+    Number,
+    Numbers,
+    Whole,
+    entry,
+    made,
+    number,
+    of,
+    or_inf,
+    says,
+)
+from maneuver_automaton.formats.fleet_json import read_of_fleet
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.problem import Problem
 
@@ -68,7 +66,7 @@ Row: TypeAlias = Mapping[str, Any]  # an object of the file
 class SwapEntry(TypedDict):
     """Plans exchanged for others, of one vehicle or of several at once."""
 
-    vehicles: list[str]
+    vehicles: Annotated[list[str], of("names")]
     before: Annotated[Known, says("cost of what was left of their plans; null if not all arrived")]
     after: Number
     past: Annotated[dict[str, Whole], says("proven past the plan of this number")]
@@ -80,7 +78,7 @@ class FleetBrokenEntry(TypedDict):
 
     step: NotRequired[Annotated[Whole, says("its number, where it is not that of the row")]]
     guarantee: str
-    vehicles: list[str]
+    vehicles: Annotated[list[str], of("names")]
     reason: str
 
 
@@ -99,7 +97,7 @@ class FleetStepEntry(TypedDict):
     gap_m: Annotated[Known, says("any two keep it over the rest of the plans")]
     distance_m: Annotated[Known, says("least of any two along what was driven")]
     solve_s: Known
-    broken_guarantees: list[FleetBrokenEntry]
+    broken_guarantees: Annotated[list[FleetBrokenEntry], of("violations")]
 
 
 class HeldEntry(TypedDict):
@@ -118,6 +116,7 @@ class DroveEntry(PlaceEntry):
     plan: list[Piece]
     replanned: Flag
     number: Whole
+    vehicle_pose: VehiclePose
     measured_pose: Numbers
     arrival_s: Annotated[Known, says("when its plan arrives; null if it does not")]
     off_plan_m: Number
@@ -192,33 +191,23 @@ def fleet_loop_to_dict(
         one: _vehicle(log, one, problem)
         for one, problem in zip(fleet.names, fleet.problems, strict=True)
     }
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "kind": FLEET,
-        "name": name,
-        "status": log.status,
-        "reason": log.reason,
-        "notes": list(left_out(*fleet.problems)),
-        "reached": log.reached,
-        "cost": float(log.cost),
-        "duration_s": float(times[-1] - times[0]),
-        "step_s": float(log.step),
-        "sum_s": float(log.sum_s),
-        "last_s": float(log.last_s),
-        "clearance_m": {
+    return document_of(
+        FleetLoopDocument,
+        log,
+        kind=FLEET,
+        name=name,
+        notes=left_out(*fleet.problems),
+        duration_s=times[-1] - times[0],
+        clearance_m={
             "between": number(driven.distance_m),
             "to_obstacles": number(driven.clearance_m),
         },
-        "closest": [closest_entry(one) for one in driven.closest],
-        "collisions": list(driven.collisions),
-        "broken_guarantees": [
-            {"step": number, **_broken(violation)} for number, violation in log.violations
-        ],
-        "counts": {key: int(value) for key, value in log.counts.items()},
-        "vehicles": vehicles,
-        "steps": _steps(log, vehicles),
-    }
+        closest=driven.closest,
+        collisions=driven.collisions,
+        broken_guarantees=[entry(FleetBrokenEntry, one, step=k) for k, one in log.violations],
+        vehicles=vehicles,
+        steps=_steps(log, vehicles),
+    )
 
 
 def save_fleet_loop(
@@ -269,23 +258,8 @@ def _steps(log: FleetLog, vehicles: Mapping[str, Any]) -> list[FleetStepEntry]:
         for name, entries in spent.items():
             if step.time in entries:
                 known[name] = entries[step.time]["accumulated_cost"]
-        rows.append(
-            {
-                "time_s": float(step.time),
-                "value": number(value),
-                "accumulated_cost": math.fsum(known.values()),
-                "number": step.number,
-                "swaps": [_swap(one) for one in step.swaps],
-                "asked": list(step.asked),
-                "void": list(step.void),
-                "refused": list(step.refused),
-                "arrived": list(step.arrived),
-                "gap_m": number(step.gap_m),
-                "distance_m": number(step.distance_m),
-                "solve_s": float(step.solve_s),
-                "broken_guarantees": [_broken(one) for one in step.violations],
-            }
-        )
+        spent_yet = math.fsum(known.values())
+        rows.append(entry(FleetStepEntry, step, value=value, accumulated_cost=spent_yet))
     return [*rows, _ended(log, vehicles)]
 
 
@@ -310,24 +284,6 @@ def _ended(log: FleetLog, vehicles: Mapping[str, Any]) -> FleetStepEntry:
     }
 
 
-def _swap(swap: Swap) -> SwapEntry:
-    return {
-        "vehicles": list(swap.names),
-        "before": number(swap.before),
-        "after": float(swap.after),
-        "past": {name: int(version) for name, version in swap.past},
-        "holds": {name: int(version) for name, version in swap.holds},
-    }
-
-
-def _broken(violation: FleetViolation) -> FleetBrokenEntry:
-    return {
-        "guarantee": violation.guarantee.value,
-        "vehicles": list(violation.names),
-        "reason": violation.reason,
-    }
-
-
 # -- one vehicle
 
 
@@ -341,6 +297,7 @@ def _vehicle(log: FleetLog, name: str, problem: Problem) -> VehicleLoopEntry:
         step = log.steps[k]
         rows.append(_row(step, name, piece, cost, held, problem))
         held = step.plans[name]
+    when, pose, value = _end_of(log, name, problem)
     broken, arrived = name in log.broken_down, log.arrived_s.get(name)
     status = "broken_down" if broken else "under_way" if arrived is None else "arrived"
     return {
@@ -350,7 +307,7 @@ def _vehicle(log: FleetLog, name: str, problem: Problem) -> VehicleLoopEntry:
         "reached": arrived is not None,
         "arrived_s": None if arrived is None else float(arrived),
         "cost": spent[-1],
-        "steps": [*rows, _last_row(log, name, problem, spent[-1])],
+        "steps": [*rows, ended_entry(when, pose.tolist(), value, spent[-1])],
     }
 
 
@@ -395,23 +352,6 @@ def _is_other(piece: Plan, plan: Plan) -> bool:
         not np.array_equal(one.body_velocity, other.body_velocity)
         for one, other in zip(piece.trims, plan.trims, strict=False)
     )
-
-
-def _last_row(log: FleetLog, name: str, problem: Problem, cost: float) -> EndedEntry:
-    """Where a vehicle ended: at the end of the loop, or where it left."""
-    when, pose, value = _end_of(log, name, problem)
-    return {
-        "time_s": when,
-        "pose": pose.tolist(),
-        "value": number(value),
-        "accumulated_cost": cost,
-        "control": None,
-        "word": None,
-        "plan": None,
-        "replanned": None,
-        "solve_s": None,
-        "vehicle_pose": pose.tolist(),
-    }
 
 
 def _end_of(log: FleetLog, name: str, problem: Problem) -> tuple[float, Array, float]:
@@ -467,10 +407,12 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
                 for number, (row, _, _) in did[name].items()
             )
     with told_of(path):
-        closest = [closest_of(one) for one in document["closest"]]
-        return FleetLog(
+        closest = [made(Closest, one, ClosestEntry) for one in document["closest"]]
+        return made(
+            FleetLog,
+            document,
+            FleetLoopDocument,
             problem=fleet,
-            step=step_s,
             steps=tuple(steps),
             driven=pieces,
             arrived_s={
@@ -480,10 +422,6 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
                 sorted(name for name, one in stated.items() if one["status"] == "broken_down")
             ),
             closest=min(closest, key=lambda row: row.distance_m, default=None),
-            status=document["status"],
-            reason=document["reason"],
-            cost=float(document["cost"]),
-            counts=document["counts"],
         )
 
 
@@ -529,41 +467,19 @@ def _step_of(
             f"vehicles.{late[0]}: step {number} is at {own[late[0]]['time_s']:g} s, "
             f"need {row['time_s']:g} s"
         )
-    return FleetStep(
-        number=number,
-        time=float(row["time_s"]),
+    swaps = (made(Swap, one, SwapEntry, order=k) for k, one in enumerate(row["swaps"]))
+    return made(
+        FleetStep,
+        row,
+        FleetStepEntry,
         poses={name: np.array(its["measured_pose"], dtype=float) for name, its in own.items()},
         plans={name: held for name, (_, held, _) in here.items()},
         driven={name: plan for name, (_, _, plan) in here.items()},
         values={name: or_inf(its["value"]) for name, its in own.items()},
         arrivals={name: or_inf(its["arrival_s"]) for name, its in own.items()},
         off_plan={name: float(its["off_plan_m"]) for name, its in own.items()},
-        arrived=tuple(row["arrived"]),
-        swaps=tuple(_swap_of(k, one) for k, one in enumerate(row["swaps"])),
-        asked=tuple(row["asked"]),
-        void=tuple(row["void"]),
-        refused=tuple(row["refused"]),
-        gap_m=or_inf(row["gap_m"]),
-        violations=tuple(map(_violation_of, row["broken_guarantees"])),
-        solve_s=float(row["solve_s"]),
-        distance_m=or_inf(row["distance_m"]),
+        swaps=tuple(swaps),
     )
-
-
-def _swap_of(order: int, entry: Row) -> Swap:
-    return Swap(
-        names=tuple(entry["vehicles"]),
-        before=or_inf(entry["before"]),
-        after=float(entry["after"]),
-        past=tuple((name, int(version)) for name, version in entry["past"].items()),
-        holds=tuple((name, int(version)) for name, version in entry["holds"].items()),
-        order=order,
-    )
-
-
-def _violation_of(entry: Row) -> FleetViolation:
-    guarantee = FleetGuarantee(entry["guarantee"])
-    return FleetViolation(guarantee, tuple(entry["vehicles"]), str(entry["reason"]))
 
 
 def _check_times(steps: Sequence[FleetStep]) -> None:

@@ -12,7 +12,7 @@ limits it: what a controlled vehicle makes of it is not known.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -91,7 +91,7 @@ def automaton_of_lattice(
             name=f"heading {k}",
             body_velocity=np.zeros(3),
             control=np.zeros(3),
-            reduced_state=_direction(angle),
+            reduced_state=np.array([math.cos(angle), math.sin(angle)]),
         )
         for k, angle in enumerate(lattice.headings.tolist())
     )
@@ -196,10 +196,6 @@ def cells(move: Move, resolution: float) -> tuple[int, int] | None:
     return int(whole[0]), int(whole[1])
 
 
-def _direction(angle: float) -> Array:
-    return np.array([math.cos(angle), math.sin(angle)])
-
-
 def _twists(poses: Array) -> Array:
     """Constant twists (n - 1, 3) that lead from pose to pose in 1 s each."""
     group = SE2(poses)
@@ -301,7 +297,7 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
         for a in range(n)
         for k in steps
     }
-    gap = float(np.diff(headings).min())
+    gap, scale = float(np.diff(headings).min()), np.array([resolution, resolution, 1.0])
     moves = []
     for a in range(n):
         count = math.ceil(radius * gap / float(np.hypot(*directions[a])) - ALIKE)
@@ -310,7 +306,7 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
             b = (a + k) % n
             if not _is_chain(turns, a, k, n):
                 ends[b] = _along(headings[a], headings[b], turns[a, b])
-        moves += [Move(start=a, end=b, poses=_scaled(ends[b], resolution)) for b in sorted(ends)]
+        moves += [Move(start=a, end=b, poses=ends[b] * scale) for b in sorted(ends)]
         if spins:
             moves += [
                 Move(start=a, end=b, poses=_spin(headings[a], headings[b]))
@@ -411,10 +407,6 @@ def _spin(first: float, last: float) -> Array:
     return np.column_stack([np.zeros((count + 1, 2)), np.linspace(first, first + angle, count + 1)])
 
 
-def _scaled(poses: Array, resolution: float) -> Array:
-    return np.asarray(poses * np.array([resolution, resolution, 1.0]))
-
-
 DIGITS = 12  # after the point, of a level
 
 
@@ -440,3 +432,10 @@ def nearest_level(values: Array, levels: Array) -> Array:
     """The level (n,) next to each value (n,)."""
     chosen: Array = levels[np.abs(levels - values[:, None]).argmin(axis=1)]
     return chosen
+
+
+def ending_at(course: Trajectory, state: ArrayLike) -> Trajectory:
+    """A course whose last reduced state is that of its trim, to the last bit."""
+    states = course.reduced_state.copy()
+    states[-1] = state
+    return replace(course, reduced_state=states)

@@ -11,6 +11,7 @@ Source: Sturtevant (2012), *Benchmarks for Grid-Based Pathfinding*, IEEE TCIAIG 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from maneuver_automaton.formats.cells import bounds_around, check_size, drawn_he
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import (
     MAX_MAP_BYTES,
+    check_columns,
     finite,
     lines_of,
     read_text,
@@ -132,16 +134,12 @@ def read_movingai_scenario(path: Path) -> tuple[Statement, ...]:
         got = repr(lines[0][:40]) if lines else "nothing"
         raise InvalidScenario(f"{path}:1: got {got}, need 'version 1'")
     finite(first[1], at=f"{path}:1: version")
-    queries = [(k + 2, line) for k, line in enumerate(lines[1:]) if line.strip()]
-    if not queries:
-        raise InvalidScenario(f"{path}: holds no query, need at least one")
     beside = map_beside(path)
     cells = load_movingai_map(beside)
-    bounds = bounds_around(cells)
     statements = []
-    for case, (number, line) in enumerate(queries):
-        ends = _ends(line, f"{path}:{number}", cells, beside)
-        headings = drawn_headings(case)
+    for at, columns in _queries(path):
+        case = len(statements)
+        ends, headings = _ends(columns, at, cells, beside), drawn_headings(case)
         statements.append(
             Statement(
                 format="MovingAI",
@@ -150,7 +148,7 @@ def read_movingai_scenario(path: Path) -> tuple[Statement, ...]:
                 start=np.append(ends[0], headings[0]),
                 goal=np.append(ends[1], headings[1]),
                 headings=False,
-                bounds=bounds,
+                bounds=bounds_around(cells),
             )
         )
     return tuple(statements)
@@ -164,39 +162,34 @@ def map_beside(path: Path) -> Path:
     InvalidScenario
         If it is not there.
     """
-    lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="a list of queries"))
-    for k, line in enumerate(lines[1:]):
-        columns = _columns(line)
-        if len(columns) == len(COLUMNS):
-            name = columns[1].replace("\\", "/").rpartition("/")[2]
-            beside = path.parent / name
-            if "\0" in name or not beside.is_file():
-                raise InvalidScenario(
-                    f"{path}:{k + 2}: map: got {columns[1]!r}, but there is no {beside}"
-                )
-            return beside
-        if line.strip():
-            raise _wrong_columns(f"{path}:{k + 2}", columns)
+    for at, columns in _queries(path):
+        beside = path.parent / _name(columns[1])
+        if "\0" in columns[1] or not beside.is_file():
+            raise InvalidScenario(f"{at}: map: got {columns[1]!r}, but there is no {beside}")
+        return beside
     raise InvalidScenario(f"{path}: holds no query, need at least one")
 
 
-def _columns(line: str) -> list[str]:
-    """Columns are parted by tabs; where names of maps have no spaces, spaces do as well."""
-    return line.strip().split("\t") if "\t" in line else line.split()
+def _queries(path: Path) -> Iterator[tuple[str, list[str]]]:
+    """Place and columns of each query.
+
+    Columns are parted by tabs; where names of maps have no spaces, spaces do as well.
+    """
+    lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="a list of queries"))
+    for k, line in enumerate(lines[1:]):
+        if columns := line.strip().split("\t") if "\t" in line.strip() else line.split():
+            check_columns(columns, COLUMNS, at=f"{path}:{k + 2}")
+            yield f"{path}:{k + 2}", columns
 
 
-def _wrong_columns(at: str, columns: list[str]) -> InvalidScenario:
-    return InvalidScenario(
-        f"{at}: got {len(columns)} columns, need {len(COLUMNS)}: {', '.join(COLUMNS)}"
-    )
+def _name(stated: str) -> str:
+    """The name of a map, whatever folder it is stated in."""
+    return stated.replace("\\", "/").rpartition("/")[2]
 
 
-def _ends(line: str, at: str, cells: OccupancyMap, beside: Path) -> Array:
+def _ends(columns: list[str], at: str, cells: OccupancyMap, beside: Path) -> Array:
     """Middles (2, 2) of the cells of start and goal [m]."""
-    columns = _columns(line)
-    if len(columns) != len(COLUMNS):
-        raise _wrong_columns(at, columns)
-    if columns[1].replace("\\", "/").rpartition("/")[2] != beside.name:
+    if _name(columns[1]) != beside.name:
         raise InvalidScenario(f"{at}: map: got {columns[1]!r}, need {beside.name!r} in every line")
     rows, width = cells.blocked.shape
     whole(columns[0], at=f"{at}: bucket")

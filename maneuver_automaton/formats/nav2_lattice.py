@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NotRequired
+from typing import Annotated, Any, NotRequired
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -25,14 +25,8 @@ from maneuver_automaton._arrays import Array, freeze, wrapped
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
-from maneuver_automaton.formats.documents import (
-    Flag,
-    Number,
-    Positive,
-    Whole,
-    check_value,
-    misstated,
-)
+from maneuver_automaton.formats.documents import check_value, misstated
+from maneuver_automaton.formats.entries import Flag, Number, Positive, Whole, entry, made, of
 from maneuver_automaton.formats.lattice import (
     ON_GRID,
     SPEED,
@@ -53,7 +47,6 @@ GAP_CELLS = 1.75  # between two poses in a row, where all others of a primitive 
 GAP_TURN = 0.25  # [rad] the same of a turn; Nav2 writes at most 0.232 rad
 UNEVEN = 1.5  # a gap is so many times as long as the middle one of a primitive's steps
 MOTIONS = ("ackermann", "diff", "omni")
-DISTINCT = "trajectory_distinctness_ratio"
 ON_HEADING = 1e-6  # [rad] between a last pose and its heading
 SIDEWAYS = 0.5  # sine of the angle to the heading above which a straight is no straight ahead
 DIGITS = 5  # after the point, of what is worked out of poses
@@ -62,12 +55,12 @@ DIGITS = 5  # after the point, of what is worked out of poses
 class Nav2Row(TypedDict):
     """A primitive of a file."""
 
-    trajectory_id: Whole
-    start_angle_index: Whole
-    end_angle_index: Whole
+    trajectory_id: Annotated[Whole, of("id")]
+    start_angle_index: Annotated[Whole, of("start")]
+    end_angle_index: Annotated[Whole, of("end")]
     left_turn: Flag
-    trajectory_radius: Number
-    trajectory_length: Number
+    trajectory_radius: Annotated[Number, of("radius")]
+    trajectory_length: Annotated[Number, of("length")]
     arc_length: Number
     straight_length: Number
     poses: list[list[Number]]
@@ -78,11 +71,11 @@ class Nav2Head(TypedDict):
 
     motion_model: str
     turning_radius: Positive
-    grid_resolution: Positive
+    grid_resolution: Annotated[Positive, of("resolution")]
     stopping_threshold: NotRequired[Whole]
     num_of_headings: Whole
-    trajectory_distinctness_ratio: NotRequired[Number]
-    heading_angles: list[Number]
+    trajectory_distinctness_ratio: NotRequired[Annotated[Number, of("distinctness_ratio")]]
+    heading_angles: Annotated[list[Number], of("headings")]
     number_of_trajectories: Whole
 
 
@@ -90,7 +83,7 @@ class Nav2File(TypedDict):
     """A file of primitives, as JSON holds it."""
 
     version: NotRequired[Number]
-    date_generated: NotRequired[str]
+    date_generated: NotRequired[Annotated[str, of("date")]]
     lattice_metadata: Nav2Head
     primitives: list[Nav2Row]
 
@@ -176,17 +169,8 @@ def read_nav2_lattice(path: Path) -> Nav2Lattice:
     if count != len(primitives):
         said = f"got {count}, but there are {len(primitives)} primitives"
         raise wrong("number_of_trajectories", said)
-    return Nav2Lattice(
-        motion_model=motion,
-        turning_radius=float(head["turning_radius"]),
-        resolution=resolution,
-        headings=headings,
-        primitives=primitives,
-        version=float(top.get("version", 1.0)),
-        date=top.get("date_generated", ""),
-        stopping_threshold=head.get("stopping_threshold"),
-        distinctness_ratio=head.get(DISTINCT),
-    )
+    more = {"version": float(top.get("version", 1.0)), "date": top.get("date_generated", "")}
+    return made(Nav2Lattice, head, Nav2Head, primitives=primitives, **more)
 
 
 def save_nav2_lattice(file: Nav2Lattice, path: Path) -> None:
@@ -203,35 +187,13 @@ def save_nav2_lattice(file: Nav2Lattice, path: Path) -> None:
 
 def nav2_lattice_to_dict(file: Nav2Lattice) -> dict[str, Any]:
     """What the file says, in the order in which Nav2 writes it."""
-    head: dict[str, Any] = {
-        "motion_model": file.motion_model,
-        "turning_radius": file.turning_radius,
-        "grid_resolution": file.resolution,
-        "stopping_threshold": file.stopping_threshold,
+    counts = {
         "num_of_headings": file.headings.size,
-        DISTINCT: file.distinctness_ratio,
-        "heading_angles": file.headings.tolist(),
         "number_of_trajectories": len(file.primitives),
     }
-    content: dict[str, Any] = {
-        "version": file.version,
-        "date_generated": file.date,
-        "lattice_metadata": {key: value for key, value in head.items() if value is not None},
-        "primitives": [
-            {
-                "trajectory_id": one.id,
-                "start_angle_index": one.start,
-                "end_angle_index": one.end,
-                "left_turn": one.left_turn,
-                "trajectory_radius": one.radius,
-                "trajectory_length": one.length,
-                "arc_length": one.arc_length,
-                "straight_length": one.straight_length,
-                "poses": one.poses.tolist(),
-            }
-            for one in file.primitives
-        ],
-    }
+    head = entry(Nav2Head, file, **counts)
+    known = {key: value for key, value in head.items() if value is not None}
+    content = entry(Nav2File, file, lattice_metadata=known)
     return {key: value for key, value in content.items() if value != ""}
 
 
@@ -263,7 +225,7 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
     """
     lattice = lattice_of_automaton(automaton, kind=KIND)
     label = automaton.name or "automaton"
-    made = []
+    moves = []
     for maneuver, move in zip(automaton.maneuvers, lattice.moves, strict=True):
         forward = _along(move)[0]
         if forward < -SIDEWAYS:
@@ -271,21 +233,21 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
                 f"maneuver {maneuver.name!r}: drives in reverse, but a file of {KIND} has forward "
                 "motion only: Nav2 drives the primitives of the opposite heading backwards"
             )
-        made.append(move)
-    made.sort(key=lambda move: move.start)
-    left_out = set(range(lattice.headings.size)) - {move.start for move in made}
+        moves.append(move)
+    moves.sort(key=lambda move: move.start)
+    left_out = set(range(lattice.headings.size)) - {move.start for move in moves}
     if left_out:
         raise InvalidLibrary(
             f"{label}: heading {min(left_out)} has no maneuver; a file of {KIND} needs one for each"
         )
-    primitives = tuple(_described(k, move) for k, move in enumerate(made))
+    primitives = tuple(_described(k, move) for k, move in enumerate(moves))
     radii = [one.radius for one in primitives if one.radius > 0.0]
     if lattice.turning_radius is None and not radii:
         raise InvalidLibrary(
             f"{label}: has neither a turning radius nor arcs; a file of {KIND} states one"
         )
     return Nav2Lattice(
-        motion_model=_motion(made),
+        motion_model=_motion(moves),
         turning_radius=min(radii) if lattice.turning_radius is None else lattice.turning_radius,
         resolution=lattice.resolution,
         headings=lattice.headings,
@@ -299,11 +261,8 @@ def _primitive(
     def wrong(said: str, *where: str | int) -> InvalidScenario:
         return misstated(path, ("primitives", number, *where), said)
 
-    for key, index in (
-        ("start_angle_index", row["start_angle_index"]),
-        ("end_angle_index", row["end_angle_index"]),
-    ):
-        if not 0 <= index < headings.size:
+    for key in ("start_angle_index", "end_angle_index"):
+        if not 0 <= (index := row[key]) < headings.size:
             raise wrong(f"got {index}, need 0 to {headings.size - 1}", key)
     poses = row["poses"]
     for k, pose in enumerate(poses):
@@ -311,18 +270,8 @@ def _primitive(
             raise wrong(f"got {len(pose)} numbers, need 3: x, y, yaw", "poses", k)
     if not poses:
         raise wrong("is empty, need at least one pose", "poses")
-    made = Nav2Primitive(
-        id=row["trajectory_id"],
-        start=row["start_angle_index"],
-        end=row["end_angle_index"],
-        left_turn=row["left_turn"],
-        radius=float(row["trajectory_radius"]),
-        length=float(row["trajectory_length"]),
-        arc_length=float(row["arc_length"]),
-        straight_length=float(row["straight_length"]),
-        poses=np.array(poses, dtype=np.float64),
-    )
-    steps = np.hypot(*np.diff(made.poses[:, :2], axis=0, prepend=0.0).T) / resolution
+    one = made(Nav2Primitive, row, Nav2Row)
+    steps = np.hypot(*np.diff(one.poses[:, :2], axis=0, prepend=0.0).T) / resolution
     if not steps.max() <= MOST_CELLS:
         k = int(steps.argmax())
         raise wrong(
@@ -331,7 +280,7 @@ def _primitive(
             "poses",
             k,
         )
-    turns = np.abs(wrapped(np.diff(made.poses[:, 2], prepend=headings[made.start])))
+    turns = np.abs(wrapped(np.diff(one.poses[:, 2], prepend=headings[one.start])))
     for values, most, unit in ((steps, GAP_CELLS, "cells"), (turns, GAP_TURN, "rad")):
         k, usual = int(values.argmax()), _usual(values)
         if values[k] > max(most, UNEVEN * usual):
@@ -341,7 +290,7 @@ def _primitive(
                 "poses",
                 k,
             )
-    last, heading = made.poses[-1], float(headings[made.end])
+    last, heading = one.poses[-1], float(headings[one.end])
     across = last[:2] / resolution
     if np.abs(across - np.round(across)).max() > ON_GRID:
         raise wrong(
@@ -351,11 +300,11 @@ def _primitive(
         )
     if abs(float(wrapped(last[2] - heading))) > ON_HEADING:
         raise wrong(
-            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {made.end}",
+            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {one.end}",
             "poses",
             len(poses) - 1,
         )
-    return made
+    return one
 
 
 def _usual(steps: Array) -> float:

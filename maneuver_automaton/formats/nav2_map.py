@@ -10,6 +10,7 @@ For obstacles the mode scale counts as trinary: shades between the thresholds ar
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 from dataclasses import dataclass
@@ -193,8 +194,11 @@ def _document(path: Path) -> Document:
 
 
 def _image(document: Document, path: Path, header: _Header) -> GreyImage:
+    image = Path(header.image)
+    with contextlib.suppress(RuntimeError):  # there is no home
+        image = image.expanduser()
     try:
-        return read_grey_image(path.parent / _from_home(header.image))
+        return read_grey_image(path.parent / image)
     except InvalidScenario as error:
         raise document.error(("image",), str(error)) from error
 
@@ -261,14 +265,6 @@ def _negate(document: Document) -> bool:
     if value not in (0, 1) or isinstance(value, float):
         raise document.error(("negate",), f"got {shown(value)}, need 0 or 1")
     return bool(value)
-
-
-def _from_home(name: str) -> Path:
-    """A path whose ~ is the home of the user, where there is one."""
-    try:
-        return Path(name).expanduser()
-    except RuntimeError:
-        return Path(name)
 
 
 def _occupancy(image: GreyImage, header: _Header) -> Array:

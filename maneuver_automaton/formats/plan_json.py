@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, NotRequired
+from typing import Annotated, Any, Literal, NotRequired, cast
 
 import numpy as np
 from typing_extensions import TypedDict
@@ -20,24 +20,26 @@ from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     FLEET,
-    SCHEMA,
     DocumentHead,
+    ModelEntry,
+    checked,
+    document_of,
+    kind_of,
+    library_entries,
+    parsed,
+    read_document,
+    told_of,
+    write_document,
+)
+from maneuver_automaton.formats.entries import (
     Flag,
     Known,
-    ModelEntry,
     Number,
     Pairs,
     Whole,
-    checked,
-    kind_of,
-    number,
-    package_version,
-    parsed,
-    read_document,
+    entry,
+    made,
     says,
-    told_of,
-    vehicle_entry,
-    write_document,
 )
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
@@ -158,66 +160,30 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
     >>> document["status"], document["cost"], document["primitives"]
     ('unreachable', None, [])
     """
-    plan, narrow, bound, audit = result.plan, result.narrowest, result.bound, result.audit
-    document: PlanDocument = {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "name": name,
-        "vehicle": vehicle_entry(result.problem.automaton.model),
-        "automaton_hash": automaton_hash(result.problem.automaton),
-        "status": result.status.value,
-        "reason": result.reason,
-        "notes": list(result.notes),
-        "narrowest": None
-        if narrow is None
-        else {"place": narrow.place, "missing_m": narrow.missing},
-        "cost": number(result.cost),
-        "duration_s": None if plan is None else plan.duration,
-        "lower_bound": number(result.lower_bound),
-        "gap": number(result.gap),
-        "bound": None
-        if bound is None
-        else {
-            "value": float(bound.value),
-            "kind": bound.kind,
-            "history": [(float(at), float(value)) for at, value in bound.history],
-        },
-        "certificate": number(result.certificate),
-        "primitives": primitive_entries(plan),
-        "terminal_error": _terminal_error(result.terminal_error),
-        "clearance_m": number(result.clearance_m),
-        "trajectory": trajectory_entry(plan),
-        "audit": {
-            "passed": None if audit is None else bool(audit.passed),
-            "max_dynamics_defect": None if audit is None else number(audit.max_dynamics_defect),
-            "min_clearance_m": None if audit is None else number(audit.min_clearance_m),
-            "terminal_position_m": None if audit is None else number(audit.terminal_position_m),
-            "terminal_heading_rad": None if audit is None else number(audit.terminal_heading_rad),
-        },
-        "alternatives": [
-            {
-                "cost": float(one.cost),
-                "duration_s": one.plan.duration,
-                "word": list(one.plan.word),
-                "primitives": primitive_entries(one.plan),
-                "terminal_error": _terminal_error(one.terminal_error),
-            }
+    document = document_of(
+        PlanDocument,
+        result,
+        name=name,
+        **library_entries(result.problem.automaton),
+        **motion_entries(result.plan),
+        terminal_error=entry(TerminalErrorEntry, result.terminal_error),
+        audit=entry(AuditEntry, result.audit),
+        alternatives=[
+            entry(
+                AlternativeEntry,
+                one,
+                duration_s=one.plan.duration,
+                word=one.plan.word,
+                primitives=primitive_entries(one.plan),
+            )
             for one in result.alternatives
         ],
-        "improvements": [(float(at), float(cost)) for at, cost in result.improvements],
-        "timing_s": {**dict.fromkeys(TIMINGS), **{k: float(v) for k, v in result.timing_s.items()}},
-        "counts": {**dict.fromkeys(COUNTS, 0), **{k: int(v) for k, v in result.counts.items()}},
-    }
-    if narrow is None:
+        timing_s=dict.fromkeys(TIMINGS) | result.timing_s,
+        counts=dict.fromkeys(COUNTS, 0) | result.counts,
+    )
+    if result.narrowest is None:
         del document["narrowest"]
     return document
-
-
-def _terminal_error(error: TerminalError | None) -> TerminalErrorEntry:
-    return {
-        "position_m": None if error is None else float(error.position_m),
-        "heading_rad": None if error is None else float(error.heading_rad),
-    }
 
 
 def save_plan(
@@ -233,6 +199,15 @@ def save_plan(
         If the file cannot be written.
     """
     write_document(plan_to_dict(result, name=name), path, interrupted=interrupted)
+
+
+def motion_entries(plan: Plan | None) -> dict[str, Any]:
+    """The keys that a plan fills in a file; without one they are null or empty."""
+    return {
+        "duration_s": None if plan is None else plan.duration,
+        "primitives": primitive_entries(plan),
+        "trajectory": trajectory_entry(plan),
+    }
 
 
 def trajectory_entry(plan: Plan | None) -> TrajectoryEntry:
@@ -388,6 +363,7 @@ def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> P
     if document.get("automaton_hash") != automaton_hash(problem.automaton):
         raise InvalidScenario(f"{place}: automaton_hash: this was planned with another library")
     passage, bound = document.get("narrowest"), document.get("bound")
+    same = ("cost", "lower_bound", "gap", "certificate", "clearance_m")
     with told_of(place):
         status = PlanStatus(document["status"])
         found = status is PlanStatus.FOUND
@@ -397,48 +373,38 @@ def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> P
             status=status,
             reason=document.get("reason", ""),
             plan=plan_of_document(document, problem.automaton.model) if found else None,
-            bound=bound and LowerBound(**bound | {"history": _pairs(bound["history"])}),
+            bound=bound and made(LowerBound, bound, BoundEntry),
             terminal_error=_error(document.get("terminal_error")),
             alternatives=tuple(one for one in others if one is not None),
-            improvements=_pairs(document.get("improvements", ())),
-            narrowest=passage
-            and Narrowest(place=tuple(passage["place"]), missing=passage["missing_m"]),
+            improvements=tuple(
+                (float(at), float(cost)) for at, cost in document.get("improvements", ())
+            ),
+            narrowest=passage and made(Narrowest, passage, NarrowestEntry),
             notes=tuple(document.get("notes", ())),
-            cost=document.get("cost"),
-            lower_bound=document.get("lower_bound"),
-            gap=document.get("gap"),
-            certificate=document.get("certificate"),
-            clearance_m=document.get("clearance_m"),
+            **cast("Any", {key: document.get(key) for key in same}),
         )
 
 
-def _alternative(entry: AlternativeEntry, problem: Problem) -> Alternative | None:
+def _alternative(stated: AlternativeEntry, problem: Problem) -> Alternative | None:
     """A costlier plan of trims; None where it has maneuvers."""
-    automaton, error, parts = (
-        problem.automaton,
-        _error(entry["terminal_error"]),
-        entry["primitives"],
-    )
-    known = all(one["kind"] == "trim" and one["name"] in automaton.trim_names for one in parts)
+    automaton, rows = problem.automaton, stated["primitives"]
+    error = _error(stated["terminal_error"])
+    known = all(one["kind"] == "trim" and one["name"] in automaton.trim_names for one in rows)
     if not known or error is None:
         return None
     plan = Plan(
         problem.start,
-        [automaton[one["name"]] for one in parts],
-        durations=[one["duration_s"] for one in parts],
+        [automaton[one["name"]] for one in rows],
+        durations=[one["duration_s"] for one in rows],
         start_time=problem.start_time,
     )
-    return Alternative(plan=plan, cost=entry["cost"], terminal_error=error)
+    return Alternative(plan=plan, cost=stated["cost"], terminal_error=error)
 
 
-def _error(entry: TerminalErrorEntry | None) -> TerminalError | None:
-    if entry is None or entry["position_m"] is None or entry["heading_rad"] is None:
+def _error(stated: TerminalErrorEntry | None) -> TerminalError | None:
+    if stated is None or None in stated.values():
         return None
-    return TerminalError(position_m=entry["position_m"], heading_rad=entry["heading_rad"])
-
-
-def _pairs(rows: Sequence[Any]) -> tuple[tuple[float, float], ...]:
-    return tuple((float(at), float(value)) for at, value in rows)
+    return made(TerminalError, stated, TerminalErrorEntry)
 
 
 def plan_of_document(document: Mapping[str, Any], model: Model | None = None) -> Plan:

@@ -7,7 +7,6 @@ one it stands there.
 
 from __future__ import annotations
 
-import csv
 from itertools import pairwise
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import told_of
 from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.text_source import MAX_MAP_BYTES, finite, lines_of, read_text
+from maneuver_automaton.formats.text_source import MAX_MAP_BYTES, finite, table_of
 
 NAMES = ("name", "time_s", "x_m", "y_m", "heading_rad", "length_m", "width_m")
 
@@ -41,20 +40,12 @@ def read_poses(path: Path) -> tuple[Statement, ...]:
         or is not positive.
     """
     rows: dict[str, list[tuple[list[float], str]]] = {}
-    text = read_text(path, most=MAX_MAP_BYTES, what="a table of poses")
-    for line, row in enumerate(csv.reader(lines_of(text)), start=1):
-        at = f"{path}:{line}"
-        if line == 1 or not row:
-            continue
-        if len(row) != len(NAMES):
-            raise InvalidScenario(f"{at}: got {len(row)} values, need {', '.join(NAMES)}")
-        numbers = [
-            finite(token, at=f"{at}: {name}")
-            for name, token in zip(NAMES[1:], row[1:], strict=True)
-        ]
+    for at, row in table_of(path, NAMES, most=MAX_MAP_BYTES, what="a table of poses"):
+        numbers = [finite(row[name], at=f"{at}: {name}") for name in NAMES[1:]]
         if not min(numbers[4:]) > 0.0:
-            raise InvalidScenario(f"{at}: got {row[5]} x {row[6]} m, need positive sizes")
-        rows.setdefault(row[0].strip(), []).append((numbers, at))
+            length, width = row["length_m"], row["width_m"]
+            raise InvalidScenario(f"{at}: got {length} x {width} m, need positive sizes")
+        rows.setdefault(row["name"], []).append((numbers, at))
     if not rows:
         raise InvalidScenario(f"{path}: holds no pose, need a row for each")
     for own in rows.values():

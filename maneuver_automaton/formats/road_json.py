@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Sequence
 from typing import Annotated, Literal, NotRequired
 
 import numpy as np
@@ -21,16 +20,11 @@ from maneuver_automaton.formats.documents import (
     ClearanceEntry,
     ClosestEntry,
     DocumentHead,
-    Flag,
-    Known,
     ModelEntry,
-    Number,
-    Whole,
-    number,
     package_version,
-    says,
     vehicle_entry,
 )
+from maneuver_automaton.formats.entries import Flag, Known, Number, Whole, entry, number, says
 from maneuver_automaton.formats.plan_json import (
     PlanDocument,
     PrimitiveEntry,
@@ -42,7 +36,6 @@ from maneuver_automaton.roads import (
     RoadDrive,
     RoadFleetDrive,
     RoadFleetResult,
-    RoadPair,
     RoadPlanner,
     RoadPlanResult,
     RoadStep,
@@ -197,7 +190,7 @@ def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> 
             "between": number(result.distance_m),
             "to_obstacles": number(min((one.clearance_m for one in verdicts), default=math.inf)),
         },
-        "closest": _closest(result.pairs),
+        "closest": [entry(ClosestEntry, one) for one in result.pairs],
         "order": list(result.order),
         "timing_s": {"search": result.search_s},
         "notes": joint_notes(result),
@@ -233,7 +226,7 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> RoadFleetDriveDocument:
             "between": number(drive.distance_m),
             "to_obstacles": number(min(one.verdict.clearance_m for one in rows)),
         },
-        "closest": _closest(drive.pairs),
+        "closest": [entry(ClosestEntry, one) for one in drive.pairs],
         "collisions": sum(one.verdict.collisions for one in rows),
         "notes": joint_notes(drive),
         "vehicles": vehicles,
@@ -281,32 +274,25 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
                 _step(drive.planner, step, float(cost))
                 for step, cost in zip(drive.steps, spent, strict=False)
             ),
-            {
-                "time_s": driven.start_time + driven.duration,
-                "pose": driven.end.tolist(),
-                "reduced_state": driven.trims[-1].reduced_state.tolist(),
-                "value": 0.0,
-                "accumulated_cost": float(spent[-1]),
-                "control": None,
-                "word": None,
-                "plan": None,
-                "replanned": None,
-                "solve_s": None,
-            },
+            entry(
+                DriveStepEntry,
+                None,
+                time_s=driven.start_time + driven.duration,
+                pose=driven.end,
+                reduced_state=driven.trims[-1].reduced_state,
+                value=0.0,
+                accumulated_cost=spent[-1],
+            ),
         ],
     }
-
-
-def _closest(pairs: Sequence[RoadPair]) -> list[ClosestEntry]:
-    return [{"pair": one.pair, "time_s": one.time_s, "distance_m": one.distance_m} for one in pairs]
 
 
 def _primitives(plan: Plan | None) -> list[PrimitiveEntry]:
     """Trims and maneuvers in order; a maneuver on roads has one control throughout."""
     entries = primitive_entries(plan)
-    for entry, one in zip(entries, () if plan is None else plan.primitives, strict=True):
+    for row, one in zip(entries, () if plan is None else plan.primitives, strict=True):
         if isinstance(one, Maneuver) and one.course is not None:
-            entry["control"] = one.course.control[0].tolist()
+            row["control"] = one.course.control[0].tolist()
     return entries
 
 
@@ -321,22 +307,18 @@ def library_hash(library: RoadLibrary) -> str:
 def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> DriveStepEntry:
     decision = step.decision
     plan = _primitives(planner.plan_of(step.state, decision.controls, tick=step.number))
-    return {
-        "time_s": step.time,
-        "pose": planner.world(step.state[:3]).tolist(),
-        "reduced_state": step.state[3:].tolist(),
-        "value": step.value,
-        "accumulated_cost": spent,
-        "control": step.control.tolist(),
-        "word": [one["name"] for one in plan],
-        "plan": plan,
-        "replanned": step.replanned,
-        "solve_s": step.solve_s,
-        "number": step.number,
-        "reaches": decision.reaches,
-        "lasting_s": planner.tick * decision.lasting,
-        "stops": decision.stops,
-    }
+    return entry(
+        DriveStepEntry,
+        step,
+        pose=planner.world(step.state[:3]),
+        reduced_state=step.state[3:],
+        accumulated_cost=spent,
+        word=[one["name"] for one in plan],
+        plan=plan,
+        reaches=decision.reaches,
+        lasting_s=planner.tick * decision.lasting,
+        stops=decision.stops,
+    )
 
 
 def _audit(verdict: RoadVerdict) -> RoadAuditEntry:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import zipfile
 import zlib
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from maneuver_automaton._files import open_input
@@ -75,6 +77,35 @@ def lines_of(text: str) -> list[str]:
     return lines[:-1] if lines[-1] == "" else lines
 
 
+def table_of(
+    path: Path, names: Sequence[str], *, what: str, most: int = MAX_BYTES
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Of each row of a CSV its place, for messages, and its words by the names of their columns.
+
+    Raises
+    ------
+    InvalidScenario
+        As `read_text`, and if the first line misses a name, or a row has another number of columns.
+    """
+    rows = list(csv.reader(lines_of(read_text(path, most=most, what=what))))
+    head = [word.strip() for word in rows[0]] if rows else []
+    for name in names:
+        if name not in head:
+            raise InvalidScenario(f"{path}:1: the column {name!r} is missing")
+    for line, row in enumerate(rows[1:], start=2):
+        if any(word.strip() for word in row):
+            check_columns(row, head, at=f"{path}:{line}")
+            yield f"{path}:{line}", dict(zip(head, map(str.strip, row), strict=True))
+
+
+def check_columns(row: Sequence[str], names: Sequence[str], *, at: str) -> None:
+    """Refuse a row that has not one word for each name; raises InvalidScenario."""
+    if len(row) != len(names):
+        raise InvalidScenario(
+            f"{at}: got {len(row)} columns, need {len(names)}: {', '.join(names)}"
+        )
+
+
 def finite(token: str, *, at: str) -> float:
     """The number that a word states; `at` is its place, for the message.
 
@@ -88,10 +119,7 @@ def finite(token: str, *, at: str) -> float:
     >>> finite(" 2.5e-1", at="Case1.csv:1: value 4")
     0.25
     """
-    try:
-        value = float(token) if "_" not in token else math.nan
-    except ValueError:
-        value = math.nan
+    value = _number(token)
     if not math.isfinite(value):
         raise InvalidScenario(f"{at}: got {_brief(token)}, need a finite number")
     if abs(value) > FARTHEST:
@@ -112,13 +140,17 @@ def whole(token: str, *, at: str, least: int = 0) -> int:
     >>> whole("4.0", at="Case1.csv:1: value 8")
     4
     """
-    try:
-        value = float(token) if "_" not in token else math.nan
-    except ValueError:
-        value = math.nan
+    value = _number(token)
     if not (value >= least and value.is_integer() and value < 2**53):
         raise InvalidScenario(f"{at}: got {_brief(token)}, need a whole number of at least {least}")
     return int(value)
+
+
+def _number(token: str) -> float:
+    try:
+        return float(token) if "_" not in token else math.nan
+    except ValueError:
+        return math.nan
 
 
 def _brief(token: str) -> str:

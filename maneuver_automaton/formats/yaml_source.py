@@ -328,6 +328,14 @@ def number_at(document: Document, where: Where) -> float:
     return float(value)
 
 
+def positive_at(document: Document, where: Where) -> float:
+    """The positive number at a place; raises InvalidScenario."""
+    value = number_at(document, where)
+    if not value > 0.0:
+        raise document.error(where, f"got {value:g}, need a positive number")
+    return value
+
+
 def numbers_at(document: Document, where: Where, n: int, need: str) -> tuple[float, ...]:
     """The list of n numbers at a place; raises InvalidScenario."""
     values = value_at(document, where, list, need)

@@ -113,7 +113,7 @@ def test_commands(tmp_path, path, points):
         ("</svg>\n", "</svg>\nrest", ":9: not valid XML: junk after document element"),
         ('encoding="UTF-8"', 'encoding="nonsense"', ": not valid XML: unknown encoding: nonsense"),
         ("<svg", "<!DOCTYPE svg [<!ENTITY a 'b'>]><svg",
-         ":2: has a document type, need a drawing without one"),
+         ":2: has a document type, need a file without one"),
         ("translate(1)", "matrix(1 0 0 1 2 3)",
          ":6: transform: got 'matrix(1 0 0 1 2 3)', need translate(x, y)"),
         ("translate(1)", "translate(x)", ":6: transform: got 'x', need a finite number"),
@@ -140,7 +140,11 @@ def test_what_is_wrong_with_a_drawing(tmp_path, old, new, message):
     [
         ("robot,", "", "1: the column 'robot' is missing"),
         (QUERIES, "", "1: the column 'world' is missing"),
-        (",1.5\n", "\n", "2: got 7 columns, need 8"),
+        (
+            ",1.5\n",
+            "\n",
+            "2: got 7 columns, need 8: world, robot, x0_m, y0_m, yaw0_rad, x1_m, y1_m, yaw1_rad",
+        ),
         ("-5,", "x,", "2: y1_m: got 'x', need a finite number"),
         ("cart", "", "2: robot: got '', need the name of a drawing"),
         ("cart", "../cart", "2: robot: got '../cart', need the name of a drawing"),

@@ -46,7 +46,7 @@ def test_it_is_planned_among_with_a_scenario(tmp_path):
     [
         (("car,2.0", "car,0.0"), ":4: time_s: got 0, need more than 0"),
         (("1.8\nperson,1.0", "2.0\nperson,1.0"), ":4: length_m, width_m: changed, need those"),
-        (("4.5,1.8\nperson,5.0", "4.5\nperson,5.0"), ":4: got 6 values, need name, time_s, "),
+        (("4.5,1.8\nperson,5.0", "4.5\nperson,5.0"), ":4: got 6 columns, need 7: name, time_s, "),
         (("0.5,0.5\ncar", "0.5,0\ncar"), ":3: got 0.5 x 0 m, need positive sizes"),
         (("2.0,-5.0", "2.0,far"), ":3: y_m: got 'far', need a finite number"),
     ],
