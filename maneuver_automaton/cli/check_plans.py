@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.cli.fleet_tables import pair_text
 from maneuver_automaton.cli.inputs import Parts, scenario_of
 from maneuver_automaton.cli.planned import fleet_planned, road_fleet
 from maneuver_automaton.cli.progress import announced
@@ -34,6 +33,7 @@ from maneuver_automaton.formats.plan_json import load_plan, load_plans
 from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, within
+from maneuver_automaton.recording.values import pair_text
 from maneuver_automaton.roads import RoadFleetResult, RoadPair
 
 ENDING = ".json"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,6 @@ from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.cli.single import STEPS
 from maneuver_automaton.fleet import (
-    DrivenVerdict,
     FleetLog,
     FleetResult,
     FleetStatus,
@@ -22,6 +20,7 @@ from maneuver_automaton.fleet import (
 )
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.planning import PlanResult, PlanStatus
+from maneuver_automaton.recording.fleets import judged_facts
 from maneuver_automaton.scenario import FleetScenario
 
 
@@ -53,27 +52,15 @@ def planned(job: Job, scenario: FleetScenario) -> JobResult:
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     name, whole = scenario.name, result.status is FleetStatus.FOUND
     why = "interrupted before all had a plan: " if stopped() else ""
-    known = [one.clearance_m for one in result.results.values() if one.clearance_m is not None]
-    least = min([result.clearance_m, *known])
-
-    def tell(folder: str) -> None:
-        from maneuver_automaton.cli.fleet_tables import print_fleet
-
-        print_fleet(name, result, folder=folder)
-
     return JobResult(
         name=name,
         result=result,
         save=lambda path: save_fleet(
             result, path, name=name, source=_source(job), interrupted=stopped()
         ),
-        tell=tell,
         done=whole,
         status=result.status.value,
         complaints=() if whole else (f"{result.status.value}: {why}{reason_of(result)}",),
-        cost=result.cost if whole else None,
-        duration=result.last_s if whole else None,
-        clearance=least if math.isfinite(least) else None,
         first_plan=result.timing_s.get("first_plan"),
     )
 
@@ -118,29 +105,16 @@ def driven(job: Job, scenario: FleetScenario) -> JobResult:
             log, path, driven=verdict, name=name, source=_source(job), interrupted=stopped()
         )
 
-    def tell(folder: str) -> None:
-        from maneuver_automaton.cli.fleet_tables import print_fleet_loop
-
-        print_fleet_loop(name, log, verdict, folder=folder)
-
     return JobResult(
         name=name,
         result=log,
         save=save,
-        tell=tell,
         done=log.reached and verdict.passed and not broken,
         status=log.status,
         complaints=tuple(complaints),
-        cost=float(log.cost),
-        duration=float(log.times[-1] - log.times[0]),
-        clearance=_least(verdict),
+        facts=judged_facts(verdict, log.problem.margin),
+        measured=(verdict,),
     )
-
-
-def _least(verdict: DrivenVerdict) -> float | None:
-    """The least distance to an obstacle or another vehicle [m]; None if there is none."""
-    least = min([verdict.distance_m, *verdict.clearances_m.values()])
-    return least if math.isfinite(least) else None
 
 
 def _loop(job: Job, scenario: FleetScenario) -> FleetLog:

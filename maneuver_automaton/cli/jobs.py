@@ -25,7 +25,9 @@ from maneuver_automaton.cli.options import Options, refuse_unknown
 from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, draw
 from maneuver_automaton.cli.progress import announced
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.recording import Fact, recording_of, tables_of
 
+NEAR = ("clearance", "least clearance", "apart")  # facts that are distances
 INTERRUPTED = "interrupted before there was a plan"
 DOCUMENTS = {"plan": "plan", "mpc": "closed_loop"}  # and what pictures are called
 PICTURES = {
@@ -36,33 +38,53 @@ PICTURES = {
 WORK = {"plan": "planned", "mpc": "driven"}
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class JobResult:
     """What came of a job: how it is written and told, and its row in the table of a folder."""
 
     name: str  # of the scenario
     result: Any  # what is drawn; None: nothing
     save: Callable[[Path], None]  # writes its document
-    tell: Callable[[str], None]  # prints it, and the folder that it is in
     done: bool  # whether all is as asked
     status: str
     complaints: tuple[str, ...] = ()  # a line each
-    cost: float | None = None
-    duration: float | None = None
-    clearance: float | None = None
-    first_plan: float | None = None
+    facts: tuple[Fact, ...] = ()  # beside those of its recording, or instead of those so called
+    measured: tuple[Any, ...] = ()  # again, of all that was driven
+    remarks: tuple[str, ...] = ()  # a line each, below the facts
+    first_plan: float | None = None  # [s]
     document: str = ""  # its name; empty: that of the command
 
-    def row(self, path: Path) -> Row:
-        """For the table of a folder."""
+    @functools.cached_property
+    def told(self) -> tuple[Fact, ...]:
+        """All that is said of it."""
+        known = () if self.result is None else recording_of(self.result).facts
+        return tuple({one.label: one for one in (*known, *self.facts)}.values())
+
+    def tell(self, folder: str) -> None:
+        """Print it, and the folder that it is in; nothing where one vehicle has no plan."""
+        from maneuver_automaton.cli.tables import console, print_result
+
+        movers = () if self.result is None else recording_of(self.result).movers
+        if len(movers) == 1 and not movers[0].has_plan:
+            return
+        tables = [] if self.result is None else tables_of(self.result, *self.measured)
+        print_result(self.name, tables, (*self.told, Fact(label="written to", value=folder)))
+        for line in self.remarks:
+            console().print(f"  {line}", soft_wrap=True)
+
+    def row(self, path: Path, *, known: bool) -> Row:
+        """For the table of a folder; with its numbers, if they are `known`."""
+        found = {one.label: one.value for one in self.told if not isinstance(one.value, str)}
+        numbers = found if known else {}
+        near = [numbers[one] for one in NEAR if one in numbers]
         return Row(
             name=path.name,
             code=FOUND if self.done else NO_PLAN,
             status=self.status,
             reason="".join(f"{path}: {line}\n" for line in self.complaints),
-            cost=self.cost,
-            duration=self.duration,
-            clearance=self.clearance,
+            cost=numbers.get("cost"),
+            duration=numbers.get("duration", numbers.get("last arrival")),
+            clearance=min(near, default=None),
             first_plan=self.first_plan,
         )
 
@@ -219,7 +241,7 @@ def _row(
     except Exception as error:  # noqa: BLE001, one bad file must not stop the others
         reason = explained(error)
         return path, Row(name=path.name, code=BAD_INPUT, status="bad input", reason=reason)
-    return path, outcome.row(path)
+    return path, outcome.row(path, known=outcome.done or command == "mpc")
 
 
 def _compile_first(*, quiet: bool) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,22 +12,17 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.guard import complain
 from maneuver_automaton.cli.inputs import states_several
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
-from maneuver_automaton.cli.loop_tables import times_of
 from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import source_entry, write_document
 from maneuver_automaton.formats.road_json import (
-    joint_notes,
     road_drive_to_dict,
     road_fleet_drive_to_dict,
     road_fleet_to_dict,
     road_plan_to_dict,
 )
+from maneuver_automaton.recording import Fact
 from maneuver_automaton.roads import (
-    RoadDrive,
-    RoadFleetDrive,
-    RoadFleetResult,
-    RoadPlanResult,
     RoadScene,
     RoadVehicle,
     drive_roads,
@@ -42,8 +37,6 @@ from maneuver_automaton.roads.search_arrays import LONGEST
 from maneuver_automaton.scenario import RoadScenario, load_roads, load_scenario
 
 TIME_LIMIT = 10.0  # [s] of one plan
-COLUMNS = ["vehicle", "status", "cost", "arrival [s]", "clearance [m]", "edge [m]"]
-Facts = Mapping[str, str]
 
 
 def planned(job: Job, _: None) -> JobResult:
@@ -60,14 +53,15 @@ def planned(job: Job, _: None) -> JobResult:
     if stopped() and result.plan is None:
         result = replace(result, reason=INTERRUPTED)
     status = "found" if result.plan is not None else "out_of_budget" if stopped() else "no_plan"
-    document = road_plan_to_dict(result) | {"status": status}
-    return _outcome(
-        result,
-        document,
+    return JobResult(
         name=found.scene.name,
-        facts=_plan_facts(result),
+        result=result,
+        save=_save(road_plan_to_dict(result) | {"status": status}),
         done=result.plan is not None,
-        complaint=f"{status}: {result.reason}",
+        status=status,
+        complaints=()
+        if result.plan is not None
+        else ("; ".join([f"{status}: {result.reason}", *result.notes]),),
         first_plan=result.search_s,
     )
 
@@ -99,13 +93,17 @@ def driven(job: Job, _: None) -> JobResult:
                 first=None if before is None else before.decision,
                 progress=lambda _: advance(),
             )
-    return _outcome(
-        drive,
-        road_drive_to_dict(drive, before=before),
+    first = ""
+    if before is not None and before.plan is not None:
+        first = f"made in {before.search_s:.3g} s before the start"
+    return JobResult(
         name=found.scene.name,
-        facts=_drive_facts(drive, before),
+        result=drive,
+        save=_save(road_drive_to_dict(drive, before=before)),
         done=drive.reached,
-        complaint=f"{drive.status}: {drive.reason}",
+        status=drive.status,
+        complaints=() if drive.reached else (f"{drive.status}: {drive.reason}",),
+        facts=(Fact(label="first plan", value=first),),
     )
 
 
@@ -129,30 +127,13 @@ def _plans(job: Job) -> JobResult:
     missing = [(vehicle, one) for vehicle, one in result.results.items() if one.plan is None]
     reason = "; ".join(f"{vehicle}: {one.reason}" for vehicle, one in missing)
     said = "interrupted before all had a plan: " if stopped() else ""
-    return _outcome(
-        result,
-        road_fleet_to_dict(result, status=status, reason=reason),
+    return JobResult(
         name=result.name,
-        rows=[
-            [
-                vehicle,
-                "no plan" if one.plan is None else "found",
-                "" if one.plan is None else f"{one.cost:.6g}",
-                "" if one.plan is None else f"{one.plan.switching_times[-1]:.6g}",
-                "" if one.verdict is None else f"{one.verdict.clearance_m:.3g}",
-                "" if one.verdict is None else f"{one.verdict.edge_m:.3g}",
-            ]
-            for vehicle, one in result.results.items()
-        ],
-        facts={
-            "plans": f"{len(result.plans)} of {len(result.results)}",
-            "nearest": _nearest(result),
-            "order": ", ".join(result.order),
-            "searched": f"{result.search_s:.3g} s",
-        },
+        result=result,
+        save=_save(road_fleet_to_dict(result, status=status, reason=reason), job),
         done=result.found,
-        complaint=f"{status}: {said}{reason}",
-        source=job,
+        status=status,
+        complaints=() if result.found else (f"{status}: {said}{reason}",),
         first_plan=result.search_s,
     )
 
@@ -170,33 +151,13 @@ def _drives(job: Job) -> JobResult:
             )
         except ValueError as error:
             raise InvalidScenario(f"{job.path}: {error}") from error
-    taken = [step for one in drive.results.values() for step in one.steps]
-    reached = sum(one.reached for one in drive.results.values())
-    return _outcome(
-        drive,
-        road_fleet_drive_to_dict(drive),
+    return JobResult(
         name=drive.name,
-        rows=[
-            [
-                vehicle,
-                one.status,
-                f"{math.fsum(step.applied_cost for step in one.steps):.6g}",
-                f"{one.driven.start_time + one.driven.duration:.6g}" if one.reached else "",
-                f"{one.verdict.clearance_m:.3g}",
-                f"{one.verdict.edge_m:.3g}",
-            ]
-            for vehicle, one in drive.results.items()
-        ],
-        facts={
-            "reached": f"{reached} of {len(drive.results)}",
-            "nearest": _nearest(drive),
-            "steps": f"{len(taken)}, {sum(step.replanned for step in taken)} replanned",
-            "time per step": times_of(step.solve_s for step in taken),
-            "planned before": f"{drive.before.search_s:.3g} s",
-        },
+        result=drive,
+        save=_save(road_fleet_drive_to_dict(drive), job),
         done=drive.reached,
-        complaint=f"{drive.status}: {drive.reason}",
-        source=job,
+        status=drive.status,
+        complaints=() if drive.reached else (f"{drive.status}: {drive.reason}",),
     )
 
 
@@ -219,94 +180,14 @@ def _scenes(job: Job) -> tuple[dict[str, RoadScene], RoadVehicle, str]:
     return scenes, drives[0].vehicle, drives[0].name.removesuffix(" case 0")
 
 
-def _outcome(
-    result: RoadPlanResult | RoadDrive | RoadFleetResult | RoadFleetDrive,
-    said: Mapping[str, object],
-    *,
-    name: str,
-    facts: Facts,
-    done: bool,
-    complaint: str,
-    rows: Sequence[Sequence[str]] | None = None,
-    source: Job | None = None,
-    first_plan: float | None = None,
-) -> JobResult:
-    """What came of any job on roads; of several vehicles with a row each, and their `source`."""
-    document: dict[str, Any] = dict(said)
-    if isinstance(result, RoadFleetResult | RoadFleetDrive):
-        notes: Sequence[str] = joint_notes(result)
-    else:
-        notes = result.notes
+def _save(said: Mapping[str, object], job: Job | None = None) -> Callable[[Path], None]:
+    """What writes a document; one of several vehicles names the files of its `job`."""
 
     def save(path: Path) -> None:
-        if source is not None:
-            made_from = {"file": source.path, "with": source.parts.beside, "case": None}
+        document: dict[str, Any] = dict(said)
+        if job is not None:
+            made_from = {"file": job.path, "with": job.parts.beside, "case": None}
             document["source"] = source_entry(made_from, path)
         write_document(document, path, interrupted=stopped())
 
-    def tell(folder: str) -> None:
-        from maneuver_automaton.cli.tables import console, print_facts, table
-
-        if rows is not None:
-            console().print(table(name, COLUMNS, rows, numbers=(2, 3, 4, 5)))
-        elif facts or notes:
-            console().print(name, soft_wrap=True)
-        written = {"written to": folder} if facts else {}
-        print_facts({**facts, **written, "notes": "; ".join(notes)})
-
-    apart = document.get("clearance_m")
-    distances = (
-        apart.values() if isinstance(apart, dict) else (apart, document.get("min_clearance_m"))
-    )
-    duration = document.get("duration_s")
-    if isinstance(result, RoadFleetResult):
-        duration = max((one.duration for one in result.plans.values()), default=None)
-    known = done or isinstance(result, RoadDrive | RoadFleetDrive)
-    return JobResult(
-        name=name,
-        result=result,
-        save=save,
-        tell=tell,
-        done=done,
-        status=document["status"],
-        complaints=() if done else (complaint,),
-        cost=document["cost"] if known else None,
-        duration=duration if known else None,
-        clearance=min((one for one in distances if one is not None), default=None),
-        first_plan=first_plan,
-    )
-
-
-def _plan_facts(result: RoadPlanResult) -> dict[str, str]:
-    plan, verdict, decision = result.plan, result.verdict, result.decision
-    if plan is None or verdict is None or decision is None:
-        return {}
-    return {
-        "goal": f"reached at {plan.switching_times[-1]:.6g} s",
-        "cost": f"{result.cost:.6g}",
-        "clearance": verdict.room,
-        "stop after it": "free" if decision.stops else "none was found",
-        "searched": f"{result.search_s:.3g} s",
-    }
-
-
-def _drive_facts(drive: RoadDrive, before: RoadPlanResult | None) -> dict[str, str]:
-    verdict = drive.verdict
-    end = drive.driven.switching_times[-1]
-    facts = {
-        "goal": f"reached at {end:.6g} s" if drive.reached else f"{drive.status}: {drive.reason}",
-        "steps": f"{len(drive.steps)}, {sum(step.replanned for step in drive.steps)} replanned",
-        "collisions": str(len(verdict.hit)),
-        "clearance": verdict.room,
-        "written to": "",  # its place
-    }
-    if before is not None and before.plan is not None:
-        facts["first plan"] = f"made in {before.search_s:.3g} s before the start"
-    return {**facts, "time per step": times_of(drive.solve_s)}
-
-
-def _nearest(result: RoadFleetResult | RoadFleetDrive) -> str:
-    if not result.pairs:
-        return ""
-    one = result.pairs[0]
-    return f"{' and '.join(one.pair)} {one.distance_m:.3g} m at {one.time_s:.4g} s"
+    return save

@@ -14,6 +14,8 @@ from maneuver_automaton.cli.progress import counted, has_terminal, progress_bar,
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, simulate, simulate_many
+from maneuver_automaton.recording import Fact, recording_of
+from maneuver_automaton.recording.loops import causes, statistics_facts
 from maneuver_automaton.scenario import Scenario
 from maneuver_automaton.scenario.scenario import disturbance_of
 
@@ -45,23 +47,24 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     found, status, name = result.plan is not None, result.status.value, scenario.name
 
-    def tell(folder: str) -> None:
-        from maneuver_automaton.cli.tables import print_result
-
-        print_result(name, result, folder=folder, share=budgets.gap is not None)
-
     return JobResult(
         name=name,
         result=result,
         save=lambda path: save_plan(result, path, name=name, interrupted=stopped()),
-        tell=tell,
         done=found,
         status=status,
         complaints=() if found else ("; ".join([f"{status}: {result.reason}", *result.notes]),),
-        cost=result.cost,
-        duration=None if result.plan is None else result.plan.duration,
-        clearance=result.clearance_m,
+        facts=() if budgets.gap is None else _with_gap(result),
         first_plan=result.timing_s.get("first_plan"),
+    )
+
+
+def _with_gap(result: PlanResult) -> tuple[Fact, ...]:
+    """The cost with the gap, too, where that was asked for and is open."""
+    return tuple(
+        replace(one, note=f"{one.note}, gap {100.0 * (result.gap or 0.0):.2g} %")
+        for one in recording_of(result).facts
+        if one.label == "cost" and one.note.startswith("proven: ")
     )
 
 
@@ -143,22 +146,13 @@ def _driven(loop: ClosedLoop, name: str) -> JobResult:
     ]
     missed = [] if loop.reached else [f"{loop.status}: {loop.reason}"]
 
-    def tell(folder: str) -> None:
-        from maneuver_automaton.cli.loop_tables import print_loop
-
-        print_loop(name, loop, folder=folder)
-
     return JobResult(
         name=name,
         result=loop,
         save=lambda path: save_closed_loop(loop, path, name=name, interrupted=stopped()),
-        tell=tell,
         done=loop.reached and not any(loop.collisions),
         status=loop.status,
         complaints=(*broken, *disturbed, *missed),
-        cost=loop.cost,
-        duration=float(loop.times[-1] - loop.times[0]),
-        clearance=loop.min_clearance_m,
     )
 
 
@@ -180,17 +174,13 @@ def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
             progress=counted(advance),
         )
 
-    def tell(folder: str) -> None:
-        from maneuver_automaton.cli.loop_tables import print_statistics
-
-        print_statistics(scenario.name, statistics, folder=folder)
-
     return JobResult(
         name=scenario.name,
-        result=None,
+        result=None,  # the motion of no loop is kept
         save=lambda path: save_statistics(statistics, path, interrupted=stopped()),
-        tell=tell,
         done=all(one.reached and not any(one.collisions) for one in statistics.outcomes),
         status=f"{count} loops",
+        facts=statistics_facts(statistics),
+        remarks=tuple(causes(statistics)),
         document="statistics",
     )

@@ -32,6 +32,7 @@ from maneuver_automaton.formats.plan_json import (
     trajectory_entry,
 )
 from maneuver_automaton.primitives import Maneuver
+from maneuver_automaton.recording.road_drives import joint_notes
 from maneuver_automaton.roads import (
     RoadDrive,
     RoadFleetDrive,
@@ -231,16 +232,6 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> RoadFleetDriveDocument:
         "notes": joint_notes(drive),
         "vehicles": vehicles,
     }
-
-
-def joint_notes(fleet: RoadFleetResult | RoadFleetDrive) -> list[str]:
-    """Notes of several vehicles: those on their file once, any other with the vehicle's name."""
-    said = [
-        note if note in one.planner.scene.notes else f"{name}: {note}"
-        for name, one in fleet.results.items()
-        for note in one.notes
-    ]
-    return list(dict.fromkeys(said))
 
 
 def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> DriveDocument:

@@ -131,9 +131,9 @@ def _legend(cast: Cast, panels: Sequence[Panel]) -> tuple[list[Artist], list[str
 def heading_of(recording: Recording, look: Look) -> list[str]:
     """Lines that say how it ended and what is known of it, the word of a plan, what went wrong."""
     first = recording.movers[0]
-    facts = [f"{one.label} {one.text}" for one in recording.facts]
+    facts = [f"{one.label} {one.text}" for one in recording.heading]
     if recording.kind == "plan" and not first.has_plan:
-        return [one.text for one in recording.facts]
+        return [one.text for one in recording.heading]
     tells = recording.kind == "closed_loop" or bool(recording.reason)  # more than the facts do
     lines = [recording.ending] if tells and recording.kind != "plan" else []
     lines += [" · ".join(facts), recording.world.source]

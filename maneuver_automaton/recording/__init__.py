@@ -17,6 +17,7 @@ from maneuver_automaton.recording.values import Recording as Recording
 from maneuver_automaton.recording.values import Search as Search
 from maneuver_automaton.recording.values import bodies_of as bodies_of
 from maneuver_automaton.recording.values import world_of as world_of
+from maneuver_automaton.recording.values import Table as Table
 
 ROOMS = {  # of results: who records them, loaded only where there is such a result
     "automaton": "plans",
@@ -50,13 +51,28 @@ RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
     """
     if isinstance(result, Recording):
         return result
-    package, _, home = type(result).__module__.partition(".")
-    room = ROOMS.get(home.partition(".")[0]) if package == "maneuver_automaton" else None
-    if room is not None:
-        made = importlib.import_module(f"{__name__}.{room}").recorded(result)
+    if (room := _room_of(result)) is not None:
+        made = room.recorded(result)
         if isinstance(made, Recording):
             return made
     raise TypeError(
         f"recording: got {type(result).__name__}, need a Plan, PlanResult, ClosedLoop, "
         "FleetResult, FleetLog, or a plan or drive on roads"
     )
+
+
+def tables_of(result: Any, *measured: Any) -> list[Table]:
+    """The tables that the terminal shows of any result of `recording_of`.
+
+    `measured` is what was found of the loop of a fleet, if it was judged already.
+    """
+    room = _room_of(result)
+    made: list[Table] = [] if room is None else room.tables(result, *measured)
+    return made
+
+
+def _room_of(result: Any) -> Any:
+    """The module that records a result, loaded only where there is such a result; or None."""
+    package, _, home = type(result).__module__.partition(".")
+    room = ROOMS.get(home.partition(".")[0]) if package == "maneuver_automaton" else None
+    return None if room is None else importlib.import_module(f"{__name__}.{room}")

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.fleet import FleetLog, FleetResult
+from maneuver_automaton.fleet import (
+    DrivenVerdict,
+    FleetLog,
+    FleetResult,
+    FleetStep,
+    verify_driven,
+)
 from maneuver_automaton.fleet.driven import whole_pieces
+from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.recording.values import (
     Curve,
@@ -18,12 +26,20 @@ from maneuver_automaton.recording.values import (
     Mover,
     Recording,
     Search,
+    Table,
+    asked_for,
     bodies_of,
+    effort_facts,
+    nearest_fact,
+    proven,
+    shown,
+    times_of,
     world_of,
 )
 
 STANDS = "stands"  # the name of what a vehicle does while it has nothing to do
 SHORT = 1e-9  # [s] that is no time
+MOST_NAMES = 4  # of vehicles in a cell
 
 
 def recorded(result: FleetResult | FleetLog) -> Recording | None:
@@ -72,22 +88,50 @@ def _planned(result: FleetResult, k: int) -> Mover:
 
 
 def _plan_facts(result: FleetResult) -> list[Fact]:
-    count, found = len(result.problem), len(result.plans)
-    number = str(count) if found == count else f"{found} of {count} with a plan"
-    facts = [Fact(label="vehicles", value=number)]
-    if found:
-        facts.append(Fact(label="sum", value=result.sum_s, unit="s"))
-        facts.append(Fact(label="last", value=result.last_s, unit="s"))
-        if math.isfinite(result.clearance_m):
-            facts.append(Fact(label="clearance", value=result.clearance_m, unit="m", digits=3))
+    proof = ""
     if result.gap is not None:
-        proven = f"at least {result.lower_bound:.6g}" if result.gap else "optimal"
-        facts.append(Fact(label="proven", value=proven))
-    return facts + _margin(result.problem.margin)
+        unit = " s of the last arrival" if result.objective == "last" else ""
+        proof = proven(result.lower_bound or 0.0, optimal=result.gap <= 0.0) + unit
+    facts = [
+        Fact(label="plans", value=f"{len(result.plans)} of {len(result.results)}"),
+        Fact(label="cost", value=result.cost, note=proof),
+    ]
+    if result.alone_cost:
+        facts.append(Fact(label="each alone", value=result.alone_cost, heads=False))
+    facts += _arrivals(result)
+    facts += _apart(result.clearance_m, result.problem.margin)
+    known = [one.clearance_m for one in result.results.values() if one.clearance_m is not None]
+    facts += clearance_facts(min(known, default=math.inf))
+    return [
+        *facts,
+        nearest_fact(result.closest),
+        Fact(label="order", value=", ".join(result.order), heads=False),
+        *effort_facts(result.timing_s, result.counts),
+        Fact(label="left out", value="; ".join(result.notes), heads=False),
+    ]
 
 
-def _margin(margin: float) -> list[Fact]:
-    return [Fact(label="margin", value=f"{margin:g} m")] if margin > 0.0 else []
+def _arrivals(result: FleetResult | FleetLog) -> list[Fact]:
+    return [
+        Fact(label="sum", value=result.sum_s, unit="s", heads=False),
+        Fact(label="last arrival", value=result.last_s, unit="s"),
+    ]
+
+
+def _apart(distance: float, margin: float) -> list[Fact]:
+    """The least distance of any two [m]; nothing if no two are there at once."""
+    if math.isinf(distance):
+        return []
+    kept = f" at least{asked_for(distance, margin)}"
+    return [Fact(label="apart", value=distance, unit="m", digits=3, more=kept)]
+
+
+def clearance_facts(distance: float) -> list[Fact]:
+    """The least distance of anybody to an obstacle [m]; nothing where there is none."""
+    if math.isinf(distance):
+        return []
+    near = " to the nearest obstacle"
+    return [Fact(label="clearance", value=distance, unit="m", digits=3, more=near, heads=False)]
 
 
 def _loop(log: FleetLog) -> Recording:
@@ -96,13 +140,9 @@ def _loop(log: FleetLog) -> Recording:
     times = np.minimum(log.times, last)
     total = np.where(np.isfinite(log.values), log.values, math.nan)
     total = np.append(total, 0.0 if log.reached else math.nan)[: log.times.size]
-    spent = np.zeros(log.times.size)
-    for name in fleet.names:
-        for step, cost in log.costs_of(name).items():
-            spent[step + 1] += cost
     curves = [
         Curve(label="value", time=times, value=total),
-        Curve(label="spent", time=times, value=np.cumsum(spent)),
+        Curve(label="spent", time=times, value=_spent(log)),
     ]
     curves += [
         Curve(label="value", time=times, value=_values(log, name), mover=name)
@@ -214,16 +254,114 @@ def _events(log: FleetLog) -> list[Event]:
     return rows
 
 
+def judged_facts(driven: DrivenVerdict, margin: float) -> tuple[Fact, ...]:
+    """What was measured again of all that a fleet drove in closed loop."""
+    count = len(driven.collisions)
+    return (
+        *(_apart(driven.distance_m, margin) if driven.closest else ()),
+        nearest_fact(driven.closest),
+        *clearance_facts(driven.clearance_m),
+        Fact(label="collisions", value=str(count) if count else "none"),
+    )
+
+
 def _loop_facts(log: FleetLog) -> list[Fact]:
-    broken, swaps = len(list(log.violations)), len(list(log.swaps))
-    facts = [
-        Fact(label="vehicles", value=f"{len(log.arrived_s)} of {len(log.problem)} arrived"),
-        Fact(label="sum", value=log.sum_s, unit="s"),
-        Fact(label="last", value=log.last_s, unit="s"),
-        Fact(label="cost", value=log.cost, digits=6),
-        Fact(label="steps", value=f"{len(log.steps)}, {swaps} exchange{'' if swaps == 1 else 's'}"),
+    broken = len({number for number, _ in log.violations})
+    swaps = len(list(log.swaps))
+    number = f"{len(log.arrived_s)} of {len(log.problem)} arrived"
+    steps = f"{len(log.steps)}, {swaps} exchange{'' if swaps == 1 else 's'}"
+    kept = f"broken in {broken} steps" if broken else "hold in every step"
+    duration = float(log.times[-1] - log.times[0])
+    return [
+        Fact(label="goals", value="reached" if log.reached else log.reason, heads=False),
+        Fact(label="vehicles", value=number),
+        Fact(label="cost", value=log.cost),
+        *_arrivals(log),
+        Fact(label="duration", value=duration, unit="s", heads=False),
+        Fact(label="steps", value=steps),
+        Fact(label="guarantees", value=kept),
+        *_apart(log.distance_m, log.problem.margin),
+        Fact(label="left out", value="; ".join(left_out(*log.problem.problems)), heads=False),
+        Fact(label="time per step", value=times_of(one.solve_s for one in log.steps), heads=False),
     ]
-    if math.isfinite(log.distance_m):
-        facts.append(Fact(label="nearest", value=log.distance_m, unit="m", digits=3))
-    facts += _margin(log.problem.margin)
-    return [*facts, Fact(label="guarantees", value=f"{broken} broken" if broken else "all kept")]
+
+
+def tables(result: FleetResult | FleetLog, driven: DrivenVerdict | None = None) -> list[Table]:
+    """Every vehicle; of a closed loop every step, and what was `driven` measured again."""
+    if isinstance(result, FleetLog):
+        return [_steps(result), _vehicles(result, driven or verify_driven(result))]
+    rows = [
+        [
+            name,
+            one.status.value,
+            shown(one.cost, 6),
+            "" if one.plan is None else f"{one.plan.start_time + one.plan.duration:.6g}",
+            shown(one.clearance_m, 3),
+            "" if one.plan is None else str(len(one.plan.primitives)),
+        ]
+        for name, one in result.results.items()
+    ]
+    columns = ("vehicle", "status", "cost", "arrival [s]", "clearance [m]", "primitives")
+    return [Table(columns=columns, rows=rows, numbers=(2, 3, 4, 5))]
+
+
+def _steps(log: FleetLog) -> Table:
+    rows = [
+        [
+            str(step.number),
+            f"{step.time:.6g}",
+            shown(value, 6),
+            f"{spent:.6g}",
+            shown(step.distance_m, 3),
+            _several([" and ".join(swap.names) for swap in step.swaps]),
+            str(len(step.asked)),
+            _happened(step),
+            f"{1e3 * step.solve_s:.2f}",
+        ]
+        for step, value, spent in zip(log.steps, log.values.tolist(), _spent(log), strict=False)
+    ]
+    columns = ("", "time [s]", "value", "spent", "apart [m]", "swaps", "asked", "events",
+               "solved [ms]")  # fmt: skip
+    return Table(columns=columns, rows=rows, numbers=(0, 1, 2, 3, 4, 6, 8))
+
+
+def _spent(log: FleetLog) -> Array:
+    """What all had spent at the times of the log."""
+    spent = np.zeros(log.times.size)
+    for name in log.problem.names:
+        for step, cost in log.costs_of(name).items():
+            spent[step + 1] += cost
+    return np.cumsum(spent)
+
+
+def _happened(step: FleetStep) -> str:
+    kinds = (
+        ("plan void", step.void),
+        ("not let in", step.refused),
+        ("broken", [one.guarantee.value for one in step.violations]),
+    )
+    return "; ".join(f"{what}: {_several(names)}" for what, names in kinds if names)
+
+
+def _several(names: Sequence[str]) -> str:
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
+
+
+def _vehicles(log: FleetLog, driven: DrivenVerdict) -> Table:
+    rows = []
+    for name in log.problem.names:
+        arrived = log.arrived_s.get(name)
+        status = "under way" if arrived is None else "arrived"
+        status = "broken down" if name in log.broken_down else status
+        rows.append([
+            name,
+            status if log.driven[name] or arrived is not None else "not there",
+            shown(arrived, 6),
+            f"{math.fsum(log.costs_of(name).values()):.6g}",
+            str(sum(name in swap.names for _, swap in log.swaps)),
+            f"{max((one.off_plan.get(name, 0.0) for one in log.steps), default=0.0):.2g}",
+            shown(driven.clearances_m[name], 3),
+        ])  # fmt: skip
+    columns = ("vehicle", "status", "arrival [s]", "cost", "swaps", "off plan [m]", "clearance [m]")
+    return Table(columns=columns, rows=rows, numbers=(2, 3, 4, 5, 6))

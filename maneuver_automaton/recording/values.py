@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,6 +20,10 @@ from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Bounds, Goal, Problem
 
+MOST_DIGITS = 6  # of a number in a heading
+MOST_PAIRS = 3  # that are named, the nearest first
+TIGHT_M = 1e-3  # [m] a clearance that is smaller is remarked on
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fact:
@@ -27,21 +31,45 @@ class Fact:
 
     Examples
     --------
-    >>> Fact(label="duration", value=3.14159, unit="s").text, Fact(label="goal", value="met").text
-    ('3.1416 s', 'met')
+    >>> Fact(label="duration", value=3.14159265, unit="s").text
+    '3.14159 s'
+    >>> Fact(label="cost", value=2.00000001, note="proven optimal", more=", at once").in_full
+    '2.00000001 (proven optimal), at once'
     """
 
     label: str
     value: float | str
     unit: str = ""
-    digits: int = 5
+    digits: int = 9  # of a number; a heading has at most six of them
+    note: str = ""  # said behind the value, in brackets
+    more: str = ""  # said behind that, where there is a line for each fact
+    heads: bool = True  # whether headings of pictures and pages have it
 
     @property
     def text(self) -> str:
-        """The value with its unit, as it is shown."""
-        if isinstance(self.value, str):
-            return self.value
-        return f"{self.value:.{self.digits}g} {self.unit}".rstrip()
+        """The value with its unit and the note, for a heading."""
+        return self._shown(min(self.digits, MOST_DIGITS))
+
+    @property
+    def in_full(self) -> str:
+        """All that is said, with all digits."""
+        return self._shown(self.digits) + self.more
+
+    def _shown(self, digits: int) -> str:
+        value = self.value
+        said = value if isinstance(value, str) else f"{value:.{digits}g} {self.unit}".rstrip()
+        return f"{said} ({self.note})" if self.note else said
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Table:
+    """Rows of a table of the terminal: of a word, of steps, of vehicles."""
+
+    title: str = ""
+    columns: tuple[str, ...]
+    rows: list[list[str]]
+    numbers: tuple[int, ...] = ()  # columns that hold numbers
+    instead: str = ""  # said where there is no row
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -287,6 +315,11 @@ class Recording:
     __repr__ = brief
 
     @property
+    def heading(self) -> tuple[Fact, ...]:
+        """The facts that head pictures and pages."""
+        return tuple(one for one in self.facts if one.heads)
+
+    @property
     def begin(self) -> float:
         """When the first may leave its start [s]."""
         return min(one.start_time for one in self.movers)
@@ -326,3 +359,65 @@ def _loosest(problems: tuple[Problem, ...]) -> Bounds:
         if len(known) == len(problems):
             sides[axis] = (min(low for low, _ in known), max(high for _, high in known))
     return Bounds(**sides)
+
+
+def proven(bound: float, *, optimal: bool) -> str:
+    """What a lower bound proves, in words.
+
+    Examples
+    --------
+    >>> proven(2.9512, optimal=False), proven(3.0, optimal=True)
+    ('proven: at least 2.9512', 'proven optimal')
+    """
+    return "proven optimal" if optimal else f"proven: at least {bound:.9g}"
+
+
+def asked_for(distance: float, margin: float) -> str:
+    """What is to be said of a least distance [m]: the margin, or that there is next to none.
+
+    Examples
+    --------
+    >>> asked_for(0.2, 0.1), asked_for(0.2, 0.0), asked_for(2e-5, 0.0)
+    (', 0.1 m asked for', '', ': less than 1 mm, as margin_m is 0')
+    """
+    if margin:
+        return f", {margin:g} m asked for"
+    return ": less than 1 mm, as margin_m is 0" if distance < TIGHT_M else ""
+
+
+def times_of(solve_s: Iterable[float]) -> str:
+    """What steps took [s], in words; empty if there is none."""
+    milliseconds = [1e3 * one for one in solve_s]
+    if not milliseconds:
+        return ""
+    return f"{np.median(milliseconds):.2f} ms median, {max(milliseconds):.2f} ms at most"
+
+
+def effort_facts(timing_s: Mapping[str, float], counts: Mapping[str, int]) -> list[Fact]:
+    """What an answer took, by the keys of its file as people say them."""
+
+    def spoken(key: str) -> str:
+        return key.replace("_", " ").replace("fcl", "FCL")
+
+    times = ", ".join(f"{spoken(key)} {seconds:.3f} s" for key, seconds in timing_s.items())
+    numbers = ", ".join(f"{spoken(key)} {count}" for key, count in counts.items())
+    return [
+        Fact(label="timing", value=times, heads=False),
+        Fact(label="counts", value=numbers, heads=False),
+    ]
+
+
+def shown(value: float | None, digits: int) -> str:
+    """A number in a cell; empty where it is none, or infinite."""
+    return "" if value is None or math.isinf(value) else f"{value:.{digits}g}"
+
+
+def nearest_fact(pairs: Sequence[Any]) -> Fact:
+    """Who come nearest to each other, a few pairs; each has two names, a distance and a time."""
+    said = "; ".join(map(pair_text, pairs[:MOST_PAIRS]))
+    return Fact(label="nearest", value=said, heads=False)
+
+
+def pair_text(one: Any) -> str:
+    """Who come nearest to each other, how near, and when."""
+    return f"{' and '.join(one.pair)} {one.distance_m:.3g} m at {one.time_s:.4g} s"

@@ -15,6 +15,7 @@ from maneuver_automaton.formats.plan_json import load_plan, load_result, plan_to
 from maneuver_automaton.optimal_control.ipopt import why_no_casadi
 from maneuver_automaton.planning import plan, plans
 from maneuver_automaton.problem import Problem, SearchSettings
+from maneuver_automaton.recording import recording_of
 from tests.inertia import CAR, resting, unicycle_automaton
 
 SAID = (
@@ -62,7 +63,7 @@ def test_a_result_says_so_and_so_do_files_and_tables(without_casadi, tmp_path, c
     assert_said(json.loads((tmp_path / "plan.json").read_text())["notes"])
     assert load_plan(tmp_path / "plan.json").notes == result.notes
     assert load_result(tmp_path / "plan.json", result.problem).notes == result.notes
-    print_result("a car", result, folder="out")
+    print_result("a car", [], recording_of(result).facts)
     assert " ".join(capsys.readouterr().out.split()).count(SAID) == 1
 
 

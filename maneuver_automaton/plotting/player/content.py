@@ -101,7 +101,7 @@ def content_of(recording: Recording) -> dict[str, Any]:
     motions += [_motion(one, way, recording, local, numbers[0]) for one, way in others.items()]
     content: dict[str, Any] = {
         "title": recording.title,
-        "facts": [(fact.label, fact.text) for fact in recording.facts],
+        "facts": [(fact.label, fact.text) for fact in recording.heading],
         "trims": trims,
         "motions": motions,
         "bodies": [],
