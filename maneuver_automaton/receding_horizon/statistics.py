@@ -14,9 +14,8 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Violation
-from maneuver_automaton.receding_horizon.simulation import simulate
+from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
 
 CHUNKS = 4  # per worker, so that a slow one is not waited for
 
