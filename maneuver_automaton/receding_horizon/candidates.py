@@ -224,25 +224,19 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
             for solution in result.solutions
         ]
         for one in sorted(found, key=lambda candidate: candidate.cost):
-            calm = steps == 1 or _share(one.plan, goal, settings.step) <= CALM
-            if calm and _stays(one.plan, goal):
-                return one
-            if second is None and _inside_at_steps(one.plan, goal, settings.step):
+            plan, begin = one.plan, one.plan.start_time
+            if steps == 1 or _share(plan.pose_at(begin + settings.step), goal) <= CALM:
+                samples = plan.sample(max_step_m=FINE, max_step_rad=FINE)
+                if all(within(pose, goal) for pose in samples.pose):
+                    return one
+            closings = settings.step * np.arange(1, math.ceil(plan.duration / settings.step) + 1)
+            poses = plan.pose_at(begin + closings)
+            if second is None and all(within(pose, goal) for pose in poses):
                 second = one
     return second
 
 
-def _share(plan: Plan, goal: Goal, step: float) -> float:
-    """How much of the tolerance is used up at the next step, 1 at the edge of the set."""
-    distance, turn = goal.off(plan.pose_at(plan.start_time + step))
+def _share(pose: Array, goal: Goal) -> float:
+    """How much of a goal's tolerance is used up at a pose, 1 at the edge of the set."""
+    distance, turn = goal.off(pose)
     return max(distance / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT))
-
-
-def _stays(plan: Plan, goal: Goal) -> bool:
-    samples = plan.sample(max_step_m=FINE, max_step_rad=FINE)
-    return all(within(pose, goal) for pose in samples.pose)
-
-
-def _inside_at_steps(plan: Plan, goal: Goal, step: float) -> bool:
-    times = plan.start_time + step * np.arange(1, math.ceil(plan.duration / step) + 1)
-    return all(within(pose, goal) for pose in plan.pose_at(times))

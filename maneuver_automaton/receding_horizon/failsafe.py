@@ -333,16 +333,7 @@ def mitigate(here: Problem, *, step: float, until: float, known: Sequence[Plan] 
     the library held for several moments and then stopped; a vehicle that cannot stop goes on with
     its last trim.
 
-    Parameters
-    ----------
-    here : Problem
-        Its margin does not count: contact alone does.
-    step : float
-        [s] of the loop.
-    until : float
-        [s] of the world's clock that is looked at.
-    known : sequence of Plan
-        From the problem's start, at its time.
+    The margin does not count: contact alone does, until a time [s] of the world's clock.
 
     Examples
     --------

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.lower_bound import Proving, in_costs, load_proofs
@@ -185,21 +185,13 @@ def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
     needed = (promised.least_rate + promised.rest_rate) * promised.step
     resting = now.plan.trims and now.plan.trims[0].is_rest
     cheap = now.applied_cost < needed - ACCURACY * (1.0 + needed)
-    if resting or (cheap and _time_moving(now) > moves):
+    moving = [not trim.is_rest for trim in now.plan.trims]
+    if resting or (cheap and float(now.plan.durations[moving].sum()) > moves):
         yield Violation(
             guarantee=Guarantee.LEAST_COST,
             reason=f"the step costs {now.applied_cost:.9g}, need at least {needed:.9g}: it rests "
             "before the goal",
         )
-
-
-def _time_moving(step: Step) -> float:
-    moving = [not trim.is_rest for trim in step.plan.trims]
-    return float(step.plan.durations[moving].sum()) if moving else 0.0
-
-
-if TYPE_CHECKING:
-    from maneuver_automaton.bounds import CostToGo
 
 
 @dataclass(slots=True, eq=False)

@@ -25,27 +25,13 @@ from maneuver_automaton.words import TimesStatus, solve_switching_times
 def rest_of(
     plan: Plan, after: float, *, start: Array | None = None, pad: Trim | None = None
 ) -> Plan:
-    """The rest of a plan after `after` seconds, from `start`; `pad` makes it last as long again.
+    """The rest of a plan after `after` seconds, from `start` (dof,); `pad` makes it last as long.
 
     Of a maneuver under way its end remains. This is the plan that makes the loop recursively
     feasible: where the goal was to be met after T, it is met after T - `after`, and the vehicle
     rests there.
 
     Source: the paper, Sec. 4, after Algorithm 14.
-
-    Parameters
-    ----------
-    plan : Plan
-    after : float
-        [s] that have passed since its start.
-    start : (dof,) array, optional
-        Where the vehicle is [m, m, rad(, m)]; if omitted, where the plan says.
-    pad : Trim, optional
-        A rest, appended for as long as has passed; a plan that ends in a rest stays in that.
-
-    Returns
-    -------
-    Plan
 
     Examples
     --------
@@ -191,21 +177,8 @@ def reanchored(
     ends exactly at the goal; with a fixed time, in it. A vehicle that does not switch at will may
     not get there exactly: its word with times that lead to within the goal's tolerance comes last.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its start is where the vehicle was measured.
-    plan : Plan
-        The plan that was about to be driven, from nearby; it ends at the goal, rest included.
-    goal : Goal
-    pad : Trim, optional
-        The rest that fills the remainder of a fixed time.
-    under_way : bool
-        Whether `plan` begins within a maneuver.
-
-    Yields
-    ------
-    Plan
+    The `plan` was about to be driven, from nearby, and may begin within a maneuver that is
+    `under_way`; `pad` is the rest that fills the remainder of a fixed time.
     """
     same = same_word(problem, plan, goal, pad=pad, under_way=under_way)
     if same is not None:

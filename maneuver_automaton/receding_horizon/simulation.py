@@ -202,7 +202,16 @@ def simulate(
         )
     begin = 0 if last is None else last.number + 1
     random = itertools.islice(draws(upset, problem.start.size), begin, None)  # after those used
-    track = _track(problem, upset, last)
+    where = np.array(problem.start)
+    track = _Track(
+        problem=problem,
+        upset=upset,
+        last=last,
+        measured=where if last is None or last.measured is None else last.measured,
+        poses=[where],
+        times=[problem.start_time if last is None else last.time + last.applied],
+        inside=[any(within(where, goal) for goal in problem.goals)],
+    )
     stops = controller.arrival is None and at_will  # where it likes
     arrived = track.inside[-1] and (
         _arrives(last, stops=stops)
@@ -253,7 +262,7 @@ class _Track:
         late, self.measured = self.measured, measured
         before = self.log[-1] if self.log else self.last
         if self.upset.delay and before is not None:  # the piece applied since is a group element
-            return _after(before, late)
+            return np.array(replace(before.piece, start=late).end)
         return measured
 
     def drive(self, *, audit: bool) -> None:
@@ -277,21 +286,7 @@ class _Track:
             where = np.array((group(where) @ group(push)).pose)
         self.poses.append(where)
         self.times.append(now.time + now.applied)
-        self.inside.append(_inside(self.problem, where))
-
-
-def _track(problem: Problem, upset: Disturbance, last: Step | None) -> _Track:
-    """The vehicle at the start of the loop, or after the last step of another one."""
-    where = np.array(problem.start)
-    return _Track(
-        problem=problem,
-        upset=upset,
-        last=last,
-        measured=where if last is None or last.measured is None else last.measured,
-        poses=[where],
-        times=[_begin(problem, last)],
-        inside=[_inside(problem, where)],
-    )
+        self.inside.append(any(within(where, goal) for goal in self.problem.goals))
 
 
 def _closed_loop(
@@ -300,7 +295,9 @@ def _closed_loop(
     log, driven, inside = track.log, track.driven, track.inside
     helpless = len(log) > len(driven)
     applied = log[:-1] if helpless else log
-    cost = log[-1].accumulated_cost if helpless else _spent(controller.last)
+    last, cost = controller.last, 0.0
+    if last is not None:
+        cost = last.accumulated_cost + (0.0 if helpless else last.applied_cost)
     value, reason, status, bound = 0.0, "", "reached", controller.most_steps
     if helpless:
         value, status = log[-1].lower_bound, "no_plan"
@@ -350,15 +347,6 @@ def _arrives(step: Step, *, stops: bool) -> bool:
     return left.duration <= NOTHING or not moves_on(left)
 
 
-def _spent(last: Step | None) -> float:
-    return 0.0 if last is None else last.accumulated_cost + last.applied_cost
-
-
-def _after(step: Step, start: Array) -> Array:
-    """Where the piece of a step leads from `start`."""
-    return np.array(replace(step.piece, start=start).end)
-
-
 def _audited(problem: Problem, piece: Plan) -> Audit:
     """A piece against the model's equations and the obstacles; it need not end at the goal."""
     return audit_plan(
@@ -380,11 +368,3 @@ def _judged(now: Step, driven: Audit) -> Step:
         return replace(now, clearance_m=clearance)
     hit = Violation(guarantee=Guarantee.NO_COLLISION, reason=driven.reason.split("; ")[-1])
     return replace(now, clearance_m=clearance, violations=(*now.violations, hit))
-
-
-def _inside(problem: Problem, pose: Array) -> bool:
-    return any(within(pose, goal) for goal in problem.goals)
-
-
-def _begin(problem: Problem, last: Step | None) -> float:
-    return problem.start_time if last is None else last.time + last.applied

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
 from maneuver_automaton.budget import Budget
@@ -39,19 +38,8 @@ ROUNDING = 1e-13  # relative, of a pose that was computed from a plan
 class Situation:
     """One step under way: all that is known before a search.
 
-    Parameters
-    ----------
-    settings : Settings
-    here : Problem
-        From where the vehicle was measured, at that time.
-    last : Step or None
-        The last step, as it was driven.
-    passed : float
-        [s] since the last step.
-    budget : Budget
-        Its time is for all of this step.
-    changed : bool
-        Whether other obstacles are seen than at the last step.
+    `here` starts where the vehicle was measured, `passed` seconds after the `last` step as it was
+    driven; `budget` is for all of this step; `changed`: other obstacles are seen than before.
     """
 
     def __init__(
@@ -84,11 +72,6 @@ class Situation:
             self.rounding = off <= ROUNDING * self.size
             self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
             self.busy = committed(last.plan, passed)
-
-    def is_near_optimal(self, kept: Candidate | None) -> bool:
-        """Whether the plan that is kept is proven to be near enough to the optimum, if asked."""
-        gap = self.settings.gap
-        return gap is not None and kept is not None and kept.cost - self.bound <= gap * kept.cost
 
     @cached_property
     def size(self) -> float:
@@ -182,20 +165,6 @@ class Situation:
             return plan
         return rested(plan, pad, total - plan.duration)
 
-    def exactly_at(self) -> int | None:
-        """Number of the goal at which the vehicle is, and may rest; None if at none."""
-        for index, goal in enumerate(self.here.goals if self.may_rest else ()):
-            if max(goal.off(self.here.start)) <= EXACT:
-                return index
-        return None
-
-    def ended_within(self) -> int | None:
-        """Number of the goal within whose tolerance the last plan is over; None if none is."""
-        if self.last is None or self.rest is None or moves_on(self.rest):
-            return None
-        index = self.last.goal_index
-        return index if within(self.here.start, self.here.goals[index]) else None
-
     def resting(self, index: int) -> Candidate:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
@@ -242,20 +211,6 @@ class Situation:
         for plan in reanchored(here, self.planned(), goal, pad=pad, under_way=under_way):
             yield plan, Origin.REANCHORED
 
-    def rest_within(self) -> Plan | None:
-        """The rest of the last plan as it is, if it ends within the tolerance of its goal."""
-        if self.rest is None or self.last is None:
-            return None
-        goal = self.here.goals[self.last.goal_index]
-        return self.rest if within(self.rest.end, goal) else None
-
-    def is_detour(self, plan: Plan) -> bool:
-        """Whether a plan drives other trims than the last one, or costs more."""
-        if self.last is None or self.rest is None:
-            return False
-        same = [trim.name for trim in plan.trims] == [trim.name for trim in self.rest.trims]
-        return not same or self.here.cost_of(plan) > self.last.value
-
     def best(self, kept: Candidate | None, found: Iterable[Candidate]) -> Candidate | None:
         """The cheapest; of equal ones, that which costs most at first; of these, the known word."""
         everything = [*found] if kept is None else [kept, *found]
@@ -292,20 +247,3 @@ class Situation:
     def flag(self, guarantee: Guarantee, reason: str) -> None:
         """Say that a guarantee is broken."""
         self.violations.append(Violation(guarantee=guarantee, reason=reason))
-
-    def flag_late(self, plan: Plan) -> None:
-        """Say so if a plan takes longer than it may."""
-        limit = self.longest
-        if limit is not None and plan.duration > limit * (1.0 + EXACT):
-            self.flag(
-                Guarantee.HORIZON,
-                f"no plan was found that takes at most {limit:g} s; the one applied takes "
-                f"{plan.duration:.6g} s",
-            )
-
-    def goal_within(self, pose: Array) -> int | None:
-        """Number of the goal that a pose is, to within its tolerances."""
-        for index, goal in enumerate(self.here.goals):
-            if within(pose, goal):
-                return index
-        return None

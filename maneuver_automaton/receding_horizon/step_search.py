@@ -15,7 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import committed
 from maneuver_automaton.planning.tracking import free_until
 from maneuver_automaton.problem import Horizon, Problem, moves
-from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, holding
+from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, holding, within
 from maneuver_automaton.receding_horizon.failsafe import (
     FailSafe,
     Mitigation,
@@ -24,7 +24,8 @@ from maneuver_automaton.receding_horizon.failsafe import (
     search_fail_safe,
 )
 from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, first_part
-from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
+from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on
+from maneuver_automaton.receding_horizon.settings import EXACT
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.search.limits import closed_bound
 
@@ -119,14 +120,22 @@ class StepSearch:
                 )
             return self._known_free(given)
         kept = self._kept()
-        found = [] if now.is_near_optimal(kept) else self.cheaper(kept)
+        gap = now.settings.gap
+        proven = gap is not None and kept is not None and kept.cost - now.bound <= gap * kept.cost
+        found = [] if proven else self.cheaper(kept)
         if now.settings.pieces:
             better = now.between_trims(kept, found)
             found = [*found, *(one for one in better if self.is_safe(one.plan))]
         best = now.best(kept, found) or self.otherwise()
         if best is None:
             return self._without_plan()
-        now.flag_late(best.plan)
+        limit, lasting = now.longest, best.plan.duration
+        if limit is not None and lasting > limit * (1.0 + EXACT):
+            now.flag(
+                Guarantee.HORIZON,
+                f"no plan was found that takes at most {limit:g} s; the one applied takes "
+                f"{lasting:.6g} s",
+            )
         return self._known_free(replace(best, shifted_value=None if kept is None else kept.cost))
 
     def is_safe(self, plan: Plan) -> bool:
@@ -151,15 +160,19 @@ class StepSearch:
 
     def _there(self) -> Candidate | None:
         """At the goal, or within it if that is to be held: rest, if that is safe."""
-        now = self.now
-        index = now.exactly_at()
-        inside = now.goal_within(now.here.start) if now.settings.hold and now.may_rest else None
-        if index is None and inside is not None:
-            held = holding(now.here, now.settings, inside)
+        now, here = self.now, self.here
+        goals = here.goals if now.may_rest else ()
+        exact = (n for n, goal in enumerate(goals) if max(goal.off(here.start)) <= EXACT)
+        index = next(exact, None)
+        if index is None and now.settings.hold:
+            index = next((n for n, goal in enumerate(goals) if within(here.start, goal)), None)
+            held = None if index is None else holding(here, now.settings, index)
             if held is not None and self.is_safe(held.plan):
                 return replace(held, shifted_value=held.cost, arrived=True)
-            index = inside
-        index = now.ended_within() if index is None else index
+        over = now.rest is not None and not moves_on(now.rest)
+        if index is None and now.last is not None and over:
+            before = now.last.goal_index
+            index = before if within(here.start, here.goals[before]) else None
         if index is None:
             return None
         there = now.resting(index)
@@ -171,18 +184,20 @@ class StepSearch:
         As it is, it may end within the goal's tolerance: that will do where no other is safe, and
         with inertia before a detour.
         """
-        now, last = self.now, self.now.last
-        if last is None or (now.here.moves and not last.decision.leads):
+        now, last, rest = self.now, self.now.last, self.now.rest
+        if last is None or rest is None or (now.here.moves and not last.decision.leads):
             return None
         safe: list[Candidate] = []
         for plan, origin in now.rests():
             if not self.is_safe(plan):
                 continue
-            safe.append(now.candidate(plan, last.goal_index, origin))
-            if self.improves or not now.is_detour(plan):
-                return safe[-1]
-        rest = now.rest_within() if not (safe and now.settings.at_will) else None
-        if rest is not None and self.is_safe(rest):
+            one = now.candidate(plan, last.goal_index, origin)
+            same = [trim.name for trim in plan.trims] == [trim.name for trim in rest.trims]
+            if self.improves or (same and now.here.cost_of(plan) <= last.value):
+                return one
+            safe.append(one)
+        near = within(rest.end, now.here.goals[last.goal_index])
+        if near and not (safe and now.settings.at_will) and self.is_safe(rest):
             return now.candidate(rest, last.goal_index, Origin.SHIFTED)
         return min(safe, key=lambda one: one.cost, default=None)
 

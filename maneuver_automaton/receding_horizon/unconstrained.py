@@ -18,6 +18,7 @@ from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, plain_
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
 
 MIXED_POSE_ORDERS = (4.0, 2.0, 4.0)
 NAMES = ("pose_weights", "control_weights", "pose_orders", "control_orders")
@@ -118,9 +119,6 @@ def _weighted(values: Array, weights: Array, orders: Array) -> Array:
             total = total + weights[k] * np.abs(column) ** orders[k]
     return total
 
-
-if TYPE_CHECKING:
-    from maneuver_automaton.receding_horizon._kernels_unconstrained import IntervalTables
 
 NODES = 5  # of the Gauss-Legendre rule on an interval: exact for polynomials of degree 9
 SIMILAR = 9  # trims of most similar twist that a change of two intervals tries
@@ -251,17 +249,15 @@ class UnconstrainedProblem:
         return int(np.argmin(self.cost.control_rates(self.automaton.controls)))
 
     @cached_property
-    def tables(self) -> IntervalTables:
+    def tables(self) -> kernels.IntervalTables:
         """Displacements and costs of an interval of each trim, for the kernels."""
-        from maneuver_automaton.receding_horizon._kernels_unconstrained import IntervalTables
-
         points, weights = np.polynomial.legendre.leggauss(NODES)
         step, twists = self.horizon.interval, self.automaton.body_velocities
         times = 0.5 * step * (points + 1.0)
         size = np.abs(twists).max(axis=0)
         scaled = twists / np.where(size > 0.0, size, 1.0)
         gaps = np.linalg.norm(scaled[:, None] - scaled, axis=-1)
-        return IntervalTables(
+        return kernels.IntervalTables(
             places=np.array(SE2.exp(times[:, None] * twists[:, None]).pose),
             ends=np.array(SE2.exp(step * twists).pose),
             weights=0.5 * step * weights,
@@ -313,10 +309,11 @@ def search_horizon(
     >>> search_horizon(problem, [0, 0, 0]).trims.tolist()
     [1, 1, 0, 0]
     """
-    from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
-
     effort, tables = search or HorizonSearch(), problem.tables
-    seen, n = problem.seen(_one_pose(pose)), problem.horizon.intervals
+    row = as_array("pose", pose, last=3)
+    if row.ndim != 1:
+        raise ValueError(f"pose: got shape {row.shape}, need one pose (3,)")
+    seen, n = problem.seen(row), problem.horizon.intervals
     words, costs = kernels.beam(tables, seen, n, effort.width, effort.growth, effort.same)
     guesses = [words[0]] if warm is None else [_sequence(problem, warm, count=n), words[0]]
     plans = []
@@ -327,20 +324,11 @@ def search_horizon(
 
 
 def _plan(problem: UnconstrainedProblem, seen: Array, sequence: IntArray) -> HorizonPlan:
-    from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
-
     poses, costs = np.empty((sequence.size + 1, 3)), np.empty(sequence.size)
     kernels.roll_out(problem.tables, seen, sequence, poses, costs)
     for array in (sequence, poses, costs):
         array.setflags(write=False)
     return HorizonPlan(trims=sequence, poses=poses, costs=costs)
-
-
-def _one_pose(pose: ArrayLike) -> Array:
-    row = as_array("pose", pose, last=3)
-    if row.ndim != 1:
-        raise ValueError(f"pose: got shape {row.shape}, need one pose (3,)")
-    return row
 
 
 def _sequence(problem: UnconstrainedProblem, trims: ArrayLike, *, count: int) -> IntArray:
