@@ -21,8 +21,7 @@ from maneuver_automaton.analysis.stability import (
     certified_intervals,
     check_closed_loop,
 )
-from maneuver_automaton.receding_horizon.unconstrained import search_horizon
-from maneuver_automaton.receding_horizon.unconstrained_loop import simulate_unconstrained
+from maneuver_automaton.receding_horizon.unconstrained import search_horizon, simulate_unconstrained
 from tests.receding_horizon.unconstrained_cases import (
     MIXED,
     PARKING,

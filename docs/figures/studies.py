@@ -38,7 +38,7 @@ from maneuver_automaton.receding_horizon import (
     UnconstrainedProblem,
     simulate_unconstrained,
 )
-from maneuver_automaton.receding_horizon.unconstrained_loop import UnconstrainedLoop
+from maneuver_automaton.receding_horizon.unconstrained import UnconstrainedLoop
 
 ROOT = Path(__file__).parents[2]
 COLORS = ("#0062b2", "#de7210", "#009e73", "#c879a6")

@@ -37,9 +37,8 @@ from maneuver_automaton.planning.tracking import PROVEN, PROVEN_SHARE
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import allowed, within
-from maneuver_automaton.receding_horizon.reanchoring import reanchored
+from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, reanchored
 from maneuver_automaton.receding_horizon.settings import switches_at_will
-from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on
 
 LEFT = 0.5  # share of a tolerance that is left at least
 CONTACT = 1e-9  # [m] what is closer touches

@@ -31,15 +31,15 @@ from maneuver_automaton.fleet.verdict import measured
 from maneuver_automaton.fleet.workers import Workers
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.receding_horizon.candidates import within
-from maneuver_automaton.receding_horizon.disturbance import (
+from maneuver_automaton.receding_horizon.rest_of_plan import moves_on
+from maneuver_automaton.receding_horizon.settings import switches_at_will
+from maneuver_automaton.receding_horizon.simulation import (
     Disturbance,
     Draw,
     as_driven,
     checked,
     draws,
 )
-from maneuver_automaton.receding_horizon.settings import switches_at_will
-from maneuver_automaton.receding_horizon.shifting import moves_on
 
 TOUCHES = 1e-9  # [m] what is closer touches
 NEVER: Mapping[str, float] = MappingProxyType({})

@@ -33,7 +33,7 @@ from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.problem import Goal, Problem, moves
-from maneuver_automaton.receding_horizon.shifting import followed_by
+from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import FirstPlan, first_plan

@@ -3,9 +3,8 @@
 from maneuver_automaton.receding_horizon.candidates import within as within
 from maneuver_automaton.receding_horizon.controller import ManeuverHorizon as ManeuverHorizon
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
-from maneuver_automaton.receding_horizon.disturbance import Disturbance as Disturbance
-from maneuver_automaton.receding_horizon.failsafe_search import FailSafe as FailSafe
-from maneuver_automaton.receding_horizon.failsafe_search import (
+from maneuver_automaton.receding_horizon.failsafe import FailSafe as FailSafe
+from maneuver_automaton.receding_horizon.failsafe import (
     search_fail_safe as search_fail_safe,
 )
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
@@ -16,7 +15,7 @@ from maneuver_automaton.receding_horizon.log import Guarantee as Guarantee
 from maneuver_automaton.receding_horizon.log import Origin as Origin
 from maneuver_automaton.receding_horizon.log import Step as Step
 from maneuver_automaton.receding_horizon.log import Violation as Violation
-from maneuver_automaton.receding_horizon.mixed_order_cost import MixedOrderCost as MixedOrderCost
+from maneuver_automaton.receding_horizon.simulation import Disturbance as Disturbance
 from maneuver_automaton.receding_horizon.simulation import simulate as simulate
 from maneuver_automaton.receding_horizon.statistics import Outcome as Outcome
 from maneuver_automaton.receding_horizon.statistics import Statistics as Statistics
@@ -24,13 +23,14 @@ from maneuver_automaton.receding_horizon.statistics import simulate_many as simu
 from maneuver_automaton.receding_horizon.unconstrained import FixedHorizon as FixedHorizon
 from maneuver_automaton.receding_horizon.unconstrained import HorizonPlan as HorizonPlan
 from maneuver_automaton.receding_horizon.unconstrained import HorizonSearch as HorizonSearch
+from maneuver_automaton.receding_horizon.unconstrained import MixedOrderCost as MixedOrderCost
+from maneuver_automaton.receding_horizon.unconstrained import (
+    UnconstrainedLoop as UnconstrainedLoop,
+)
 from maneuver_automaton.receding_horizon.unconstrained import (
     UnconstrainedProblem as UnconstrainedProblem,
 )
 from maneuver_automaton.receding_horizon.unconstrained import search_horizon as search_horizon
-from maneuver_automaton.receding_horizon.unconstrained_loop import (
-    UnconstrainedLoop as UnconstrainedLoop,
-)
-from maneuver_automaton.receding_horizon.unconstrained_loop import (
+from maneuver_automaton.receding_horizon.unconstrained import (
     simulate_unconstrained as simulate_unconstrained,
 )

@@ -1,26 +1,95 @@
-"""Plans that a step may apply, and the costs by which they are compared."""
+"""Plans that a step may apply, the costs by which they are compared, and their best pace."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+import re
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.cutting import first_times, last_times
-from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.receding_horizon.log import Origin, first_part
-from maneuver_automaton.receding_horizon.pace import at_best_pace, base_name
-from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.receding_horizon.shifting import (
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Goal, Horizon, Problem
+from maneuver_automaton.receding_horizon.log import Decision, Origin, first_part
+from maneuver_automaton.receding_horizon.rest_of_plan import (
     costliest_first,
     merged,
     moving_pieces,
     rest_of,
 )
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings
+from maneuver_automaton.refinement.effort import effort_report
+from maneuver_automaton.refinement.retiming import retime
+from maneuver_automaton.refinement.shooting import least_effort
+from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.limits import outside, stays_inside
-from maneuver_automaton.search.result import TIE
+from maneuver_automaton.search.result import TIE, plan_of
+
+PACE = re.compile(r"( x[-+.e0-9]+)+$")
+UNIFORM = 1e-9  # relative spread of an effort that counts as uniform
+
+
+def at_best_pace(problem: Problem, plan: Plan) -> Plan:
+    """A plan retimed to uniform effort in the same time, as far as limits allow.
+
+    Source: the paper, Prop. 15 and Cor. 19.
+    """
+    moving = [bool(trim.body_velocity.any()) for trim in plan.trims]
+    if not any(moving) or not isinstance(problem.cost, Cost):
+        return plan
+    better = retime(plan, problem.automaton.model, cost=problem.cost)
+    if not better.saving > 0.0:
+        return plan
+    trims = tuple(_named(problem.automaton, trim) for trim in better.after.trims)
+    return replace(better.after, trims=trims)
+
+
+def between_trims(problem: Problem, plan: Plan, pieces: int) -> Plan:
+    """A plan with controls between those of the library, in the same time, where it costs less."""
+    if not any(trim.body_velocity.any() for trim in plan.trims) or not isinstance(
+        problem.cost, Cost
+    ):
+        return plan
+    model = problem.automaton.model
+    known = np.array([trim.control for trim in problem.automaton.trims])
+    most = np.asarray(model.control_limits, dtype=np.float64)
+    limits = np.stack(
+        [np.maximum(known.min(axis=0), most[:, 0]), np.minimum(known.max(axis=0), most[:, 1])],
+        axis=-1,
+    )
+    return least_effort(plan, model, cost=problem.cost, limits=limits, pieces=pieces)
+
+
+def base_name(name: str) -> str:
+    """Name of the trim of the library that a trim at another pace comes from.
+
+    Examples
+    --------
+    >>> base_name("spin x0.5 x0.25"), base_name("ahead")
+    ('spin', 'ahead')
+    """
+    return PACE.sub("", name) if " x" in name else name
+
+
+def _named(automaton: Automaton, trim: Trim) -> Trim:
+    """The trim, named after the one of the library and how much faster it is."""
+    base = base_name(trim.name)
+    own = automaton.trims[automaton.index_of(base)].body_velocity
+    pace = float(trim.body_velocity @ own) / float(own @ own)
+    return replace(trim, name=base if pace == 1.0 else f"{base} x{pace:.6g}")
+
+
+def is_uniform(plan: Plan, cost: StageCost) -> bool:
+    """Whether a plan has the same quadratic effort all along."""
+    if not isinstance(cost, Cost) or not plan.trims:
+        return False
+    report = effort_report(plan, cost.effort_matrix)
+    return bool(report.spread <= UNIFORM) and bool(np.isfinite(report.mean))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -31,6 +100,10 @@ class Candidate:
     cost: float
     goal_index: int
     origin: Origin
+    shifted_value: float | None = None  # cost of the rest of the last plan
+    arrived: bool = False
+    decision: Decision | None = None  # None: told by the plan
+    free_until: float | None = None  # [s]
 
 
 def preference(
@@ -108,3 +181,62 @@ def within(pose: Array, goal: Goal) -> bool:
 
 def _moving(plan: Plan) -> list[str]:
     return [base_name(piece.name) for piece in moving_pieces(plan)]
+
+
+MOST_STEPS = 4  # that a plan within the goal's set may take
+ALTERNATIVES = 1  # costlier plans, of which one may stay in the set
+CALM = 0.5  # share of the tolerance that a plan of several steps may use up at the next step
+FINE = 0.01  # [m, rad] between the poses that are looked at
+
+
+def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | None:
+    """A plan to the middle of a goal's set within a step or a few.
+
+    The cheapest that stays in the set all along and does not linger at its edge, otherwise one that
+    is inside whenever the loop closes; None if there is neither, or trims are not switched at will.
+    """
+    if not settings.at_will:
+        return None
+    goal = here.goals[goal_index]
+    middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
+    second: Candidate | None = None
+    for steps in range(1, MOST_STEPS + 1):
+        limit = steps * settings.step
+        fixed = settings.pad_of(here) is not None
+        near = replace(
+            here,
+            goals=(middle,),
+            horizon=Horizon(time=limit) if fixed else Horizon(max_time=limit),
+            search=replace(here.search, method="insertion"),
+        )
+        results = search_goal(
+            near, middle, alternatives=ALTERNATIVES, budget=Budget.from_now(settings.time_limit)
+        )
+        found = [
+            candidate(
+                near,
+                settings,
+                plan_of(near, solution),
+                goal_index=goal_index,
+                origin=Origin.SEARCHED,
+            )
+            for result in results
+            for solution in result.solutions
+        ]
+        for one in sorted(found, key=lambda candidate: candidate.cost):
+            plan, begin = one.plan, one.plan.start_time
+            if steps == 1 or _share(plan.pose_at(begin + settings.step), goal) <= CALM:
+                samples = plan.sample(max_step_m=FINE, max_step_rad=FINE)
+                if all(within(pose, goal) for pose in samples.pose):
+                    return one
+            closings = settings.step * np.arange(1, math.ceil(plan.duration / settings.step) + 1)
+            poses = plan.pose_at(begin + closings)
+            if second is None and all(within(pose, goal) for pose in poses):
+                second = one
+    return second
+
+
+def _share(pose: Array, goal: Goal) -> float:
+    """How much of a goal's tolerance is used up at a pose, 1 at the edge of the set."""
+    distance, turn = goal.off(pose)
+    return max(distance / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT))

@@ -15,9 +15,15 @@ from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, AnyShape, as_obstacles
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.receding_horizon.candidates import cost_until, is_rest_of
-from maneuver_automaton.receding_horizon.decision import StepSearch, decide
-from maneuver_automaton.receding_horizon.guarantees import broken, promises, too_cheap
+from maneuver_automaton.receding_horizon.at_will import AmongObstacles, InFreeSpace, as_it_stands
+from maneuver_automaton.receding_horizon.candidates import (
+    Candidate,
+    cost_until,
+    is_rest_of,
+    is_uniform,
+)
+from maneuver_automaton.receding_horizon.failsafe import load_fail_safe
+from maneuver_automaton.receding_horizon.guarantees import LoopBounds, broken, promises, too_cheap
 from maneuver_automaton.receding_horizon.log import (
     Decision,
     Guarantee,
@@ -25,15 +31,24 @@ from maneuver_automaton.receding_horizon.log import (
     Step,
     Violation,
 )
-from maneuver_automaton.receding_horizon.pace import is_uniform
-from maneuver_automaton.receding_horizon.proving import LoopBounds
-from maneuver_automaton.receding_horizon.searches import load_search, started
+from maneuver_automaton.receding_horizon.over_maneuvers import (
+    OverManeuvers,
+    needs_maneuvers,
+    with_trims_at_ends,
+    within_its_margin,
+)
 from maneuver_automaton.receding_horizon.settings import (
     Settings,
     filling_rest,
     switches_at_will,
 )
-from maneuver_automaton.receding_horizon.situation import Chosen, Situation
+from maneuver_automaton.receding_horizon.situation import Situation
+from maneuver_automaton.receding_horizon.step_search import StepSearch
+from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
+from maneuver_automaton.search.choose import load_search as load_words
+from maneuver_automaton.search.choose import load_times_kernels
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
+from maneuver_automaton.search.linked_words import load_linked_words
 
 MOST_AHEAD = 10_000  # steps ahead for which a plan gets samples; later steps see to theirs
 
@@ -224,12 +239,12 @@ class RecedingHorizon:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
         here = self.problem.starting_at(pose, time=at, horizon=self._horizon(at))
-        now, search = started(
+        now, search = _started(
             self.settings, here, last, passed=passed, budget=budget, changed=changed
         )
         if self.proven is not None:
             now.bound = self._known(now)
-        self.last = self._logged(decide(now, search), search, now)
+        self.last = self._logged(search.decide(), search, now)
         control = self.last.control
         if control is None and self.settings.pad is not None:
             control = self.settings.pad.control
@@ -262,7 +277,7 @@ class RecedingHorizon:
         spent = cost_until(self.problem, plan, passed)
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
-    def _logged(self, chosen: Chosen, search: StepSearch, now: Situation) -> Step:
+    def _logged(self, chosen: Candidate, search: StepSearch, now: Situation) -> Step:
         here, last, delta = now.here, now.last, self.settings.step
         plan = chosen.plan
         if plan.maneuvers:
@@ -272,7 +287,7 @@ class RecedingHorizon:
         same = is_rest_of(plan, now.rest)
         decision = _decision(chosen, now, same=same)
         bound = self._bound(chosen, search, now)
-        value = chosen.value if decision.leads or search.knows_all else bound
+        value = chosen.cost if decision.leads or search.knows_all else bound
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
         step = Step(
             time=here.start_time,
@@ -327,10 +342,10 @@ class RecedingHorizon:
         if steady and step.decision.leads and not step.arrived:
             yield from too_cheap(self.promises, step)
 
-    def _bound(self, chosen: Chosen, search: StepSearch, now: Situation) -> float:
+    def _bound(self, chosen: Candidate, search: StepSearch, now: Situation) -> float:
         """No plan to any goal costs less."""
         if now.exhaustive:
-            return chosen.value
+            return chosen.cost
         if (
             self.settings.continuous
         ):  # trims at another pace may cost less than those of the library
@@ -339,7 +354,7 @@ class RecedingHorizon:
         least, moving = search.lower_bound(), now.as_it_moves
         if self.proven is None or moving is None:
             return least
-        proven = self.proven.prove(moving, chosen.value, _accumulated(now), now.budget)
+        proven = self.proven.prove(moving, chosen.cost, _accumulated(now), now.budget)
         return max(least, proven)
 
 
@@ -359,7 +374,7 @@ def _is_taken(violation: Violation, now: Situation) -> bool:
     return bool(now.off_plan or now.changed or violation.guarantee in before)
 
 
-def _decision(chosen: Chosen, now: Situation, *, same: bool) -> Decision:
+def _decision(chosen: Candidate, now: Situation, *, same: bool) -> Decision:
     """What a step decides, where the plan tells; `same`: its word is the last one."""
     if chosen.decision is not None:
         return chosen.decision
@@ -368,6 +383,48 @@ def _decision(chosen: Chosen, now: Situation, *, same: bool) -> Decision:
     if chosen.origin is not Origin.SEARCHED:
         return Decision.KEPT
     return Decision.IMPROVED if same and now.last.decision.leads else Decision.REPLANNED
+
+
+def _started(
+    settings: Settings,
+    here: Problem,
+    last: Step | None,
+    *,
+    passed: float,
+    budget: Budget,
+    changed: bool,
+) -> tuple[Situation, StepSearch]:
+    """A step under way, and where its plans come from; the parameters are those of `Situation`."""
+    maneuvers, broken = needs_maneuvers(here), ""
+    if maneuvers:
+        here = with_trims_at_ends(here)
+        if here.margin and here.obstacles and here.start.size == 3:
+            here, broken = within_its_margin(here)
+    elif here.obstacles:
+        here, broken = as_it_stands(here)
+    now = Situation(settings, here, last, passed=passed, budget=budget, changed=changed)
+    if broken:
+        now.flag(Guarantee.SAFETY, broken)
+    if maneuvers:
+        return now, OverManeuvers(now)
+    return now, AmongObstacles(now) if here.obstacles else InFreeSpace(now)
+
+
+def load_search(problem: Problem) -> None:
+    """Prepare the search of a step for a problem, before its clock runs."""
+    load_times_kernels()
+    if needs_maneuvers(problem):
+        load_linked_words()
+        if problem.obstacles or problem.zones:
+            load_maneuver_kernels()
+        if problem.moves:
+            load_fail_safe()
+    elif problem.obstacles:
+        load_lattice()
+        load_fail_safe()
+        cost_to_go_table(problem)
+    else:
+        load_words(problem)
 
 
 ManeuverHorizon = RecedingHorizon  # the name it has had for vehicles with inertia

@@ -1,4 +1,4 @@
-"""Guarantees of the paper for the closed loop, checked while it runs."""
+"""What the paper guarantees of a closed loop, and what is proven of it on the way."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton.bounds import CostToGo
+from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.lower_bound import Proving, in_costs, load_proofs
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.settings import switches_at_will
@@ -182,7 +185,8 @@ def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
     needed = (promised.least_rate + promised.rest_rate) * promised.step
     resting = now.plan.trims and now.plan.trims[0].is_rest
     cheap = now.applied_cost < needed - ACCURACY * (1.0 + needed)
-    if resting or (cheap and _time_moving(now) > moves):
+    moving = [not trim.is_rest for trim in now.plan.trims]
+    if resting or (cheap and float(now.plan.durations[moving].sum()) > moves):
         yield Violation(
             guarantee=Guarantee.LEAST_COST,
             reason=f"the step costs {now.applied_cost:.9g}, need at least {needed:.9g}: it rests "
@@ -190,6 +194,75 @@ def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
         )
 
 
-def _time_moving(step: Step) -> float:
-    moving = [not trim.is_rest for trim in step.plan.trims]
-    return float(step.plan.durations[moving].sum()) if moving else 0.0
+@dataclass(slots=True, eq=False)
+class LoopBounds:
+    """Functions that were proven on the way, and what has been driven since.
+
+    The way driven and any plan from here make one plan from where a function was proven: if it is
+    cheaper than the plan known then, it stays in the function's cells.
+    """
+
+    gap: float  # share of the value that is small enough
+    whole: CostToGo | None = None  # serves poses beside the way, too
+    finest: CostToGo | None = None  # serves poses on the way from where it was proven
+    since: float = 0.0  # cost accumulated there
+    least: float = 0.0  # cost of any plan from where that much was accumulated ...
+    at: float = 0.0
+
+    @classmethod
+    def ready(cls, gap: float) -> LoopBounds:
+        """Bounds of a loop that begins, with all that is to be compiled."""
+        load_proofs()
+        return cls(gap)
+
+    def forget(self) -> None:
+        """Other obstacles are seen: nothing holds any more."""
+        self.whole = self.finest = None
+        self.least = 0.0
+
+    def leave(self) -> None:
+        """The vehicle is off the plan: how it came here is not known."""
+        self.finest = None
+        self.least = 0.0
+
+    def known(self, here: Problem, accumulated: float) -> float:
+        """The best bound from here, after some cost of the whole loop; 0 if none is known."""
+        pose = here.start[:3]
+        driven = accumulated - self.since
+        beside = 0.0 if self.whole is None else self.whole.anywhere(pose)
+        on_the_way = 0.0 if self.finest is None else self.finest.after(pose, driven)
+        best = max(beside, on_the_way)
+        proven = in_costs(here, best) if best > 0.0 else 0.0
+        return max(proven, self.least - (accumulated - self.at))
+
+    def closed(self, value: float, bound: float) -> bool:
+        """Whether a value is near enough to a bound."""
+        return value < math.inf and value - bound <= self.gap * value
+
+    def prove(self, here: Problem, value: float, accumulated: float, budget: Budget) -> float:
+        """A better bound than that known, in the time that is left of a step."""
+        known = self.known(here, accumulated)
+        if value == math.inf or self.closed(value, known) or budget.is_over:
+            return known
+        watch = Watch(gap=self.gap, cost=value, bound=known)
+        proving = Proving(here, budget, watch)
+        proving.run()
+        for function in proving.functions:
+            if function.whole:
+                self.whole = function
+            if not function.priced:  # what a change between two steps costs is not counted
+                self.finest, self.since = function, accumulated
+        best = max(known, proving.bound(value).value)
+        self._note(here, best, accumulated)
+        return best
+
+    def _note(self, here: Problem, least: float, accumulated: float) -> None:
+        """Keep a bound of plans from here, for steps on the way.
+
+        Not where a switch or a change of direction between two steps has a price, which neither
+        step counts, nor for a fixed time, which every step begins anew.
+        """
+        cost = here.cost
+        priced = not isinstance(cost, Cost) or cost.switch or cost.direction_change
+        if not priced and here.horizon.time is None:
+            self.least, self.at = least, accumulated

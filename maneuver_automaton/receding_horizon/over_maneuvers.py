@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import committed, head_of
+from maneuver_automaton.automaton.cutting import head_of
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
@@ -22,15 +22,14 @@ from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.planning.needs import climbs_among_obstacles
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Horizon, Problem, moves
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
-from maneuver_automaton.receding_horizon.failsafe import LEAST_AHEAD, looked_at, settled
-from maneuver_automaton.receding_horizon.failsafe_search import FailSafe, search_fail_safe
-from maneuver_automaton.receding_horizon.log import Decision, Origin, first_part
-from maneuver_automaton.receding_horizon.mitigation import Mitigation
+from maneuver_automaton.receding_horizon.failsafe import FailSafe, Mitigation, settled
+from maneuver_automaton.receding_horizon.log import Decision, Origin
+from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
-from maneuver_automaton.receding_horizon.shifting import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.situation import Situation
+from maneuver_automaton.receding_horizon.step_search import LATE, StepSearch
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search.choose import search_insertion
@@ -42,47 +41,27 @@ from maneuver_automaton.search.result import TIE, plan_of
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
 PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
-LATE = 0.8  # share of a step's time after which no plan is searched where something moves
-SHARES = (1.0, 0.5, 0.25)  # of a step that a path to the goal is followed before it is left
 OTHERS = 3  # costlier words that are tried where the cheapest ones are not free
 HALVINGS = 10  # of a plan's duration, to find out when it is hit
 
 
-class OverManeuvers:
-    """A `StepSearch`: words of trims and maneuvers, then their lattice, checked by FCL."""
-
-    knows_all = False
-    improves = False
+class OverManeuvers(StepSearch):
+    """Words of trims and maneuvers, then their lattice, checked by FCL."""
 
     def __init__(self, now: Situation) -> None:
-        self.now = now
-        self.here = now.here
-        self.settings = now.settings
+        super().__init__(now)
         self.anew = now.here.moves or now.changed  # obstacles are not where they were
         self.reason = ""
-        self.until = looked_at(now.here, now.settings)  # [s] of the world's clock
-        self.unsafe: list[Plan] = []  # free plans that end where the vehicle cannot stay
-        self.tried: list[Plan] = []  # motions that are hit
-
-    @property
-    def free_until(self) -> float | None:
-        """Time [s] until which plans are proven collision-free; None where nothing moves."""
-        return self.until if self.here.moves else None
 
     def is_safe(self, plan: Plan) -> bool:
-        """Whether a plan stays inside the bounds, is free, and can be followed by a free motion.
-
-        The rest of the last plan, from where it had said the vehicle would be, was checked before.
-        """
+        """As of every step; the rest of the last plan, driven as it said, was checked before."""
         if plan is self.now.rest and self.now.off_plan == 0.0 and not self.anew:
             return True
-        if not allowed(self.here, plan):
-            return False
-        if not self._hit(plan) and self._may_stay(plan):
-            return True
-        if self.here.moves and not what_is_hit(self.here, plan, self.here.goals[0]):
-            self.unsafe.append(plan)
-        return False
+        return super().is_safe(plan)
+
+    def is_free(self, plan: Plan) -> bool:
+        """Whether all of a plan is free."""
+        return not what_is_hit(self.here, plan, self.here.goals[0])
 
     def _hit(self, plan: Plan, *, until: float = -math.inf) -> str:
         """The obstacle that a plan hits, or that comes to its end at rest; empty if there is none.
@@ -92,50 +71,36 @@ class OverManeuvers:
         last = self._last_trim(plan)
         if self.here.moves and last.is_rest:
             arrival = plan.start_time + plan.duration
-            plan = rested(plan, last, max(self._stand, until - arrival))
+            plan = rested(plan, last, max(self.stand, until - arrival))
         return what_is_hit(self.here, plan, self.here.goals[0])
 
     def _last_trim(self, plan: Plan) -> Trim:
         """The trim in which a plan ends; one without trims stays in that of the vehicle."""
         return plan.trims[-1] if plan.trims else self.now.trim
 
-    @property
-    def _stand(self) -> float:
-        """Time [s] that the end of a plan must stay free."""
-        return max(self.settings.stand, self.settings.step)
-
-    def _may_stay(self, plan: Plan) -> bool:
-        """Whether a vehicle that stands at the end of a free plan can stay, or go away in time."""
+    def may_end(self, plan: Plan) -> bool:
+        """Whether a plan is free, and a vehicle that stands at its end can stay, or go in time."""
+        if self._hit(plan):
+            return False
         last = self._last_trim(plan)
         if not self.here.moves or not last.is_rest:
             return True  # without rest the end of the plan is the end
-        stood = rested(plan, last, self._stand)
-        found = self._fail_safe_after(stood)
+        found = self.leaving(rested(plan, last, self.stand))
         return not self._hit(plan, until=self.until) if found is None else found.complete
 
-    def _fail_safe_after(self, plan: Plan) -> FailSafe | None:
-        """A motion from the end of a plan; None if the library lacks the trim in which it ends."""
-        here, name = self.here, plan.trims[-1].name
-        if name not in here.automaton.trim_names:
+    def leaving(self, piece: Plan) -> FailSafe | None:
+        """A fail-safe trajectory from the end of a piece; None if its trim is no trim of here."""
+        if not piece.trims or piece.trims[-1].name not in self.here.automaton.trim_names:
             return None
-        at = plan.start_time + plan.duration
-        there = replace(here, start=plan.end, start_time=at, start_trim=name)
-        until = max(self.until, at + LEAST_AHEAD)
-        return search_fail_safe(there, until=until, budget=self.now.budget)
+        at = piece.start_time + piece.duration
+        return self.fail_safe_from(piece.end, at, piece.trims[-1].name)
 
-    def _continued(self, plan: Plan, after: float) -> Plan | None:
-        """The first seconds of a plan, then a fail-safe trajectory; None if either is not free.
-
-        A maneuver that is under way then is driven to its end.
-        """
-        piece = first_part(plan, after + committed(plan, after))
-        if not piece.trims:
+    def continued(self, plan: Plan, after: float) -> Plan | None:
+        """The first seconds of a plan, then a fail-safe trajectory, if FCL finds nothing either."""
+        whole = super().continued(plan, after)
+        if whole is None or not allowed(self.here, whole) or self._hit(whole):
             return None
-        found = self._fail_safe_after(piece)
-        if found is None or not found.complete:
-            return None
-        whole = followed_by(piece, found.plan)
-        return whole if allowed(self.here, whole) and not self._hit(whole) else None
+        return whole
 
     @property
     def _for_plans(self) -> Budget:
@@ -149,7 +114,7 @@ class OverManeuvers:
         At first a planner is asked instead among obstacles: it looks at words too.
         """
         now, here = self.now, self.here
-        problem = self._onward()
+        problem = self.onward()
         if problem is None or (now.last is None and (here.obstacles or here.zones)):
             return []
         upper = math.inf  # bound of the cost of a plan
@@ -179,7 +144,7 @@ class OverManeuvers:
                     upper = cost
         return found
 
-    def _onward(self) -> Problem | None:
+    def onward(self) -> Problem | None:
         """The problem from the end of the committed part; None if the library lacks its trim."""
         onward = self.now.onward
         if onward is None:
@@ -203,7 +168,7 @@ class OverManeuvers:
         return self._planned() if found is None else found
 
     def _on_lattice(self) -> Candidate | None:
-        problem = self._onward()
+        problem = self.onward()
         return None if problem is None else self._best_on_lattice(problem, self.is_safe)
 
     def _best_on_lattice(
@@ -236,7 +201,7 @@ class OverManeuvers:
 
     def _planned(self, share: float = 1.0) -> Candidate | None:
         """The plan of a planner, from the end of the committed part on, in a share of the time."""
-        now, limit, problem = self.now, self.now.longest, self._onward()
+        now, limit, problem = self.now, self.now.longest, self.onward()
         if problem is None:
             return None
         if self.here.moves:  # a motion in one piece could not be left where something comes
@@ -266,11 +231,8 @@ class OverManeuvers:
         any case.
         """
         rest, here = self.now.rest, self.here
-        for plan in self._ambitions() if here.moves else ():
-            for share in SHARES:
-                towards = self._continued(plan, share * self.settings.step)
-                if towards is not None:
-                    yield towards, Decision.APPROACHED
+        if here.moves:
+            yield from self.approaches()
         motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
         kept = [plan for plan in motions if plan is not None and plan.trims]
         self.tried = [*kept]
@@ -281,20 +243,12 @@ class OverManeuvers:
             if here.moves and until == self.until:
                 yield from self._evasions()
 
-    def _ambitions(self) -> Iterator[Plan]:
-        """Plans to the goal that may be followed for a moment."""
-        yield from self.unsafe
-        now, onward = self.now, self._onward()
-        if now.last is not None and now.last.decision.leads and now.rest is not None:
-            yield now.rest
-        if onward is None or now.budget.is_over:
-            return
-        static = tuple(one for one in onward.obstacles if not moves(one))
-        anyhow = Horizon(max_trims=onward.horizon.max_trims, min_coast=onward.horizon.min_coast)
-        calm = replace(onward, obstacles=static, horizon=anyhow)
+    def heedless(self, calm: Problem) -> Plan | None:
+        """A plan to the goal of the problem without what moves in it: the lattice's first."""
+        if self.now.budget.is_over:
+            return None
         found = self._best_on_lattice(calm, lambda plan: allowed(self.here, plan), first=True)
-        if found is not None:
-            yield found.plan
+        return None if found is None else found.plan
 
     def _evasions(self) -> Iterator[tuple[Plan, Decision]]:
         """Motions from the end of the committed part that stay free, or from that of the last plan.
@@ -304,7 +258,7 @@ class OverManeuvers:
         for begun in (self._standing(0.0), self.now.rest):
             if begun is None or not begun.trims:
                 continue
-            found = self._fail_safe_after(begun)
+            found = self.leaving(begun)
             if found is None:
                 continue
             plan = followed_by(begun, found.plan)

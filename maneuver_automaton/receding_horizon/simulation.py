@@ -1,14 +1,17 @@
-"""The closed loop in simulation, and its log."""
+"""The closed loop in simulation, disturbed or not."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole, plain_numbers
+from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
@@ -20,15 +23,87 @@ from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
-from maneuver_automaton.receding_horizon.disturbance import (
-    Disturbance,
-    as_driven,
-    checked,
-    draws,
-)
 from maneuver_automaton.receding_horizon.failsafe import settled
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
-from maneuver_automaton.receding_horizon.shifting import moves_on
+from maneuver_automaton.receding_horizon.rest_of_plan import moves_on
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Disturbance:
+    """How a real vehicle departs from its plan; every random number comes from `seed`.
+
+    Noise shifts the pose after every step, as a person's push would: the place by a normal number
+    per axis, the heading by another. Measurement errors are seen by the controller alone. A push
+    is a displacement in the vehicle's own frame after the step of that number. A vehicle that
+    differs from its model has other body velocities: `twist_scale` times those of the library.
+    With `delay` 1 the controller sees every pose a step late, and plans from the predicted end of
+    the piece that is driven meanwhile.
+    """
+
+    position_m: float = 0.0  # standard deviation per axis and step
+    heading_rad: float = 0.0  # standard deviation per step
+    measured_position_m: float = 0.0  # standard deviation of the measurement
+    measured_heading_rad: float = 0.0
+    twist_scale: tuple[float, ...] | None = None  # (dof,) none if None
+    pushes: Mapping[int, tuple[float, ...]] = field(default_factory=lambda: MappingProxyType({}))
+    delay: int = 0  # steps, 0 or 1
+    seed: int = 0
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
+        for name in ("position_m", "heading_rad", "measured_position_m", "measured_heading_rad"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"disturbance: {name} must be at least 0, got {value}")
+        if self.delay not in (0, 1):
+            raise ValueError(f"disturbance: delay must be 0 or 1 steps, got {self.delay}")
+        if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
+            raise ValueError(
+                f"disturbance: seed must be a whole number of at least 0, got {self.seed}"
+            )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Draw:
+    """The random numbers of one step."""
+
+    noise: Array
+    measurement: Array
+
+    __repr__ = brief
+
+
+def checked(upset: Disturbance, dof: int) -> Disturbance:
+    """The disturbance, if it has as many components as the pose."""
+    if upset.twist_scale is not None:
+        as_array("disturbance: twist_scale", upset.twist_scale, last=dof)
+    for after, push in upset.pushes.items():
+        as_array(f"disturbance: push after step {after}", push, last=dof)
+    return upset
+
+
+def draws(upset: Disturbance, dof: int) -> Iterator[Draw]:
+    """Numbers for step after step: the same for a seed, whatever the loop does with them."""
+    rng = np.random.default_rng(upset.seed)
+    spread = np.full(dof, upset.position_m)
+    spread[2] = upset.heading_rad
+    blur = np.full(dof, upset.measured_position_m)
+    blur[2] = upset.measured_heading_rad
+    while True:
+        numbers = rng.standard_normal((2, dof))
+        yield Draw(spread * numbers[0], blur * numbers[1])
+
+
+def as_driven(piece: Plan, upset: Disturbance) -> Plan:
+    """A piece of plan as the disturbed vehicle drives it."""
+    if upset.twist_scale is None:
+        return piece
+    scale = as_array("disturbance: twist_scale", upset.twist_scale, last=piece.start.size)
+    trims = tuple(replace(trim, body_velocity=trim.body_velocity * scale) for trim in piece.trims)
+    return replace(piece, trims=trims)
+
 
 Seen = Callable[[int], Sequence[AnyObstacle | Shape]]
 
@@ -127,7 +202,16 @@ def simulate(
         )
     begin = 0 if last is None else last.number + 1
     random = itertools.islice(draws(upset, problem.start.size), begin, None)  # after those used
-    track = _track(problem, upset, last)
+    where = np.array(problem.start)
+    track = _Track(
+        problem=problem,
+        upset=upset,
+        last=last,
+        measured=where if last is None or last.measured is None else last.measured,
+        poses=[where],
+        times=[problem.start_time if last is None else last.time + last.applied],
+        inside=[any(within(where, goal) for goal in problem.goals)],
+    )
     stops = controller.arrival is None and at_will  # where it likes
     arrived = track.inside[-1] and (
         _arrives(last, stops=stops)
@@ -178,7 +262,7 @@ class _Track:
         late, self.measured = self.measured, measured
         before = self.log[-1] if self.log else self.last
         if self.upset.delay and before is not None:  # the piece applied since is a group element
-            return _after(before, late)
+            return np.array(replace(before.piece, start=late).end)
         return measured
 
     def drive(self, *, audit: bool) -> None:
@@ -202,21 +286,7 @@ class _Track:
             where = np.array((group(where) @ group(push)).pose)
         self.poses.append(where)
         self.times.append(now.time + now.applied)
-        self.inside.append(_inside(self.problem, where))
-
-
-def _track(problem: Problem, upset: Disturbance, last: Step | None) -> _Track:
-    """The vehicle at the start of the loop, or after the last step of another one."""
-    where = np.array(problem.start)
-    return _Track(
-        problem=problem,
-        upset=upset,
-        last=last,
-        measured=where if last is None or last.measured is None else last.measured,
-        poses=[where],
-        times=[_begin(problem, last)],
-        inside=[_inside(problem, where)],
-    )
+        self.inside.append(any(within(where, goal) for goal in self.problem.goals))
 
 
 def _closed_loop(
@@ -225,7 +295,9 @@ def _closed_loop(
     log, driven, inside = track.log, track.driven, track.inside
     helpless = len(log) > len(driven)
     applied = log[:-1] if helpless else log
-    cost = log[-1].accumulated_cost if helpless else _spent(controller.last)
+    last, cost = controller.last, 0.0
+    if last is not None:
+        cost = last.accumulated_cost + (0.0 if helpless else last.applied_cost)
     value, reason, status, bound = 0.0, "", "reached", controller.most_steps
     if helpless:
         value, status = log[-1].lower_bound, "no_plan"
@@ -275,15 +347,6 @@ def _arrives(step: Step, *, stops: bool) -> bool:
     return left.duration <= NOTHING or not moves_on(left)
 
 
-def _spent(last: Step | None) -> float:
-    return 0.0 if last is None else last.accumulated_cost + last.applied_cost
-
-
-def _after(step: Step, start: Array) -> Array:
-    """Where the piece of a step leads from `start`."""
-    return np.array(replace(step.piece, start=start).end)
-
-
 def _audited(problem: Problem, piece: Plan) -> Audit:
     """A piece against the model's equations and the obstacles; it need not end at the goal."""
     return audit_plan(
@@ -305,11 +368,3 @@ def _judged(now: Step, driven: Audit) -> Step:
         return replace(now, clearance_m=clearance)
     hit = Violation(guarantee=Guarantee.NO_COLLISION, reason=driven.reason.split("; ")[-1])
     return replace(now, clearance_m=clearance, violations=(*now.violations, hit))
-
-
-def _inside(problem: Problem, pose: Array) -> bool:
-    return any(within(pose, goal) for goal in problem.goals)
-
-
-def _begin(problem: Problem, last: Step | None) -> float:
-    return problem.start_time if last is None else last.time + last.applied

@@ -3,63 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
-from maneuver_automaton.receding_horizon.candidates import Candidate, candidate, preference, within
-from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, Step, Violation
-from maneuver_automaton.receding_horizon.pace import between_trims
-from maneuver_automaton.receding_horizon.reanchoring import (
-    distance,
+from maneuver_automaton.receding_horizon.candidates import (
+    Candidate,
+    between_trims,
+    candidate,
+    preference,
+    within,
+)
+from maneuver_automaton.receding_horizon.log import Guarantee, Origin, Step, Violation
+from maneuver_automaton.receding_horizon.rest_of_plan import (
     missed,
+    moves_on,
     reanchored,
+    rest_of,
+    rested,
     same_word,
 )
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.receding_horizon.shifting import moves_on, rest_of, rested
 from maneuver_automaton.search.result import TIE
 
 FINISHED = 2  # candidates of a step for which controls between those of the library are sought
 ROUNDING = 1e-13  # relative, of a pose that was computed from a plan
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Chosen:
-    """The result of a step."""
-
-    plan: Plan
-    goal_index: int
-    value: float
-    origin: Origin
-    shifted_value: float | None
-    arrived: bool = False
-    decision: Decision | None = None  # None: told by the plan
-    free_until: float | None = None  # [s]
-
-
 class Situation:
     """One step under way: all that is known before a search.
 
-    Parameters
-    ----------
-    settings : Settings
-    here : Problem
-        From where the vehicle was measured, at that time.
-    last : Step or None
-        The last step, as it was driven.
-    passed : float
-        [s] since the last step.
-    budget : Budget
-        Its time is for all of this step.
-    changed : bool
-        Whether other obstacles are seen than at the last step.
+    `here` starts where the vehicle was measured, `passed` seconds after the `last` step as it was
+    driven; `budget` is for all of this step; `changed`: other obstacles are seen than before.
     """
 
     def __init__(
@@ -92,11 +72,6 @@ class Situation:
             self.rounding = off <= ROUNDING * self.size
             self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
             self.busy = committed(last.plan, passed)
-
-    def is_near_optimal(self, kept: Candidate | None) -> bool:
-        """Whether the plan that is kept is proven to be near enough to the optimum, if asked."""
-        gap = self.settings.gap
-        return gap is not None and kept is not None and kept.cost - self.bound <= gap * kept.cost
 
     @cached_property
     def size(self) -> float:
@@ -161,26 +136,21 @@ class Situation:
         fixed = self.here.horizon.time is not None and self.settings.pad is None
         return self.settings.at_will and not fixed
 
-    def given(self, first: Plan) -> Chosen:
-        """The plan that the first step was told to apply."""
-        here = self.here
-        plan = self.filled(replace(first, start=here.start, start_time=here.start_time))
+    def given(self, first: Plan) -> Candidate:
+        """The plan that the first step was told to apply, which may not take too long."""
+        here, limit = self.here, self.longest
+        if limit is not None and first.duration > limit * (1.0 + EXACT):
+            raise ValueError(
+                f"receding horizon: first takes {first.duration:g} s, need at most {limit:g} s"
+            )
+        plan = self.padded(replace(first, start=here.start, start_time=here.start_time))
         for index, goal in enumerate(here.goals):
             if missed(plan, goal) <= EXACT * self.size:
-                return self.as_chosen(self.candidate(plan, index, Origin.FIRST), None)
+                return self.candidate(plan, index, Origin.FIRST)
         raise ValueError(
             f"receding horizon: first ends at {plan.end.round(9).tolist()}, need a plan that ends "
             "at the goal"
         )
-
-    def filled(self, plan: Plan) -> Plan:
-        """A plan that takes no longer than it may, with rest for the remainder of a fixed time."""
-        limit = self.longest
-        if limit is not None and plan.duration > limit * (1.0 + EXACT):
-            raise ValueError(
-                f"receding horizon: first takes {plan.duration:g} s, need at most {limit:g} s"
-            )
-        return self.padded(plan)
 
     @property
     def longest(self) -> float | None:
@@ -195,31 +165,7 @@ class Situation:
             return plan
         return rested(plan, pad, total - plan.duration)
 
-    def as_chosen(self, best: Candidate, shifted_value: float | None) -> Chosen:
-        """A candidate as the result of the step."""
-        return Chosen(
-            plan=best.plan,
-            goal_index=best.goal_index,
-            value=best.cost,
-            origin=best.origin,
-            shifted_value=shifted_value,
-        )
-
-    def exactly_at(self) -> int | None:
-        """Number of the goal at which the vehicle is, and may rest; None if at none."""
-        for index, goal in enumerate(self.here.goals if self.may_rest else ()):
-            if distance(self.here.start, goal) <= EXACT:
-                return index
-        return None
-
-    def ended_within(self) -> int | None:
-        """Number of the goal within whose tolerance the last plan is over; None if none is."""
-        if self.last is None or self.rest is None or moves_on(self.rest):
-            return None
-        index = self.last.goal_index
-        return index if within(self.here.start, self.here.goals[index]) else None
-
-    def resting(self, index: int) -> Chosen:
+    def resting(self, index: int) -> Candidate:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
         total = here.horizon.time
@@ -228,15 +174,15 @@ class Situation:
             plan = self.rest
         elif total is not None and pad is not None:
             plan = rested(plan, pad, total)
-        elif pad is not None and distance(here.start, here.goals[index]) > EXACT:
+        elif pad is not None and max(here.goals[index].off(here.start)) > EXACT:
             plan = rested(plan, pad, self.settings.step)
         value = here.cost_of(plan)
         shifted = None if self.rest is None else min(value, here.cost_of(self.rest))
         self.exhaustive = True
-        return Chosen(
+        return Candidate(
             plan=plan,
             goal_index=index,
-            value=value,
+            cost=value,
             origin=Origin.FIRST if self.last is None else Origin.SHIFTED,
             shifted_value=shifted,
             arrived=True,
@@ -264,20 +210,6 @@ class Situation:
             return
         for plan in reanchored(here, self.planned(), goal, pad=pad, under_way=under_way):
             yield plan, Origin.REANCHORED
-
-    def rest_within(self) -> Plan | None:
-        """The rest of the last plan as it is, if it ends within the tolerance of its goal."""
-        if self.rest is None or self.last is None:
-            return None
-        goal = self.here.goals[self.last.goal_index]
-        return self.rest if within(self.rest.end, goal) else None
-
-    def is_detour(self, plan: Plan) -> bool:
-        """Whether a plan drives other trims than the last one, or costs more."""
-        if self.last is None or self.rest is None:
-            return False
-        same = [trim.name for trim in plan.trims] == [trim.name for trim in self.rest.trims]
-        return not same or self.here.cost_of(plan) > self.last.value
 
     def best(self, kept: Candidate | None, found: Iterable[Candidate]) -> Candidate | None:
         """The cheapest; of equal ones, that which costs most at first; of these, the known word."""
@@ -315,20 +247,3 @@ class Situation:
     def flag(self, guarantee: Guarantee, reason: str) -> None:
         """Say that a guarantee is broken."""
         self.violations.append(Violation(guarantee=guarantee, reason=reason))
-
-    def flag_late(self, plan: Plan) -> None:
-        """Say so if a plan takes longer than it may."""
-        limit = self.longest
-        if limit is not None and plan.duration > limit * (1.0 + EXACT):
-            self.flag(
-                Guarantee.HORIZON,
-                f"no plan was found that takes at most {limit:g} s; the one applied takes "
-                f"{plan.duration:.6g} s",
-            )
-
-    def goal_within(self, pose: Array) -> int | None:
-        """Number of the goal that a pose is, to within its tolerances."""
-        for index, goal in enumerate(self.here.goals):
-            if within(pose, goal):
-                return index
-        return None

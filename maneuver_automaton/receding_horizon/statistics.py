@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -14,9 +14,8 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Violation
-from maneuver_automaton.receding_horizon.simulation import simulate
+from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
 
 CHUNKS = 4  # per worker, so that a slow one is not waited for
 
@@ -150,12 +149,14 @@ def simulate_many(
         raise ValueError(f"got {len(poses)} starts and {len(seeds)} seeds, need one of each")
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
-    n_chunks = 1 if jobs == 1 and scheduler is None and progress is None else CHUNKS * max(jobs, 4)
-    chunks = [chunk for chunk in _chunks(cases, n_chunks) if chunk]
-    settings = _Settings(
+    at_once = jobs == 1 and scheduler is None and progress is None
+    n_chunks = min(1 if at_once else CHUNKS * max(jobs, 4), len(cases))
+    parts = np.array_split(np.arange(len(cases)), n_chunks)
+    chunks = [[cases[k] for k in part] for part in parts]
+    closed = partial(
+        simulate,
         step=step,
         steps=steps,
-        disturbance=Disturbance() if disturbance is None else disturbance,
         margin=margin,
         time_limit=time_limit,
         stay=stay,
@@ -164,8 +165,9 @@ def simulate_many(
         gap=gap,
         audit=audit,
     )
+    upset = Disturbance() if disturbance is None else disturbance
     done: list[Outcome] = []
-    work = partial(_outcomes, problem, settings=settings)
+    work = partial(_outcomes, problem, upset=upset, closed=closed)
     results = in_parallel(work, chunks, jobs=jobs, scheduler=scheduler, ends_early=True)
     for outcomes in results:
         done += outcomes
@@ -176,53 +178,20 @@ def simulate_many(
     return Statistics(outcomes=tuple(done))
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Settings:
-    step: float
-    steps: int
-    disturbance: Disturbance
-    margin: float
-    time_limit: float
-    stay: bool
-    retimed: bool
-    pieces: int
-    gap: float | None
-    audit: bool
-
-
-Case = tuple[Array, int]
-
-
-def _chunks(cases: Sequence[Case], n: int) -> Iterator[list[Case]]:
-    for indices in np.array_split(np.arange(len(cases)), min(n, max(len(cases), 1))):
-        yield [cases[k] for k in indices]
-
-
-def _outcomes(problem: Problem, cases: Sequence[Case], *, settings: _Settings) -> list[Outcome]:
+def _outcomes(
+    problem: Problem,
+    cases: Sequence[tuple[Array, int]],
+    *,
+    upset: Disturbance,
+    closed: Callable[..., ClosedLoop],
+) -> list[Outcome]:
     """Outcomes of loops one after the other, without one that a signal cut short."""
     done: list[Outcome] = []
     for pose, seed in cases:
         if not stopped():
-            outcome = _outcome(problem, pose, seed, settings)
-            done += [] if stopped() else [outcome]
+            loop = closed(replace(problem, start=pose), disturbance=replace(upset, seed=seed))
+            done += [] if stopped() else [outcome_of(loop, seed=seed)]
     return done
-
-
-def _outcome(problem: Problem, pose: Array, seed: int, settings: _Settings) -> Outcome:
-    loop = simulate(
-        replace(problem, start=pose),
-        step=settings.step,
-        steps=settings.steps,
-        disturbance=replace(settings.disturbance, seed=seed),
-        margin=settings.margin,
-        time_limit=settings.time_limit,
-        stay=settings.stay,
-        retimed=settings.retimed,
-        pieces=settings.pieces,
-        gap=settings.gap,
-        audit=settings.audit,
-    )
-    return outcome_of(loop, seed=seed)
 
 
 def outcome_of(loop: ClosedLoop, *, seed: int = 0) -> Outcome:

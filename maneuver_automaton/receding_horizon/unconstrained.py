@@ -18,10 +18,107 @@ from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, plain_
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.receding_horizon.mixed_order_cost import MixedOrderCost
+from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
 
-if TYPE_CHECKING:
-    from maneuver_automaton.receding_horizon._kernels_unconstrained import IntervalTables
+MIXED_POSE_ORDERS = (4.0, 2.0, 4.0)
+NAMES = ("pose_weights", "control_weights", "pose_orders", "control_orders")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MixedOrderCost:
+    """``q1 |x|^a1 + q2 |y|^a2 + q3 |heading|^a3 + sum r_i |u_i|^b_i``, of poses seen from the goal.
+
+    A small offset y to the side is reached by speeds and headings of the size of its square root.
+    With orders 4, 2, 4 and controls of order 4 all terms shrink alike, so that driving pays however
+    small the offset is; with order 2 throughout it does not.
+
+    Source: Worthmann, Mehrez, Zanon, Mann, Gosine, Diehl (2016), *Model predictive control of
+    nonholonomic mobile robots without stabilizing constraints and costs*; why squares fail: Müller,
+    Worthmann (2017), *Quadratic costs do not always work in MPC*.
+
+    Parameters
+    ----------
+    pose_weights : (3,) array
+        Positive weights of x, y and heading.
+    control_weights : (n_u,) array
+        Positive weights of the controls.
+    pose_orders : (3,) array
+        Exponents of x, y and heading, at least 1.
+    control_orders : (n_u,) array, optional
+        Exponents of the controls, at least 1; 4 for all if omitted.
+
+    Examples
+    --------
+    >>> cost = MixedOrderCost(pose_weights=[1.0, 5.0, 0.1], control_weights=[0.5, 0.05])
+    >>> cost.rates([0.0, 2.0, 0.0], [1.0, 0.0]).tolist()
+    20.5
+    """
+
+    pose_weights: Array
+    control_weights: Array
+    pose_orders: Array = field(default_factory=lambda: np.array(MIXED_POSE_ORDERS))
+    control_orders: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if np.size(self.control_orders) == 0:
+            object.__setattr__(self, "control_orders", np.full(np.shape(self.control_weights), 4.0))
+        for name in NAMES:
+            freeze(self, name, last=3 if name.startswith("pose") else None)
+            values = getattr(self, name)
+            least = 0.0 if name.endswith("weights") else 1.0
+            good = values > 0.0 if name.endswith("weights") else values >= 1.0
+            if values.ndim != 1 or not good.all():
+                need = "positive" if least == 0.0 else "at least 1"
+                raise ValueError(f"mixed-order cost: {name} must be {need}, got {values.tolist()}")
+        if self.control_orders.shape != self.control_weights.shape:
+            raise ValueError(
+                f"mixed-order cost: got {self.control_orders.size} control_orders for "
+                f"{self.control_weights.size} control_weights, need one each"
+            )
+
+    @classmethod
+    def quadratic(cls, pose_weights: ArrayLike, control_weights: ArrayLike) -> MixedOrderCost:
+        """The usual cost: order 2 throughout.
+
+        Examples
+        --------
+        >>> MixedOrderCost.quadratic([1, 1, 1], [1, 1]).rates([0, 0, 0], [0.5, 0]).tolist()
+        0.25
+        """
+        weights = as_array("mixed-order cost: control_weights", control_weights)
+        return cls(
+            pose_weights=as_array("mixed-order cost: pose_weights", pose_weights),
+            control_weights=weights,
+            pose_orders=np.full(3, 2.0),
+            control_orders=np.full(weights.shape, 2.0),
+        )
+
+    def pose_rates(self, poses: ArrayLike) -> Array:
+        """Cost per second (...,) of being at poses (..., 3) seen from the goal [m, m, rad]."""
+        return _weighted(as_array("poses", poses, last=3), self.pose_weights, self.pose_orders)
+
+    def control_rates(self, controls: ArrayLike) -> Array:
+        """Cost per second (...,) of controls (..., n_u)."""
+        rows = as_array("controls", controls, last=self.control_weights.size)
+        return _weighted(rows, self.control_weights, self.control_orders)
+
+    def rates(self, poses: ArrayLike, controls: ArrayLike) -> Array:
+        """Cost per second (...,) at poses (..., 3) from the goal, under controls (..., n_u)."""
+        return self.pose_rates(poses) + self.control_rates(controls)
+
+
+def _weighted(values: Array, weights: Array, orders: Array) -> Array:
+    """Sum of ``weight |value| ** order`` over the last axis; squares are multiplied out."""
+    total = np.zeros(values.shape[:-1])
+    for k in range(weights.size):
+        column = values[..., k]
+        if orders[k] in (2.0, 4.0):
+            square = column * column
+            total = total + weights[k] * (square if orders[k] == 2.0 else square * square)
+        else:
+            total = total + weights[k] * np.abs(column) ** orders[k]
+    return total
+
 
 NODES = 5  # of the Gauss-Legendre rule on an interval: exact for polynomials of degree 9
 SIMILAR = 9  # trims of most similar twist that a change of two intervals tries
@@ -152,17 +249,15 @@ class UnconstrainedProblem:
         return int(np.argmin(self.cost.control_rates(self.automaton.controls)))
 
     @cached_property
-    def tables(self) -> IntervalTables:
+    def tables(self) -> kernels.IntervalTables:
         """Displacements and costs of an interval of each trim, for the kernels."""
-        from maneuver_automaton.receding_horizon._kernels_unconstrained import IntervalTables
-
         points, weights = np.polynomial.legendre.leggauss(NODES)
         step, twists = self.horizon.interval, self.automaton.body_velocities
         times = 0.5 * step * (points + 1.0)
         size = np.abs(twists).max(axis=0)
         scaled = twists / np.where(size > 0.0, size, 1.0)
         gaps = np.linalg.norm(scaled[:, None] - scaled, axis=-1)
-        return IntervalTables(
+        return kernels.IntervalTables(
             places=np.array(SE2.exp(times[:, None] * twists[:, None]).pose),
             ends=np.array(SE2.exp(step * twists).pose),
             weights=0.5 * step * weights,
@@ -214,10 +309,11 @@ def search_horizon(
     >>> search_horizon(problem, [0, 0, 0]).trims.tolist()
     [1, 1, 0, 0]
     """
-    from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
-
     effort, tables = search or HorizonSearch(), problem.tables
-    seen, n = problem.seen(_one_pose(pose)), problem.horizon.intervals
+    row = as_array("pose", pose, last=3)
+    if row.ndim != 1:
+        raise ValueError(f"pose: got shape {row.shape}, need one pose (3,)")
+    seen, n = problem.seen(row), problem.horizon.intervals
     words, costs = kernels.beam(tables, seen, n, effort.width, effort.growth, effort.same)
     guesses = [words[0]] if warm is None else [_sequence(problem, warm, count=n), words[0]]
     plans = []
@@ -228,20 +324,11 @@ def search_horizon(
 
 
 def _plan(problem: UnconstrainedProblem, seen: Array, sequence: IntArray) -> HorizonPlan:
-    from maneuver_automaton.receding_horizon import _kernels_unconstrained as kernels
-
     poses, costs = np.empty((sequence.size + 1, 3)), np.empty(sequence.size)
     kernels.roll_out(problem.tables, seen, sequence, poses, costs)
     for array in (sequence, poses, costs):
         array.setflags(write=False)
     return HorizonPlan(trims=sequence, poses=poses, costs=costs)
-
-
-def _one_pose(pose: ArrayLike) -> Array:
-    row = as_array("pose", pose, last=3)
-    if row.ndim != 1:
-        raise ValueError(f"pose: got shape {row.shape}, need one pose (3,)")
-    return row
 
 
 def _sequence(problem: UnconstrainedProblem, trims: ArrayLike, *, count: int) -> IntArray:
@@ -257,3 +344,83 @@ def _sequence(problem: UnconstrainedProblem, trims: ArrayLike, *, count: int) ->
                 f"sequence: got trim {row}, need an index from 0 to {len(problem.automaton) - 1}"
             )
     return rows
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class UnconstrainedLoop:
+    """The closed loop: k steps, and the horizon's value before and after each."""
+
+    poses: Array  # (k + 1, 3) of the world [m, m, rad]
+    trims: IntArray  # (k, applied) indices, one per interval
+    stage_costs: Array  # (k,) of the driven pieces
+    values: Array  # (k + 1,) of the horizon at each pose
+    settled: bool  # whether standing still is the best sequence at the last pose
+
+    @property
+    def cost(self) -> float:
+        """Cost of the whole loop."""
+        return float(self.stage_costs.sum())
+
+
+def simulate_unconstrained(
+    problem: UnconstrainedProblem,
+    start: ArrayLike,
+    *,
+    steps: int,
+    search: HorizonSearch | None = None,
+) -> UnconstrainedLoop:
+    """The closed loop from a `start` (3,) of the world, for `steps` steps or until it settles.
+
+    Each search begins with the sequence before it, shifted by the driven piece and filled up with
+    the trim whose control is cheapest. It settles where standing still is the best sequence found:
+    from there on every step would be the same.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Automaton
+    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton.receding_horizon.unconstrained import MixedOrderCost
+    >>> from maneuver_automaton.receding_horizon.unconstrained import FixedHorizon
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)})
+    >>> cost = MixedOrderCost(pose_weights=[1, 1, 1], control_weights=[0.1, 1])
+    >>> horizon = FixedHorizon(interval=0.5, intervals=4)
+    >>> problem = UnconstrainedProblem(robot, [1, 0, 0], cost=cost, horizon=horizon)
+    >>> loop = simulate_unconstrained(problem, [0, 0, 0], steps=9)
+    >>> loop.settled, loop.poses[:, 0].tolist()
+    (True, [0.0, 0.5, 1.0])
+    """
+    if steps < 1:
+        raise ValueError(f"steps: got {steps}, need at least 1")
+    applied, twists = problem.horizon.applied, problem.automaton.body_velocities
+    drive = SE2.exp(problem.horizon.interval * twists)
+    pose = SE2(as_array("start", start, last=3))
+    plan = search_horizon(problem, pose.pose, search=search)
+    poses, values = [pose.pose], [plan.value]
+    trims: list[IntArray] = []
+    costs: list[float] = []
+    while len(trims) < steps and not _stands_still(plan, twists):
+        for trim in plan.trims[:applied]:
+            pose = pose @ SE2(drive.pose[trim])
+        trims.append(plan.trims[:applied])
+        costs.append(float(plan.costs[:applied].sum()))
+        plan = search_horizon(problem, pose.pose, warm=shifted(problem, plan), search=search)
+        poses.append(pose.pose)
+        values.append(plan.value)
+    return UnconstrainedLoop(
+        poses=np.array(poses),
+        trims=np.array(trims, dtype=np.int64).reshape(-1, applied),
+        stage_costs=np.array(costs),
+        values=np.array(values),
+        settled=_stands_still(plan, twists),
+    )
+
+
+def shifted(problem: UnconstrainedProblem, plan: HorizonPlan) -> IntArray:
+    """The rest of a sequence after its applied intervals, filled up with the cheapest trim (n,)."""
+    applied = problem.horizon.applied
+    fill = np.full(applied, problem.least_trim, dtype=np.int64)
+    return np.concatenate([plan.trims[applied:], fill])
+
+
+def _stands_still(plan: HorizonPlan, twists: Array) -> bool:
+    return not twists[plan.trims].any()

@@ -16,7 +16,7 @@ from maneuver_automaton.formats.statement import MapFile, Statement
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.disturbance import Disturbance
+from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.combining import combined, own_scenario
 from maneuver_automaton.scenario.fleet_schema import (
     OWN,
@@ -216,8 +216,8 @@ def without_fleet(document: Document) -> tuple[Document, FleetPart, FleetLoopPar
 
 def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> None:
     """Raise where the loop of a file does not suit its vehicles."""
-    from maneuver_automaton.receding_horizon.disturbance import checked as matched
     from maneuver_automaton.receding_horizon.settings import switches_at_will
+    from maneuver_automaton.receding_horizon.simulation import checked as matched
 
     loop = file.receding_horizon
     for k, one in enumerate(file.vehicles):

@@ -17,7 +17,7 @@ from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.receding_horizon.disturbance import Disturbance
+from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (

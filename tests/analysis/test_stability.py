@@ -22,8 +22,7 @@ from maneuver_automaton.analysis.suboptimality import continuous_index, discrete
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.receding_horizon.unconstrained import search_horizon
-from maneuver_automaton.receding_horizon.unconstrained_loop import simulate_unconstrained
+from maneuver_automaton.receding_horizon.unconstrained import search_horizon, simulate_unconstrained
 from tests.receding_horizon.unconstrained_cases import (
     MIXED,
     QUADRATIC,

@@ -11,7 +11,6 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, Origin, Step
-from maneuver_automaton.receding_horizon.reanchoring import distance
 from tests.search.cases import TABLE_2, robot
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -42,7 +41,7 @@ def totals(loop: ClosedLoop) -> Array:
 
 def off_goal(loop: ClosedLoop, step: Step) -> float:
     """How far the plan of a step ends from its goal [m or rad]."""
-    return distance(step.plan.end, loop.problem.goals[step.goal_index])
+    return max(loop.problem.goals[step.goal_index].off(step.plan.end))
 
 
 def made_up(problem: Problem, **changed) -> Step:

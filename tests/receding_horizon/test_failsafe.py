@@ -10,7 +10,7 @@ from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.receding_horizon import search_fail_safe
-from maneuver_automaton.receding_horizon.mitigation import mitigate
+from maneuver_automaton.receding_horizon.failsafe import mitigate
 from tests.inertia import unicycle_automaton
 from tests.matrix.vehicles import VEHICLES
 from tests.receding_horizon.scenes import among, cannot_stop, crossing, moving_obstacle

@@ -9,7 +9,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import RecedingHorizon, Step
-from maneuver_automaton.receding_horizon.in_free_space import InFreeSpace
+from maneuver_automaton.receding_horizon.at_will import InFreeSpace
 from maneuver_automaton.search import free_insertion
 from tests.receding_horizon.loops import EFFORT
 from tests.search.cases import compiled_only

@@ -31,7 +31,7 @@ from maneuver_automaton.receding_horizon import (
     over_maneuvers,
     simulate,
 )
-from maneuver_automaton.receding_horizon.shifting import rested
+from maneuver_automaton.receding_horizon.rest_of_plan import rested
 from tests.inertia import ROBOT, car_automaton, resting, unicycle_automaton
 from tests.matrix.vehicles import VEHICLES
 from tests.search.cases import compiled_only

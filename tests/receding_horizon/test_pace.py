@@ -12,7 +12,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Horizon
 from maneuver_automaton.receding_horizon import Guarantee, promises, simulate
-from maneuver_automaton.receding_horizon.pace import (
+from maneuver_automaton.receding_horizon.candidates import (
     at_best_pace,
     base_name,
     between_trims,

@@ -7,7 +7,7 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.receding_horizon import RecedingHorizon, proving
+from maneuver_automaton.receding_horizon import RecedingHorizon, guarantees
 from tests import scenes
 
 SLOT = replace(scenes.parallel_slot(6.5), cost=ma.Cost(length=1.0))
@@ -28,12 +28,12 @@ def driven(controller, steps, *, beside=0.0):
 def test_what_a_step_has_proven_serves_the_next(monkeypatch):
     proofs = []
 
-    class Counted(proving.Proving):
+    class Counted(guarantees.Proving):
         def run(self, **more):
             proofs.append(self.problem)
             super().run(**more)
 
-    monkeypatch.setattr(proving, "Proving", Counted)
+    monkeypatch.setattr(guarantees, "Proving", Counted)
     log = driven(RecedingHorizon(SLOT, step=0.3, gap=0.15, time_limit=30.0), 3)
     assert len(proofs) == 1
     for step in log:
@@ -55,7 +55,7 @@ def test_off_the_plan_the_way_proves_nothing():
 def test_what_is_priced_between_two_steps_is_not_taken_for_driven(price):
     """Neither step counts it, so a bound less what was driven would be too high."""
     for more, kept in ({price: 0.1}, False), ({}, True):
-        bounds = proving.LoopBounds(gap=0.9)
+        bounds = guarantees.LoopBounds(gap=0.9)
         problem = replace(SLOT, cost=ma.Cost(length=1.0, **more))
         assert bounds.prove(problem, 9.0, 0.0, Budget.from_now(30.0)) > 6.0
         assert (bounds.least > 0.0) is kept

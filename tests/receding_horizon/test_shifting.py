@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.receding_horizon.shifting import NOTHING, commute, costliest_first, rest_of
+from maneuver_automaton.receding_horizon.rest_of_plan import (
+    NOTHING,
+    commute,
+    costliest_first,
+    rest_of,
+)
 from tests.compare import assert_same_motion
 from tests.quickly import draws
 from tests.search.cases import TABLE_2, helicopter, robot

@@ -10,14 +10,15 @@ from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.receding_horizon.mixed_order_cost import MixedOrderCost
 from maneuver_automaton.receding_horizon.unconstrained import (
     FixedHorizon,
     HorizonSearch,
+    MixedOrderCost,
     UnconstrainedProblem,
     search_horizon,
+    shifted,
+    simulate_unconstrained,
 )
-from maneuver_automaton.receding_horizon.unconstrained_loop import shifted, simulate_unconstrained
 from tests.receding_horizon.unconstrained_cases import (
     MIXED,
     PARKING,

@@ -6,8 +6,11 @@ import numpy as np
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.receding_horizon.mixed_order_cost import MixedOrderCost
-from maneuver_automaton.receding_horizon.unconstrained import FixedHorizon, UnconstrainedProblem
+from maneuver_automaton.receding_horizon.unconstrained import (
+    FixedHorizon,
+    MixedOrderCost,
+    UnconstrainedProblem,
+)
 
 SPEED, TURN_RATE = 1.0, np.pi / 4  # greatest of every library [m/s, rad/s]
 POSE_WEIGHTS, CONTROL_WEIGHTS = (1.0, 1.0, 0.1), (1.0, 0.1)

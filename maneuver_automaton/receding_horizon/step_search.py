@@ -1,0 +1,267 @@
+"""The search of a step: keep the rest of the last plan, find a cheaper one, or do no harm.
+
+`StepSearch.decide` is the one sequence for every vehicle and every world. Where plans come from,
+and what proves that they are free, is said by its kinds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import committed
+from maneuver_automaton.planning.tracking import free_until
+from maneuver_automaton.problem import Horizon, Problem, moves
+from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, holding, within
+from maneuver_automaton.receding_horizon.failsafe import (
+    FailSafe,
+    Mitigation,
+    looked_at,
+    mitigate,
+    search_fail_safe,
+)
+from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, first_part
+from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on
+from maneuver_automaton.receding_horizon.settings import EXACT
+from maneuver_automaton.receding_horizon.situation import Situation
+from maneuver_automaton.search.limits import closed_bound
+
+LEAST_AHEAD = 1e-9  # [s] that a fail-safe trajectory covers at least
+LATE = 0.8  # share of a step's time after which no path to the goal is searched
+SHARES = (1.0, 0.5, 0.25)  # of how far a path to the goal is followed before it is left
+NEARLY = 0.98  # of the free part of a path, after which there is room to stand
+
+
+class StepSearch:
+    """One step: which plans lead to the goal, which are safe, and what is driven otherwise.
+
+    All plans start with the committed part of the last one. A kind says `may_end`, `is_free`,
+    `cheaper`, `otherwise`, `why_none` and `fail_safe`.
+    """
+
+    knows_all = False  # whether there is no plan, in whatever time, where none is found
+    improves = False  # whether it starts from the plan that is kept, so that any safe one will do
+
+    def __init__(self, now: Situation) -> None:
+        self.now = now
+        self.here = now.here
+        self.settings = now.settings
+        self.stand = max(now.settings.stand, now.settings.step)  # [s] that the end must stay free
+        self.until = looked_at(now.here, now.settings)  # [s] of the world's clock
+        # time [s] until which plans are proven collision-free; None if nothing can come
+        self.free_until = self.until if now.here.moves else None
+        self.unsafe: list[Plan] = []  # free plans that end where the vehicle cannot stay
+        self.tried: list[Plan] = []  # motions that are not free for long enough
+
+    # --- what a kind says ---
+
+    def is_free(self, plan: Plan) -> bool:
+        """Whether all of a plan is free."""
+        raise NotImplementedError
+
+    def may_end(self, plan: Plan) -> bool:
+        """Whether a plan is free, and the vehicle may stay at its end or leave it safely."""
+        raise NotImplementedError
+
+    def cheaper(self, kept: Candidate | None) -> list[Candidate]:
+        """Safe plans, which may cost less than the one that is kept."""
+        raise NotImplementedError
+
+    def otherwise(self) -> Candidate | None:
+        """A safe plan where none is kept and none was found: late, or from a longer search."""
+        raise NotImplementedError
+
+    def why_none(self) -> str:
+        """Why there is no plan to the goal."""
+        raise NotImplementedError
+
+    def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
+        """Fail-safe trajectories with their decisions; the first one is driven."""
+        raise NotImplementedError
+
+    def leaving(self, piece: Plan) -> FailSafe | None:
+        """A fail-safe trajectory from the end of a piece of plan; None if there can be none."""
+        raise NotImplementedError
+
+    def heedless(self, calm: Problem) -> Plan | None:
+        """A plan to the goal of the problem without what moves in it."""
+        raise NotImplementedError
+
+    def onward(self) -> Problem | None:
+        """The problem that a search is asked; None if there is none."""
+        return self.here
+
+    def mitigation(self) -> Mitigation:
+        """The motion that collides last, where none is safe."""
+        return mitigate(self.here, step=self.settings.step, until=self.until, known=self.tried)
+
+    def lower_bound(self) -> float:
+        """No plan to any goal costs less."""
+        return min(closed_bound(self.here, goal) for goal in self.here.goals)
+
+    # --- the decision ---
+
+    def decide(self) -> Candidate:
+        """The plan to apply."""
+        now = self.now
+        there = self._there()
+        if there is not None:
+            return self._known_free(there)
+        first = now.settings.first
+        if now.last is None and first is not None:
+            given = now.given(first)
+            if not self.is_safe(given.plan):
+                raise ValueError(
+                    "receding horizon: first hits an obstacle, or ends where one comes; need a "
+                    "plan that is free"
+                )
+            return self._known_free(given)
+        kept = self._kept()
+        gap = now.settings.gap
+        proven = gap is not None and kept is not None and kept.cost - now.bound <= gap * kept.cost
+        found = [] if proven else self.cheaper(kept)
+        if now.settings.pieces:
+            better = now.between_trims(kept, found)
+            found = [*found, *(one for one in better if self.is_safe(one.plan))]
+        best = now.best(kept, found) or self.otherwise()
+        if best is None:
+            return self._without_plan()
+        limit, lasting = now.longest, best.plan.duration
+        if limit is not None and lasting > limit * (1.0 + EXACT):
+            now.flag(
+                Guarantee.HORIZON,
+                f"no plan was found that takes at most {limit:g} s; the one applied takes "
+                f"{lasting:.6g} s",
+            )
+        return self._known_free(replace(best, shifted_value=None if kept is None else kept.cost))
+
+    def is_safe(self, plan: Plan) -> bool:
+        """Whether a plan stays inside the bounds, is free, and can be followed by a free motion."""
+        if not allowed(self.here, plan):
+            return False
+        if self.may_end(plan):
+            return True
+        if self.here.moves and self.is_free(plan):
+            self.unsafe.append(plan)
+        return False
+
+    def _known_free(self, chosen: Candidate) -> Candidate:
+        """What is applied, with the time until which it is known to be free [s].
+
+        A plan that ends in motion was looked at to its end alone.
+        """
+        until, plan = self.free_until, chosen.plan
+        if until is not None and plan.trims and not plan.trims[-1].is_rest:
+            until = min(until, plan.start_time + plan.duration)
+        return replace(chosen, free_until=until)
+
+    def _there(self) -> Candidate | None:
+        """At the goal, or within it if that is to be held: rest, if that is safe."""
+        now, here = self.now, self.here
+        goals = here.goals if now.may_rest else ()
+        exact = (n for n, goal in enumerate(goals) if max(goal.off(here.start)) <= EXACT)
+        index = next(exact, None)
+        if index is None and now.settings.hold:
+            index = next((n for n, goal in enumerate(goals) if within(here.start, goal)), None)
+            held = None if index is None else holding(here, now.settings, index)
+            if held is not None and self.is_safe(held.plan):
+                return replace(held, shifted_value=held.cost, arrived=True)
+        over = now.rest is not None and not moves_on(now.rest)
+        if index is None and now.last is not None and over:
+            before = now.last.goal_index
+            index = before if within(here.start, here.goals[before]) else None
+        if index is None:
+            return None
+        there = now.resting(index)
+        return there if self.is_safe(there.plan) else None
+
+    def _kept(self) -> Candidate | None:
+        """The first safe rest of the last plan that is no detour; else the cheapest that is safe.
+
+        As it is, it may end within the goal's tolerance: that will do where no other is safe, and
+        with inertia before a detour.
+        """
+        now, last, rest = self.now, self.now.last, self.now.rest
+        if last is None or rest is None or (now.here.moves and not last.decision.leads):
+            return None
+        safe: list[Candidate] = []
+        for plan, origin in now.rests():
+            if not self.is_safe(plan):
+                continue
+            one = now.candidate(plan, last.goal_index, origin)
+            same = [trim.name for trim in plan.trims] == [trim.name for trim in rest.trims]
+            if self.improves or (same and now.here.cost_of(plan) <= last.value):
+                return one
+            safe.append(one)
+        near = within(rest.end, now.here.goals[last.goal_index])
+        if near and not (safe and now.settings.at_will) and self.is_safe(rest):
+            return now.candidate(rest, last.goal_index, Origin.SHIFTED)
+        return min(safe, key=lambda one: one.cost, default=None)
+
+    # --- where no safe plan leads to the goal from here, now ---
+
+    def _without_plan(self) -> Candidate:
+        now = self.now
+        if not now.here.moves or (now.last is not None and now.last.decision.leads):
+            now.flag(Guarantee.FEASIBILITY, self.why_none())
+        for plan, decision in self.fail_safe():
+            return self._known_free(self._leading_nowhere(plan, decision))
+        least = self.mitigation()
+        now.flag(Guarantee.SAFETY, least.reason)
+        harmful = self._leading_nowhere(least.plan, Decision.MITIGATED)
+        return replace(harmful, free_until=least.contact)
+
+    def _leading_nowhere(self, plan: Plan, decision: Decision) -> Candidate:
+        last = self.now.last
+        return Candidate(
+            plan=plan,
+            cost=math.inf,
+            goal_index=0 if last is None else last.goal_index,
+            origin=Origin.SHIFTED if plan is self.now.rest else Origin.SEARCHED,
+            decision=decision,
+        )
+
+    def approaches(self) -> Iterator[tuple[Plan, Decision]]:
+        """Beginnings of paths to the goal, each with a fail-safe trajectory after it."""
+        for plan in self.ambitions():
+            # what stands still leaves no reason to go on in steps
+            moving = self.here.moves
+            reach = self.settings.step if moving else NEARLY * free_until(self.here, plan)
+            for share in SHARES:
+                towards = self.continued(plan, share * reach)
+                if towards is not None:
+                    yield towards, Decision.APPROACHED
+
+    def ambitions(self) -> Iterator[Plan]:
+        """Paths to the goal that may be followed for a moment, or as far as they are free."""
+        now, onward = self.now, self.onward()
+        yield from self.unsafe
+        if now.last is not None and now.last.decision.leads and now.rest is not None:
+            yield now.rest
+        if onward is None:
+            return
+        static = tuple(one for one in onward.obstacles if not moves(one))
+        anyhow = Horizon(max_trims=onward.horizon.max_trims, min_coast=onward.horizon.min_coast)
+        plan = self.heedless(replace(onward, obstacles=static, horizon=anyhow))
+        if plan is not None:
+            yield plan
+
+    def continued(self, plan: Plan, after: float) -> Plan | None:
+        """The first seconds of a plan, then a fail-safe trajectory; None if either is not free.
+
+        A maneuver that is under way then is driven to its end.
+        """
+        piece = first_part(plan, after + committed(plan, after))
+        then = self.leaving(piece)
+        return followed_by(piece, then.plan) if then is not None and then.complete else None
+
+    def fail_safe_from(self, pose: Array, time: float, trim: str | None = None) -> FailSafe:
+        """A motion from a pose and a time that is free for as long as is looked ahead."""
+        there = replace(self.here, start=pose, start_time=time)
+        if trim is not None:
+            there = replace(there, start_trim=trim)
+        until = max(self.until, time + LEAST_AHEAD)
+        return search_fail_safe(there, until=until, budget=self.now.budget)
