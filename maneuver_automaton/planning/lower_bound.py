@@ -16,12 +16,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import as_number, as_whole
-from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
 from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
@@ -241,15 +238,6 @@ class Proving:
         """Whether to polish what there is: time for that is kept back."""
         late = self.budget.elapsed > POLISHING * self.budget.seconds or self._over()
         return late or (self.max_work is not None and work >= self.max_work)
-
-
-@functools.cache
-def load_proofs() -> None:
-    """Compile or load what proofs need, before the clock runs."""
-    robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)})
-    tiny = Problem(robot, [0, 0, 0], [1, 0.2, 0.1], obstacles=Box([1, 1], [9, 9]))
-    for _ in proofs_of(tiny, incumbent=lambda: 2.0, ends=lambda _work: True):
-        pass
 
 
 def known_bound(problem: Problem) -> LowerBound:

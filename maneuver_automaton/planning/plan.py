@@ -13,6 +13,7 @@ from typing import Any
 from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
 from maneuver_automaton.planning.free_space import plan_by_words
@@ -135,9 +136,7 @@ def plan_in(
         raise ValueError(f"gap must be a share from 0 to below 1, got {gap}")
     _load(problem, workspace)
     if gap is not None:
-        from maneuver_automaton.planning.lower_bound import load_proofs
-
-        load_proofs()
+        load_kernels("cells")
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
@@ -275,9 +274,7 @@ def _load_all(problem: Problem, workspace: Workspace) -> None:
         load_steps(problem, workspace)
         return
     if guarded:
-        from maneuver_automaton.refinement.ready import load_lattice
-
-        load_lattice()
+        load_kernels("lattice", "improvement")
     load_search(problem)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import POLISHED, UNFINISHED, Likeness
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.bounds import least_price_per_metre
@@ -21,12 +22,11 @@ from maneuver_automaton.planning.polishing import load_polishing, why_not_polish
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import follows_paths, kinematic_problem
-from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
-from maneuver_automaton.search.choose import load_insertion_kernels, load_search, load_times_kernels
+from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_trims import stands_for_more
-from maneuver_automaton.search.linked_words import ALPHABET, load_linked_words
+from maneuver_automaton.search.linked_words import ALPHABET
 from maneuver_automaton.search.word_setup import word_setup
 
 BY_TIME = Cost(time=1.0)  # one value: what is prepared for it is found again
@@ -81,13 +81,13 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
     steps = steps_of(problem)
     if steps.at_will and problem.start.size > 3:
         load_search(problem)
-        load_maneuver_kernels()
+        load_kernels("lattice", "improvement")
         return
-    load_lattice()
+    load_kernels("lattice", "improvement")
     if steps.at_will:
         cost_to_go_table(problem, prepared=workspace.prepared)
         if stands_for_more(problem):
-            load_insertion_kernels()
+            load_kernels("insertion")
         return
     load_checking()
     if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
@@ -96,8 +96,7 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
     if steps.polishes and rests_at_both_ends(problem):
         load_polishing(problem)
     if problem.automaton.maneuvers:
-        load_maneuver_kernels()
-        load_times_kernels()
+        load_kernels("times")
         least_price_per_metre(problem.automaton, problem.cost)
         if steps.lattice:
             goals, horizon = range(len(problem.goals)), problem.horizon
@@ -106,7 +105,7 @@ def load_steps(problem: Problem, workspace: Workspace) -> None:
                 in_time = replace(problem, cost=BY_TIME)
                 lattice_library(in_time, goals, prepared=workspace.prepared)
         if _suits_words(problem) or steps.words:
-            load_linked_words()
+            load_kernels("words")
             for goal in problem.goals:
                 word_setup(problem, goal, most_trims=ALPHABET, steers=True)
 

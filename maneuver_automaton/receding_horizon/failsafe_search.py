@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -239,12 +238,3 @@ def _coast(
         between.append(None)
     word.append(trim)
     times.append(lasting)
-
-
-@functools.cache
-def load_fail_safe() -> None:
-    """Have the kernels ready before the clock runs."""
-    from maneuver_automaton.search.choose import smallest_lattice_query
-
-    problem = smallest_lattice_query().problem
-    stands_free(problem, search_fail_safe(problem, until=1.0).plan.end, time=1.0, duration=1.0)

@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning.lower_bound import Proving, in_costs, load_proofs
+from maneuver_automaton.planning.lower_bound import Proving, in_costs
 from maneuver_automaton.problem import Problem
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class LoopBounds:
     @classmethod
     def ready(cls, gap: float) -> LoopBounds:
         """Bounds of a loop that begins, with all that is to be compiled."""
-        load_proofs()
+        load_kernels("cells")
         return cls(gap)
 
     def forget(self) -> None:

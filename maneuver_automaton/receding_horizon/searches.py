@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.among_obstacles import AmongObstacles, as_it_stands
 from maneuver_automaton.receding_horizon.decision import StepSearch
-from maneuver_automaton.receding_horizon.failsafe_search import load_fail_safe
 from maneuver_automaton.receding_horizon.in_free_space import InFreeSpace
 from maneuver_automaton.receding_horizon.log import Guarantee, Step
 from maneuver_automaton.receding_horizon.over_maneuvers import (
@@ -17,11 +17,8 @@ from maneuver_automaton.receding_horizon.over_maneuvers import (
 )
 from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.receding_horizon.situation import Situation
-from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search as load_words
-from maneuver_automaton.search.choose import load_times_kernels
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
-from maneuver_automaton.search.linked_words import load_linked_words
 
 
 def started(
@@ -51,16 +48,15 @@ def started(
 
 def load_search(problem: Problem) -> None:
     """Prepare the search of a step for a problem, before its clock runs."""
-    load_times_kernels()
+    load_kernels("times")
     if needs_maneuvers(problem):
-        load_linked_words()
+        load_kernels("words")
         if problem.obstacles or problem.zones:
-            load_maneuver_kernels()
+            load_kernels("lattice", "improvement")
         if problem.moves:
-            load_fail_safe()
+            load_kernels("lattice", "fail-safe")
     elif problem.obstacles:
-        load_lattice()
-        load_fail_safe()
+        load_kernels("lattice", "improvement", "fail-safe")
         cost_to_go_table(problem)
     else:
         load_words(problem)
