@@ -29,9 +29,9 @@ from maneuver_automaton.planning.blocked import (
     why_goal_blocked,
 )
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
-from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
+from maneuver_automaton.planning.steps import uses_lattice
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.shifting import followed_by
@@ -212,7 +212,7 @@ class FleetMember:
         """Whether it switches at will in a plane, so that its plans are words of the lattice."""
         searched = replace(self.problem.search, method="lattice")
         steers = uses_lattice(replace(self.problem, search=searched))
-        return steers and not has_inertia(self.problem) and self.problem.start.size == 3
+        return steers and not self.problem.has_inertia and self.problem.start.size == 3
 
     def course_of(self, plan: Plan) -> FleetCourse:
         """Its bodies in time if it drives a plan."""

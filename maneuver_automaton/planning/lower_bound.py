@@ -21,7 +21,6 @@ from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
-from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.kinematic_paths import extreme_automaton, follows_paths
@@ -242,7 +241,7 @@ class Proving:
 
 def known_bound(problem: Problem) -> LowerBound:
     """The best bound that takes no search: a formula, or the path of the inscribed disc."""
-    if has_inertia(problem):
+    if problem.has_inertia:
         return bound_along_paths(problem)
     if blocked_ends(problem) is not None or problem.automaton.lattice is not None:
         return formula_bound(problem)
@@ -301,7 +300,7 @@ class _Ramp:
 def _ramp(problem: Problem) -> _Ramp:
     """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
     model, cost = problem.automaton.model, problem.cost
-    if not (follows_paths(model) and has_inertia(problem) and rests_at_both_ends(problem)):
+    if not (follows_paths(model) and problem.has_inertia and problem.rests_at_both_ends):
         return _Ramp()
     twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
     if not isinstance(cost, Cost) or not cost.time or (twists[:, 0] == 0.0).any():

@@ -28,6 +28,7 @@ from maneuver_automaton.search.lattice_worlds import world_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.words.word import Word
 
+AT_ONCE = Patience(attempts=0, passes=0)
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
 PROVEN = 1e-6  # [m] what a search has proven with its margin passes with this one, once more
 PROVEN_SHARE = 0.2  # of the search's margin, where that is tiny
