@@ -15,24 +15,87 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from numba import types
-from numba.core.types.containers import BaseNamedTuple, BaseTuple
-from numba.core.types.scalars import BooleanLiteral
-
 FILE = Path(__file__).with_name("kernels.json")
 ARRAY = re.compile(r"(\w+)\[(\d+)([CFA])(, read only)?\]")
 LITERALS = {"True": True, "False": False}
 
+USES = {  # modules of kernels, by what calls them
+    "times": ("words._kernels_solve", "search._kernels_price"),
+    "words": (
+        "words._kernels_candidates",
+        "words._kernels_closing",
+        "words._kernels_solve",
+        "words._kernels_steering",
+        "search._kernels_all_words",
+        "search._kernels_polish",
+        "search._kernels_price",
+        "search._kernels_words",
+    ),
+    "insertion": ("search._kernels_chatter", "search._kernels_insertion"),
+    "lattice": (
+        "collision._kernels_advancement",
+        "collision._kernels_field",
+        "collision._kernels_swept",
+        "search._kernels_begin",
+        "search._kernels_distance",
+        "search._kernels_lattice",
+        "search._kernels_nodes",
+        "search._kernels_plane",
+        "search._kernels_waiting",
+        "words._kernels_solve",
+        "words._kernels_steering",
+    ),
+    "improvement": ("refinement._kernels_improve", "refinement._kernels_points"),
+    "state lattice": ("search._kernels_state_lattice", "search._kernels_nodes"),
+    "fail-safe": ("receding_horizon._kernels_failsafe",),
+    "meetings": ("fleet._kernels_meetings",),
+    "separation": ("bounds._kernels_boxes", "bounds._kernels_connectivity"),
+    "cells": (
+        "bounds._kernels_ascent",
+        "bounds._kernels_boxes",
+        "bounds._kernels_certificate",
+        "bounds._kernels_dual",
+    ),
+}
+
 Stated = Any  # a type as the list has it
+
+
+def load_kernels(*uses: str) -> None:
+    """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs."""
+    for use in uses:
+        for module in USES[use]:
+            _load(f"{__package__}.{module}")
+
+
+@functools.cache
+def _load(module: str) -> None:
+    from numba.extending import typeof_impl
+
+    for name, signatures in _rows().items():
+        one: Any = kernel_named(name) if module in name else None
+        if not hasattr(one, "compile"):  # of another module, or numba is switched off
+            continue
+        for args in signatures:
+            kinds = tuple(map(type_of, args))
+            one.compile(kinds)
+            for kind in kinds:  # or the first call looks for what types such tuples have
+                if hasattr(kind, "instance_class"):
+                    typeof_impl.dispatch(kind.instance_class)
+
+
+@functools.cache
+def _rows() -> dict[str, list[list[Stated]]]:
+    known: dict[str, list[list[Stated]]] = json.loads(FILE.read_text())
+    return known
 
 
 @functools.cache
 def listed() -> dict[str, tuple[tuple[Any, ...], ...]]:
     """The types of the arguments of each kernel, by ``module.name``, in the order of the list."""
-    known: dict[str, list[list[Stated]]] = json.loads(FILE.read_text())
     return {
         name: tuple(tuple(map(type_of, args)) for args in signatures)
-        for name, signatures in known.items()
+        for name, signatures in _rows().items()
     }
 
 
@@ -49,11 +112,11 @@ def write_list(signatures: dict[str, Iterable[Iterable[Any]]]) -> None:
         name: sorted(([stated(one) for one in args] for args in every), key=json.dumps)
         for name, every in sorted(signatures.items())
     }
-    lines = ",\n".join(f"{json.dumps(name)}: [\n{_rows(args)}\n]" for name, args in known.items())
+    lines = ",\n".join(f"{json.dumps(name)}: [\n{_lines(args)}\n]" for name, args in known.items())
     FILE.write_text(f"{{\n{lines}\n}}\n")
 
 
-def _rows(signatures: list[list[Stated]]) -> str:
+def _lines(signatures: list[list[Stated]]) -> str:
     return ",\n".join(f" {json.dumps(args)}" for args in signatures)
 
 
@@ -65,6 +128,10 @@ def stated(kind: Any) -> Stated:
     ValueError
         If the list has no word for it.
     """
+    from numba import types
+    from numba.core.types.containers import BaseNamedTuple, BaseTuple
+    from numba.core.types.scalars import BooleanLiteral
+
     if isinstance(kind, BaseNamedTuple):
         place = f"{kind.instance_class.__module__}:{kind.instance_class.__qualname__}"
         return {place: [stated(one) for one in kind.types]}
@@ -81,6 +148,10 @@ def stated(kind: Any) -> Stated:
 
 def type_of(name: Stated) -> Any:
     """The type of numba that the list means."""
+    from numba import types
+    from numba.core.types.containers import BaseTuple
+    from numba.core.types.scalars import BooleanLiteral
+
     if isinstance(name, dict):
         ((place, fields),) = name.items()
         module, qualified = place.split(":")

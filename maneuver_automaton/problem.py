@@ -612,6 +612,39 @@ class Problem:
             zones=tuple(zone.moved(by) for zone in self.zones),
         )
 
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the vehicle cannot switch at will between the trims that it needs."""
+        return bool(self.automaton.model.reduced_names) or not self.automaton.is_kinematic
+
+    @property
+    def climbs_among_obstacles(self) -> bool:
+        """Whether a vehicle that switches at will has more than a plane, and something is there.
+
+        Examples
+        --------
+        >>> from maneuver_automaton import Automaton, Disc, Unicycle
+        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
+        >>> Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [4, 0])).climbs_among_obstacles
+        False
+        """
+        in_space = self.start.size > 3 and self.automaton.is_kinematic
+        return in_space and bool(self.obstacles) and self.search.method in ("auto", "lattice")
+
+    @property
+    def has_tolerance(self) -> bool:
+        """Whether a plan may end beside a goal; on a lattice also whether at any heading."""
+        turns = self.automaton.lattice is not None
+        return any(
+            goal.tolerance_m > 0.0 or goal.tolerance_rad > 0.0 or (turns and goal.free_heading)
+            for goal in self.goals
+        )
+
+    @property
+    def rests_at_both_ends(self) -> bool:
+        """Whether the vehicle starts and ends at rest."""
+        return self.first_trim.is_rest and all(self.last_trim(goal).is_rest for goal in self.goals)
+
     @functools.cached_property
     def quiet_after(self) -> float:
         """When [s] the last moving obstacle has stopped, come or gone; -inf if nothing moves."""

@@ -217,8 +217,8 @@ def _written(entry: Piece, library: Automaton) -> Maneuver:
     columns = ("time", "pose", "reduced_state", "control")
     samples = {name: np.array(entry["course"][name], dtype=np.float64) for name in columns}
     course = Trajectory(**samples, model=library.model)
-    ends = {"source": entry["source"], "target": entry["target"]}
-    return Maneuver.along(course, name=entry["name"], **ends)
+    name, source, target = entry["name"], entry["source"], entry["target"]
+    return Maneuver.along(course, name=name, source=source, target=target)
 
 
 def _trim(entry: Piece, library: Automaton) -> Trim:

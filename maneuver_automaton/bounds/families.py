@@ -71,7 +71,7 @@ def motions_of(problem: Problem) -> Motions | None:
     cost = problem.cost
     if not isinstance(cost, Cost) or problem.automaton.translated:
         return None
-    if _by_trims_alone(problem):
+    if not problem.has_inertia:
         twists, rates = problem.automaton.body_velocities[:, :3], problem.rates
         price = cost.direction_change
         if (rest := rest_rate(problem)) is not None:
@@ -86,11 +86,6 @@ def motions_of(problem: Problem) -> Motions | None:
         return None
     families = _families(twists[moving] / rates[moving, None], gears=price > 0.0)
     return Motions(families=families, price=price, besides=besides(problem))
-
-
-def _by_trims_alone(problem: Problem) -> bool:
-    """Whether all plans are words of the library; with a reduced state they may be polished."""
-    return problem.automaton.is_kinematic and not problem.automaton.model.reduced_names
 
 
 def _at_the_limits(model: Model) -> Automaton | None:
@@ -108,7 +103,7 @@ def _at_the_limits(model: Model) -> Automaton | None:
 
 def besides(problem: Problem) -> float:
     """Cost of every plan that does not depend on its path: of resting for a fixed time."""
-    rest = rest_rate(problem) if _by_trims_alone(problem) else None
+    rest = rest_rate(problem) if not problem.has_inertia else None
     return 0.0 if rest is None else rest * (problem.horizon.time or 0.0)
 
 

@@ -106,10 +106,8 @@ def _turns(problem: Problem, world: World) -> bool:
     body = world.body
     if not body.edges[:, :2].any():
         return False
-    automaton = problem.automaton
     # With inertia a vehicle turns between its trims, and its library may hold no more than a rest.
-    by_trims_alone = automaton.is_kinematic and not automaton.model.reduced_names
-    return not by_trims_alone or bool(automaton.body_velocities[:, 2].any())
+    return problem.has_inertia or bool(problem.automaton.body_velocities[:, 2].any())
 
 
 def _limits(bounds: Bounds, frame: Array) -> Array:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton._interrupts import stopped
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import (
@@ -246,10 +247,5 @@ def _row(
 
 def _compile_first(*, quiet: bool) -> None:
     """Have the kernels in the cache, or every process would compile them for itself."""
-    from maneuver_automaton.refinement.ready import load_lattice
-    from maneuver_automaton.search.choose import load_insertion_kernels, load_word_kernels
-
     with announced(quiet=quiet):
-        load_word_kernels(4)
-        load_insertion_kernels()
-        load_lattice()
+        load_kernels("words", "insertion", "lattice", "improvement")

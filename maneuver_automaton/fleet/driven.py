@@ -30,7 +30,6 @@ from maneuver_automaton.fleet.courses import Levels
 from maneuver_automaton.fleet.result import Closest, FleetLog
 from maneuver_automaton.fleet.verdict import CONTACT, NEAR, least_of, plan_of_motion
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 
@@ -215,7 +214,7 @@ def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
             audit = audit_plan(piece, goal, problem.automaton.model, footprint=(), obstacles=())
             if not audit.passed:
                 return f"at {piece.start_time:.6g} s: {audit.reason}"
-        if has_inertia(problem) and piece.trims:
+        if problem.has_inertia and piece.trims:
             was = problem.first_trim.reduced_state if before is None else end_state(before)
             now, before = begin_state(piece), piece
             if not same_state(now, was):

@@ -13,7 +13,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision.body import Body, body_of, fastest_points
 from maneuver_automaton.collision.motion import Motion
-from maneuver_automaton.collision.shapes import Disc
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet import _kernels_meetings as kernels
 from maneuver_automaton.fleet.courses import FleetCourse, HeightBand, motion_from
@@ -141,15 +140,6 @@ def _coasts(motion: Motion, body: Body, frame: Frame, span: tuple[float, float])
     rows[:, 7] = lasting
     rows[:, 8] = begins
     return rows
-
-
-@functools.cache
-def load_meetings() -> None:
-    """Have the kernel of meetings ready, before a clock runs."""
-    stands = [
-        FleetCourse(((Disc(1.0),),), (Motion([0.0], [[place, 0.0, 0.0]]),)) for place in (0.0, 9.0)
-    ]
-    meetings(dict(enumerate(stands)), keep=0.0)
 
 
 def components(numbers: Sequence[int], found: Sequence[Meeting]) -> list[tuple[int, ...]]:

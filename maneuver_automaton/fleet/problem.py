@@ -14,7 +14,6 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_size
 from maneuver_automaton.collision.motion import planar
 from maneuver_automaton.groups import LieGroup, SE2xR
-from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.problem import Problem
 
 
@@ -112,7 +111,7 @@ class FleetProblem:
         """Who cannot switch at will stands only in a trim at rest."""
         first = min(problem.start_time for problem in self.problems)
         for name, problem, leaves in zip(self.names, self.problems, self.leaves, strict=True):
-            if not has_inertia(problem):
+            if not problem.has_inertia:
                 continue
             begin, ends = problem.first_trim, [problem.last_trim(goal) for goal in problem.goals]
             moving = next((one.name for one in ends if not one.is_rest), None)

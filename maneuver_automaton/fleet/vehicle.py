@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.automaton.cutting import NOTHING
@@ -19,7 +20,7 @@ from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Disc, Obstacle
 from maneuver_automaton.fleet.courses import FleetCourse, levels_of, standing_still, where_it_stays
-from maneuver_automaton.fleet.meetings import PROOF, load_meetings
+from maneuver_automaton.fleet.meetings import PROOF
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.planning.blocked import (
     blocked_ends,
@@ -28,14 +29,13 @@ from maneuver_automaton.planning.blocked import (
     why_goal_blocked,
 )
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
-from maneuver_automaton.planning.needs import has_inertia, uses_lattice
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
+from maneuver_automaton.planning.steps import uses_lattice
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
 from maneuver_automaton.refinement.improve import Patience, improve
-from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -212,7 +212,7 @@ class FleetMember:
         """Whether it switches at will in a plane, so that its plans are words of the lattice."""
         searched = replace(self.problem.search, method="lattice")
         steers = uses_lattice(replace(self.problem, search=searched))
-        return steers and not has_inertia(self.problem) and self.problem.start.size == 3
+        return steers and not self.problem.has_inertia and self.problem.start.size == 3
 
     def course_of(self, plan: Plan) -> FleetCourse:
         """Its bodies in time if it drives a plan."""
@@ -521,8 +521,7 @@ def prepare_vehicles(vehicles: Sequence[FleetMember]) -> None:
     kinds = {(id(one.problem.automaton), id(one.workspace)): one for one in vehicles}
     for one in kinds.values():
         prepare(one.problem, one.workspace)
-    load_lattice()
-    load_meetings()
+    load_kernels("lattice", "improvement", "meetings")
 
 
 def vehicles_of(fleet: FleetProblem, prepared: Prepared | None = None) -> list[FleetMember]:

@@ -336,9 +336,9 @@ Ends: TypeAlias = dict[str, tuple[Array, Array]]
 
 def _with_robot(world: Statement, vehicle: StatedVehicle, ends: Ends) -> Statement:
     """The problem of one robot alone."""
-    stated = {what: pose for what, (pose, _) in ends.items()}
-    states = {f"{what}_state": state for what, (_, state) in ends.items()}
-    return replace(world, footprint=vehicle.footprint, vehicle=vehicle, **stated, **states)
+    stated: dict[str, Any] = {what: pose for what, (pose, _) in ends.items()}
+    stated |= {f"{what}_state": state for what, (_, state) in ends.items()}
+    return replace(world, footprint=vehicle.footprint, vehicle=vehicle, **stated)
 
 
 def _vehicles(models: Sequence[StatedModel], ends: Sequence[Ends]) -> list[StatedVehicle]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import chain, islice, product
 from typing import Any
 
@@ -53,56 +53,73 @@ CLEAR = 0.02  # [m] between body and zone where a coast through the zone begins
 SAMPLES = 1000  # of a plan, between which a zone may be touched
 
 
-def plan_among_zones(
-    problem: Problem, search: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
-) -> PlanResult:
-    """The cheapest plan found that keeps to the zones of a problem.
+@dataclass(frozen=True, slots=True, eq=False)
+class AmongZones:
+    """Plans that keep to zones, by `search`, which asks nothing of zones but what it is told.
 
     The answer need not be the best: only where the plan that knows of no zones keeps to them, it is
     as good as that one.
     """
-    found = Incumbents(problem, budget, workspace, alternatives).begun()
-    free = replace(problem, zones=())
-    # vehicles with inertia are searched with the zones themselves: crossed slowly, left fast
-    itself = [] if problem.automaton.is_kinematic else [problem]
-    questions = [free, *itself, *(one for one in _questions(problem) if blocked_ends(one) is None)]
-    first: PlanResult | None = None
-    waits = False  # the first question lets others try
 
-    def offer(result: PlanResult) -> None:
-        for plan, goal_index in _plans(problem, result):
-            if found.may_check:
-                found.offer(plan, goal_index)
+    search: Answer
 
-    turns = found.ask(questions, search, offer, budget=budget, alternatives=alternatives)
-    for k, result, ended in turns:
-        offer(result)
-        waits = not ended if k == 0 else waits
-        if first is None or (k == 0 and result.plan is not None):
-            first = result
-        if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
-            return replace(result, problem=problem)
-        stuck = waits and not found.plans and k == len(questions) - 1
-        if itself and first.plan is not None and (stuck or (k == 0 and ended)):
-            share = 1.0 if found.plans else SLOWED_SHARE
-            polish_slowed(found, problem, first.plan, budget.stage(share))
-            waits = False
-        none = ended and not (found.plans or budget.is_over)
-        if k == 0 and itself and result.plan is not None and none:
-            part = replace(budget.part(CROSSED_SHARE, at_least=LEAST_TIME), shows=None)
-            crossed = crossed_slowly(problem, result.plan, search, part, workspace)
-            if crossed is not None and found.may_check:
-                found.offer(*crossed)
-        if k > 0 and ended and questions[k] is not problem and first.plan is not None:
-            polish_slowed(found, questions[k], first.plan, budget)
-    assert first is not None
-    if found.plans:
-        return found.found(bound=first.bound or LowerBound(value=0.0, kind="distance"))
-    reason = first.reason or (
-        "no plan was found that keeps to the zones, by going around them, or through them with "
-        "what they admit"
-    )
-    return found.none(PlanStatus.NO_PLAN if first.plan is not None else first.status, reason)
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Nothing but what the questions need."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Always: each question has a moment."""
+        return True
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer the answers that keep to all zones, quickened outside of them."""
+        problem, budget, alternatives = found.problem, found.budget, found.alternatives
+        ended = found.ended
+        ended.is_complete = True
+        free = replace(problem, zones=())
+        # vehicles with inertia are searched with the zones themselves: crossed slowly, left fast
+        itself = [] if problem.automaton.is_kinematic else [problem]
+        questions = [
+            free,
+            *itself,
+            *(one for one in _questions(problem) if blocked_ends(one) is None),
+        ]
+        first: PlanResult | None = None
+        waits = False  # the first question lets others try
+
+        def offer(result: PlanResult) -> None:
+            for plan, goal_index in _plans(problem, result):
+                if found.may_check:
+                    found.offer(plan, goal_index)
+
+        turns = found.ask(questions, self.search, offer, budget=budget, alternatives=alternatives)
+        for k, result, is_over in turns:
+            offer(result)
+            waits = not is_over if k == 0 else waits
+            if first is None or (k == 0 and result.plan is not None):
+                first = result
+            if k == 0 and found.plans and result.plan is found.plans[0].plan and not alternatives:
+                ended.verdict = replace(result, problem=problem)
+                return
+            stuck = waits and not found.plans and k == len(questions) - 1
+            if itself and first.plan is not None and (stuck or (k == 0 and is_over)):
+                share = 1.0 if found.plans else SLOWED_SHARE
+                polish_slowed(found, problem, first.plan, budget.stage(share))
+                waits = False
+            none = is_over and not (found.plans or budget.is_over)
+            if k == 0 and itself and result.plan is not None and none:
+                part = replace(budget.part(CROSSED_SHARE, at_least=LEAST_TIME), shows=None)
+                crossed = crossed_slowly(problem, result.plan, self.search, part, found.workspace)
+                if crossed is not None and found.may_check:
+                    found.offer(*crossed)
+            if k > 0 and is_over and questions[k] is not problem and first.plan is not None:
+                polish_slowed(found, questions[k], first.plan, budget)
+        assert first is not None
+        ended.bound = first.bound or LowerBound(value=0.0, kind="distance")
+        reason = first.reason or (
+            "no plan was found that keeps to the zones, by going around them, or through them with "
+            "what they admit"
+        )
+        ended.why = PlanStatus.NO_PLAN if first.plan is not None else first.status, reason
 
 
 def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:

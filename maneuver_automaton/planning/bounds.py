@@ -13,7 +13,6 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.models.speeds import greatest_speed
-from maneuver_automaton.planning.needs import rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.limits import closed_bounds
@@ -105,7 +104,7 @@ def bound_along_paths(problem: Problem) -> LowerBound:
         known += cost.length * straight
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words
         known = max(known, straight * least_price_per_metre(problem.automaton, cost))
-    if not (follows_paths(model) and rests_at_both_ends(problem) and isinstance(cost, Cost)):
+    if not (follows_paths(model) and problem.rests_at_both_ends and isinstance(cost, Cost)):
         return LowerBound(value=known, kind="distance")
     simpler = kinematic_problem(problem, switch=0.0)
     bound = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))

@@ -28,8 +28,8 @@ from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.planning.result import Workspace, workspace_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.primitive import Trajectory
-from maneuver_automaton.refinement.fitting import broken_condition
 from maneuver_automaton.problem import Goal, Problem, moves
+from maneuver_automaton.refinement.fitting import broken_condition
 from maneuver_automaton.search.limits import stays_inside
 from maneuver_automaton.search.scene import admitted_stretches, piece_is_admitted
 

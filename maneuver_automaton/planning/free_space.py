@@ -5,22 +5,32 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
+from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import formula_bound
-from maneuver_automaton.planning.checking import Condition
+from maneuver_automaton.planning.checking import Condition, load_checking
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
-from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus, Workspace
+from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.choose import insertion_stages, search_goal
+from maneuver_automaton.search.choose import insertion_stages, load_search, search_goal
 from maneuver_automaton.search.limits import outside, why_impossible
+from maneuver_automaton.search.linked_words import ALPHABET
 from maneuver_automaton.search.result import InsertionTask, SearchResult, plan_of
+from maneuver_automaton.search.word_setup import word_setup
+from maneuver_automaton.words.maneuver_words import maneuver_words
 from maneuver_automaton.words.word import Word, word_of_plan
 
+WORDS_SHARE = 0.4  # of what is left, for words of free space where there is no plan yet
+LATER_SHARE = 0.2  # the same where there is a plan already, or the lattice will find one
+OTHERS = 6  # costlier words that are looked at where bounds or obstacles may refuse the cheapest
+IN_SPACE = 23  # the same where some may pass above or below
 SPARE = 2  # solutions for every alternative, as some may be one motion
 LEAST_TIME = 1e-3  # [s] for each goal, also where the time is over
 
@@ -72,27 +82,6 @@ def word_candidate(
     return Candidate(word.cost, goal_index, make, proven=proven)
 
 
-def plan_by_words(
-    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
-) -> PlanResult:
-    """The cheapest word, by exhaustive search or insertion, that stays free and inside."""
-    found = Incumbents(problem, budget, workspace.on(problem.obstacles), alternatives).begun()
-    listed = _search_goals(found)
-    searched = budget.elapsed
-    found.offer_in_turn(listed.candidates)
-    found.counts["rejected_by_audit"] = found.refused[Condition.AUDIT]
-    if problem.obstacles:
-        found.counts["words_that_hit"] = found.refused[Condition.COLLISION]
-    if not found.plans:
-        return found.none(*_why_none(found, listed))
-    exact = not any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals)
-    if listed.proven and exact:
-        bound = LowerBound(value=listed.candidates[0].cost, kind="exhaustive")
-    else:
-        bound = formula_bound(problem)
-    return found.found(bound=bound, searched=searched, certificate=certificate_of(found))
-
-
 def certificate_of(found: Incumbents) -> float | None:
     """The certificate of the cheapest plan; None for one that is no word of the library."""
     problem, best = found.problem, found.plans[0]
@@ -100,68 +89,95 @@ def certificate_of(found: Incumbents) -> float | None:
     return None if word is None else certificate(problem, problem.goals[best.goal_index], word)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Listed:
-    """Candidates from the searches for all goals, and how these ended."""
+@dataclass(slots=True, eq=False)
+class AllWords:
+    """The words of free space, by exhaustive search or insertion: obstacles sort out what hits."""
 
-    candidates: list[Candidate]  # cheapest first, of equals the shortest
-    exhausted: bool  # no search was cut short
-    proven: bool  # every admitted word was searched
+    candidates: list[Candidate] = field(default_factory=list)  # cheapest first, then the shortest
+    exhausted: bool = True  # no search was cut short
+    proven: bool = False  # every admitted word was searched
 
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Load the kernels."""
+        if problem.obstacles or problem.zones:
+            load_kernels("lattice", "improvement")
+        load_search(problem)
 
-def _search_goals(found: Incumbents) -> _Listed:
-    """Search for every goal that is inside the bounds."""
-    problem = found.problem
-    sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
-    goals = [k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)]
-    others = None if sorted_out else SPARE * found.alternatives
-    words: list[tuple[Word, int]] = []
-    exhausted, proven = True, set[int]()  # goals whose every admitted word was searched
-    for index, result in free_words(found, goals, others=others):
-        exhausted = exhausted and result.status is not SearchStatus.OUT_OF_BUDGET
-        proven |= {index} if result.exhaustive else set()
-        found.counts.update(result.counts)
-        words += [(word, index) for word in result.solutions]
-    words.sort(key=lambda row: (float(f"{row[0].cost:.9g}"), len(row[0].trims), *row[0].trims))
-    candidates = [word_candidate(problem, word, index) for word, index in words]
-    return _Listed(candidates=candidates, exhausted=exhausted, proven=len(proven) == len(goals))
+    def is_due(self, found: Incumbents) -> bool:
+        """Always: each search has a moment, also where the time is over."""
+        return True
 
+    def offer(self, found: Incumbents) -> None:
+        """Offer the cheapest ones that stay free and inside, as many as are asked for."""
+        problem, ended = found.problem, found.ended
+        self._search(found)
+        ended.is_complete, ended.searched = True, found.budget.elapsed
+        found.offer_in_turn(self.candidates)
+        found.counts["rejected_by_audit"] = found.refused(Condition.AUDIT)
+        if problem.obstacles:
+            found.counts["words_that_hit"] = found.refused(Condition.COLLISION)
+        if not found.plans:
+            ended.why = self._why_none(found)
+        elif self.proven and not any(one.tolerance_m or one.tolerance_rad for one in problem.goals):
+            ended.bound = LowerBound(value=self.candidates[0].cost, kind="exhaustive")
+        else:
+            ended.bound = formula_bound(problem)
 
-def _why_none(found: Incumbents, listed: _Listed) -> tuple[PlanStatus, str]:
-    problem, refused = found.problem, found.refused
-    if found.why_unchecked:
-        return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
-    if refused[Condition.AUDIT]:
-        return PlanStatus.NO_PLAN, (
-            f"the audit rejected {refused[Condition.AUDIT]} plans: "
-            f"{found.reasons[Condition.AUDIT]}; do the trims belong to the model?"
-        )
-    if not listed.exhausted:
-        return PlanStatus.OUT_OF_BUDGET, (
-            f"no plan within {found.budget.seconds:g} s and the expansions allowed"
-        )
-    beyond, hit = refused[Condition.BOUNDS], refused[Condition.COLLISION]
-    if beyond and not hit:
-        return PlanStatus.NO_PLAN, f"all {beyond} plans found leave the bounds"
-    if hit:
-        return PlanStatus.NO_PLAN, (
-            f"all {beyond + hit} words found hit an obstacle or leave the bounds; "
-            "the method lattice knows the obstacles"
-        )
-    impossible = why_impossible(problem)
-    if impossible:
-        return PlanStatus.UNREACHABLE, impossible
-    if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
-        return PlanStatus.NO_PLAN, "no word was found to end within the tolerance of the goal"
-    too_short = _least_time(problem, found.budget)
-    if too_short is not None:
-        return too_short
-    limit = problem.horizon.max_trims
-    if listed.proven and limit is not None:
-        return PlanStatus.UNREACHABLE, (
-            f"no word of at most {limit} trims of this library ends at the goal"
-        )
-    return PlanStatus.NO_PLAN, "no word of this library was found to end at the goal"
+    def _search(self, found: Incumbents) -> None:
+        """Search for every goal that is inside the bounds."""
+        problem = found.problem
+        sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
+        goals = [
+            k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)
+        ]
+        others = None if sorted_out else SPARE * found.alternatives
+        words: list[tuple[Word, int]] = []
+        proven = set[int]()  # goals whose every admitted word was searched
+        for index, result in free_words(found, goals, others=others):
+            self.exhausted &= result.status is not SearchStatus.OUT_OF_BUDGET
+            proven |= {index} if result.exhaustive else set()
+            found.counts.update(result.counts)
+            words += [(word, index) for word in result.solutions]
+        words.sort(key=lambda row: (float(f"{row[0].cost:.9g}"), len(row[0].trims), *row[0].trims))
+        self.candidates = [word_candidate(problem, word, index) for word, index in words]
+        self.proven = len(proven) == len(goals)
+
+    def _why_none(self, found: Incumbents) -> tuple[PlanStatus, str]:
+        problem, refused = found.problem, found.refused
+        if found.why_unchecked:
+            return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
+        if refused(Condition.AUDIT):
+            first = next(said for broken, said in found.refusals if broken is Condition.AUDIT)
+            return PlanStatus.NO_PLAN, (
+                f"the audit rejected {refused(Condition.AUDIT)} plans: {first}; "
+                "do the trims belong to the model?"
+            )
+        if not self.exhausted:
+            return PlanStatus.OUT_OF_BUDGET, (
+                f"no plan within {found.budget.seconds:g} s and the expansions allowed"
+            )
+        beyond, hit = refused(Condition.BOUNDS), refused(Condition.COLLISION)
+        if beyond and not hit:
+            return PlanStatus.NO_PLAN, f"all {beyond} plans found leave the bounds"
+        if hit:
+            return PlanStatus.NO_PLAN, (
+                f"all {beyond + hit} words found hit an obstacle or leave the bounds; "
+                "the method lattice knows the obstacles"
+            )
+        impossible = why_impossible(problem)
+        if impossible:
+            return PlanStatus.UNREACHABLE, impossible
+        if any(goal.tolerance_m or goal.tolerance_rad for goal in problem.goals):
+            return PlanStatus.NO_PLAN, "no word was found to end within the tolerance of the goal"
+        too_short = _least_time(problem, found.budget)
+        if too_short is not None:
+            return too_short
+        limit = problem.horizon.max_trims
+        if self.proven and limit is not None:
+            return PlanStatus.UNREACHABLE, (
+                f"no word of at most {limit} trims of this library ends at the goal"
+            )
+        return PlanStatus.NO_PLAN, "no word of this library was found to end at the goal"
 
 
 def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | None:
@@ -185,3 +201,56 @@ def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | No
     return (PlanStatus.UNREACHABLE if proven else PlanStatus.NO_PLAN), (
         f"the goal cannot be reached in {limit:g} s: the least time found is {least:.6g} s"
     )
+
+
+class FreeWords:
+    """Words of free space before the lattice is searched; among obstacles some may be free."""
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Load the kernels, and what the words of each goal are made of."""
+        load_checking()
+        if not problem.has_inertia:
+            load_search(problem)
+            return
+        load_kernels("words")
+        for goal in problem.goals:
+            word_setup(problem, goal, most_trims=ALPHABET, steers=True)
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether there is time, and more is asked for."""
+        return found.wants_more
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer words as they are found."""
+        problem = found.problem
+        guarded = bool(problem.obstacles) or not problem.bounds.are_open
+        others = max(found.alternatives, (OTHERS if problem.has_inertia else IN_SPACE) * guarded)
+        share = WORDS_SHARE if problem.has_inertia and not found.plans else LATER_SHARE
+        stages = free_words(found, goals_left(problem), others=others, share=share)
+        plans = ((plan_of(problem, word), index) for word, index in words_once(stages))
+        found.offer_as_they_come(plans, proven=not problem.obstacles)
+
+
+class TurnedByManeuvers:
+    """Maneuvers in a row with straight coasts, where no word of trims turns the vehicle."""
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Nothing has to be ready."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether there is no plan."""
+        return not found.plans
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer such words."""
+        problem = found.problem
+
+        def plans() -> Iterator[tuple[Plan, int]]:
+            for index in goals_left(problem):
+                part = found.budget.stage(WORDS_SHARE)
+                for plan in maneuver_words(
+                    problem, problem.goals[index], others=OTHERS, budget=part
+                ):
+                    yield plan, index
+
+        found.offer_as_they_come(plans(), proven=not problem.obstacles)

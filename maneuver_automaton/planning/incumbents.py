@@ -31,6 +31,8 @@ from maneuver_automaton.refinement.fitting import (
     padded,
     with_lasting_coasts,
 )
+from maneuver_automaton.search.beginning import Begun
+from maneuver_automaton.search.lattice import FirstPlan
 from maneuver_automaton.search.limits import stays_inside
 
 ROUNDING = 1e-12  # relative, of sums of costs
@@ -77,6 +79,23 @@ class Candidate:
 
 
 @dataclass(slots=True, eq=False)
+class Ending:
+    """What the steps of planning have come to know beside plans: the answer is made of both."""
+
+    is_complete: bool = False  # no step follows: all that is to be said is here
+    verdict: PlanResult | None = None  # the whole answer, where no plan is looked for
+    why: tuple[PlanStatus, str] | None = None  # there is no plan, where it is not as of all steps
+    bound: LowerBound | None = None  # no plan is cheaper
+    searched: float | None = None  # [s] when improving began; None: with the first plan
+    nodes: Array | None = None  # expanded ones, if asked for
+    proof: str = ""  # why no plan can exist
+    remark: str = ""  # what came of the paths of a simpler vehicle
+    begun: Begun | None = None  # a search of the lattice that is under way
+    lattice: FirstPlan | None = None  # how its search for a first plan ended
+    finds_plans: bool = False  # words of the lattice are plans, which the checks only confirm
+
+
+@dataclass(slots=True, eq=False)
 class Incumbents:
     """Plans found for a problem, cheapest first: checked, each motion once, with its cost.
 
@@ -92,20 +111,13 @@ class Incumbents:
     plans: list[Accepted] = field(default_factory=list)
     improvements: list[tuple[float, float]] = field(default_factory=list)  # seconds, cost
     counts: Counter[str] = field(default_factory=Counter)
-    refused: Counter[Condition] = field(default_factory=Counter)
-    reasons: dict[Condition, str] = field(default_factory=dict)  # the first of each kind
+    refusals: list[tuple[Condition, str]] = field(default_factory=list)  # what was broken, how
     unchecked: int = 0  # plans whose checks were given up, as the time was over
     misfits: list[tuple[Plan, int]] = field(default_factory=list)  # of no times that would do
     least_cost: float = math.inf  # cost of the cheapest plan that a search took to be free
     checking: float = 0.0  # [s] that the checks took
     longest_check: float = CHECK_S  # [s] of all so far
-
-    def begun(self) -> Incumbents:
-        """These, with what meets a goal for the checks, however far an exact end is from it."""
-        for plan, goal_index in nearly_met(self.problem):
-            if self.offer(plan, goal_index, proven=False):
-                break
-        return self
+    ended: Ending = field(default_factory=Ending)
 
     @property
     def cost(self) -> float:
@@ -139,9 +151,14 @@ class Incumbents:
         return not self.problem.search.improve and len(self.plans) > self.alternatives
 
     @property
+    def wants_more(self) -> bool:
+        """Whether a better plan is asked for, and there is time to look for one."""
+        return not (self.budget.is_over or self.is_enough)
+
+    @property
     def why_refused(self) -> str:
         """Why the first plan was refused; empty if none was."""
-        return next(iter(self.reasons.values()), "")
+        return self.refusals[0][1] if self.refusals else ""
 
     @property
     def why_unchecked(self) -> str:
@@ -152,7 +169,11 @@ class Incumbents:
     @property
     def rejected(self) -> int:
         """How many plans were refused for more than their times."""
-        return self.refused.total() - self.refused[Condition.WORD]
+        return len(self.refusals) - self.refused(Condition.WORD)
+
+    def refused(self, condition: Condition) -> int:
+        """How many plans were refused for a condition."""
+        return sum(broken is condition for broken, _ in self.refusals)
 
     def note(self, cost: float, *, at: float | None = None) -> None:
         """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
@@ -180,9 +201,16 @@ class Incumbents:
         if none_fits and self.for_checks.left_to_check == 0.0:
             self.unchecked += 1
         elif none_fits and proven:
-            self._refuse(Condition.WORD, broken_condition(self.problem, padded(self.problem, plan)))
+            reason = broken_condition(self.problem, padded(self.problem, plan))
+            self.refusals.append((Condition.WORD, reason))
             self.misfits.append((plan, goal_index))
         return False
+
+    def offer_nearly_met(self) -> None:
+        """Offer what meets a goal for the checks, however far an exact end is from it."""
+        for plan, goal_index in nearly_met(self.problem):
+            if self.offer(plan, goal_index, proven=False):
+                return
 
     def ask(
         self,
@@ -229,6 +257,15 @@ class Incumbents:
             if again:
                 waiting.append((k, question))
             yield k, result, not again
+
+    def offer_as_they_come(self, plans: Iterable[tuple[Plan, int]], *, proven: bool = True) -> None:
+        """Offer plans to goals as they are found, until the time is over; `proven` as there."""
+        for plan, goal_index in plans:
+            if not self.may_check:
+                return
+            self.offer(plan, goal_index, proven=proven)
+            if not self.wants_more:
+                return
 
     def offer_in_turn(self, candidates: Iterable[Candidate]) -> None:
         """Check candidates, the cheapest first, until as many plans as asked for are no costlier.
@@ -284,7 +321,7 @@ class Incumbents:
             return False
         if checked.broken is not None or checked.audit is None:
             if proven:
-                self._refuse(checked.broken or Condition.AUDIT, checked.reason)
+                self.refusals.append((checked.broken or Condition.AUDIT, checked.reason))
             if self.problem.zones:  # it may keep to them once it is polished
                 self.misfits.append((plan, goal_index))
             return False
@@ -317,10 +354,6 @@ class Incumbents:
         watch = self.budget.watch
         if watch is not None and watch.problem is self.problem:
             watch.note(cost)
-
-    def _refuse(self, broken: Condition, reason: str) -> None:
-        self.refused[broken] += 1
-        self.reasons.setdefault(broken, reason)
 
     def found(
         self,

@@ -13,18 +13,20 @@ from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
-from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.no_way import along_free_path, before_proof
-from maneuver_automaton.planning.result import LowerBound
-from maneuver_automaton.planning.steps import BY_TIME, Steps
+from maneuver_automaton.planning.polishing import BY_TIME, Polish
+from maneuver_automaton.planning.result import Workspace
+from maneuver_automaton.planning.tracking import AT_ONCE
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whole_of
 from maneuver_automaton.refinement.improve import Improved, Patience, improve, restarts_of
@@ -33,15 +35,17 @@ from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
+from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.lattice_worlds import Ends
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.word import Word
 
-AT_ONCE = Patience(attempts=0, passes=0)
 SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
 BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
+FIRST_POLISHED = 0.7  # of what is left, for polishing where there is no plan yet
 MOST_PATHS = 4  # among static obstacles that are tried with rests
 QUICK = 1500  # expansions in space and time before a path with rests is tried
 PASSING_SHARE = 0.3  # of the time that is left, for paths that let moving obstacles pass
@@ -61,19 +65,89 @@ STONES = (  # where stones are laid and their radii, in shares of the path
 
 
 @dataclass(slots=True, eq=False)
-class LatticeWords:
-    """The words that the lattice has found so far, the cheapest last."""
+class Lattice:
+    """The words that the lattice finds: a first one, then better ones, and others beside it."""
 
-    query: LatticeQuery
-    table: CostTable
-    found: Incumbents
-    steps: Steps
-    alone: bool  # no other step has found a plan
-    limit: Budget
-    words: list[Word] = field(default_factory=list)
+    polish: Polish | None = None  # of what it finds; it then gets a share of the time alone
+    words: list[Word] = field(default_factory=list)  # found so far, the cheapest last
     spent: int = 0  # expansions of first plans and improvements
-    first: FirstPlan | None = None  # how the search for a first plan ended
-    bound: LowerBound | None = None  # no word is cheaper; None where they are not all there is
+    found: Incumbents = field(init=False)
+    query: LatticeQuery = field(init=False)
+    table: CostTable = field(init=False)
+    limit: Budget = field(init=False)
+    alone: bool = field(init=False)  # no other step has found a plan
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Load the kernels, price the maneuvers, make the library and its table."""
+        load_kernels("lattice", "improvement")
+        if not problem.has_inertia and problem.start.size == 3:
+            cost_to_go_table(problem, prepared=workspace.prepared)
+            if stands_for_more(problem):
+                load_kernels("insertion")
+        elif problem.has_inertia:
+            goals, horizon = range(len(problem.goals)), problem.horizon
+            library = lattice_library(problem, goals, prepared=workspace.prepared)
+            if horizon.time or horizon.max_time or library.per_metre == 0.0:
+                in_time = replace(problem, cost=BY_TIME)
+                lattice_library(in_time, goals, prepared=workspace.prepared)
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether there is time, and more is asked for."""
+        return found.wants_more
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer words as they are found, then what improving them finds.
+
+        Where no plan fits but one nearly does, which polishing may mend, it does not wait for all
+        that the lattice tries: each has its share, and the lattice what is left.
+        """
+        ended, known = found.ended, bool(found.plans)
+        soon = self.polish is not None and (known or found.misfits)
+        self.search(found, share=BEFORE_POLISHING if soon else 1.0)
+        if not known:  # only the first search had a share
+            self.limit = found.for_first
+        if self.polish and found.misfits and not found.plans:
+            tried = self.polish.polish(found, share=FIRST_POLISHED)
+            first = ended.lattice
+            done = first is None or first.exhausted or found.budget.expansions is not None
+            if not (self.words or found.plans or done):
+                self.search(found)
+            self.alone = not found.plans
+            self.polish.tried = found.cost if tried else math.inf
+        if self.finds_plans:
+            ended.searched = found.budget.elapsed
+        if not found.problem.search.improve:
+            found.offer_in_turn(self.candidates)
+        if not found.is_enough:
+            found.offer_in_turn(self.improved())
+        if self.polish and self.words:
+            self.polish.otherwise = self.offer_best_times
+        if self.finds_plans and self.words:  # which words the checks did not confirm
+            by_audit = found.refused(Condition.AUDIT)
+            found.counts["rejected_by_fcl"] = found.rejected - by_audit
+            found.counts["rejected_by_audit"] = by_audit
+
+    def search(self, found: Incumbents, *, share: float = 1.0) -> None:
+        """Search for a first word within a share of the time that is left.
+
+        Where there is no plan, the last of it is for a proof that there is none.
+        """
+        problem, ended, prepared = found.problem, found.ended, found.workspace.prepared
+        begun, ends = ended.begun, None
+        goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
+        if begun is not None:
+            ends = Ends(begun.bench.desk.seen[:, :3].copy(), begun.bench.desk.clear.copy())
+        query = lattice_query(problem, goals, prepared=prepared, ends=ends)
+        known = query.library.at_will
+        self.table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
+        self.query = query = query if known else late_at_first(query)
+        self.found, self.words, self.spent = found, [], 0
+        self.limit, self.alone = found.for_first.stage(share), not found.plans
+        first = ended.lattice = self._first(begun)
+        ended.finds_plans, ended.nodes = known, first.nodes if first else None
+        # The path in the plane, where a way leads far round, takes longer than a first plan.
+        at_once = not problem.has_inertia and problem.search.improve
+        ended.bound = lattice_bound(query) if at_once else None
 
     @property
     def budget(self) -> Budget:
@@ -87,7 +161,7 @@ class LatticeWords:
         return replace(left, deadline=min(left.deadline, better.deadline))
 
     @property
-    def knows_all(self) -> bool:
+    def finds_plans(self) -> bool:
         """Whether the lattice knows every condition and price, so that its words are plans.
 
         It does where trims in the plane are switched at will. What others find is checked, with
@@ -98,24 +172,21 @@ class LatticeWords:
     @property
     def candidates(self) -> list[Candidate]:
         """Words that are to be checked, the cheapest first."""
-        return [_candidate(self.query, word) for word in self.words[::-1] if self.knows_all]
+        return [_candidate(self.query, word) for word in self.words[::-1] if self.finds_plans]
 
     def gained(self, word: Word) -> None:
         """A better word was found."""
         self.words.append(word)
-        if self.knows_all:
+        if self.finds_plans:
             self.found.note(word.cost + self.query.padding)
             # The first is checked at once: whatever comes between, there is something to return.
-            wanted = self.found.budget.shows is not None or not self.found.plans
-            if wanted and self.found.may_check:
-                goal_index = self.query.goal_index[word.goal]
-                self.found.offer(plan_of_word(self.query, word), goal_index)
-            return
+            if self.found.budget.shows is None and self.found.plans:
+                return
         if not self.found.may_check:
             return
         self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal])
         # Polishing finds better times, and takes what time there is.
-        if not (self.steps.polishes or self.found.budget.is_over or self.found.is_enough):
+        if not self.finds_plans and self.polish is None and self.found.wants_more:
             self.offer_best_times()
 
     def offer_best_times(self) -> None:
@@ -161,72 +232,130 @@ class LatticeWords:
     def _count(self, expansions: int, queries: int, **more: int) -> None:
         self.spent += expansions
         self.found.counts.update(expansions=expansions, collision_queries=queries)
-        if self.knows_all:
+        if self.finds_plans:
             self.found.counts.update(more)
 
-
-def search_lattice(
-    found: Incumbents, steps: Steps, begun: Begun | None = None, *, share: float = 1.0
-) -> LatticeWords:
-    """The words found for a problem: a first one, and better ones for as long as there is time.
-
-    A share of the time that is left may go by; where there is no plan, the last is for a proof that
-    there is none.
-    """
-    problem, prepared = found.problem, found.workspace.prepared
-    goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
-    ends = None
-    if begun is not None:
-        ends = Ends(begun.bench.desk.seen[:, :3].copy(), begun.bench.desk.clear.copy())
-    query = lattice_query(problem, goals, prepared=prepared, ends=ends)
-    known = query.library.at_will
-    table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
-    query = query if known else late_at_first(query)
-    limit = found.for_first.stage(share)
-    lattice = LatticeWords(query, table, found, steps, not found.plans, limit)
-    lattice.first = _first(lattice, begun)
-    # The path in the plane, where a way leads far round, takes longer than a first plan.
-    lattice.bound = lattice_bound(query) if steps.at_will and problem.search.improve else None
-    return lattice
-
-
-def _first(lattice: LatticeWords, begun: Begun | None = None) -> FirstPlan | None:
-    """The first plan; where obstacles move, one with rests if a quick search finds none."""
-    query, limit = lattice.query, lattice.limit
-    if query.problem.obstacles and not lattice.found.plans:
-        last = before_proof(lattice.found.for_first)
-        limit = replace(limit, deadline=min(limit.deadline, last.deadline))
-    # where a search by cost alone would look everywhere, or for too long motions
-    in_time = math.isfinite(query.most_time) or query.library.per_metre == 0.0
-    if not lattice.knows_all and in_time and _quick(lattice):
-        return None
-    if query.problem.moves and lattice.knows_all:
-        first = lattice.first_plan(query, limit, most=QUICK)
+    def _first(self, begun: Begun | None = None) -> FirstPlan | None:
+        """The first plan; where obstacles move, one with rests if a quick search finds none."""
+        query, limit = self.query, self.limit
+        if query.problem.obstacles and not self.found.plans:
+            last = before_proof(self.found.for_first)
+            limit = replace(limit, deadline=min(limit.deadline, last.deadline))
+        # where a search by cost alone would look everywhere, or for too long motions
+        in_time = math.isfinite(query.most_time) or query.library.per_metre == 0.0
+        if not self.finds_plans and in_time and self._quick():
+            return None
+        if query.problem.moves and self.finds_plans:
+            first = self.first_plan(query, limit, most=QUICK)
+            if first.word is not None:
+                self.gained(first.word)
+                return first
+            path = self.first_plan(_among_static(query), limit)
+            timed = None if path.word is None else with_waits(query, path.word)
+            if timed is not None:
+                self.gained(timed)
+                return first
+        aside = along_free_path(query, self.table)
+        first = self.first_plan(query, limit, begun=begun, aside=aside)
         if first.word is not None:
-            lattice.gained(first.word)
-            return first
-        path = lattice.first_plan(_among_static(query), limit)
-        timed = None if path.word is None else with_waits(query, path.word)
-        if timed is not None:
-            lattice.gained(timed)
-            return first
-    aside = along_free_path(query, lattice.table)
-    first = lattice.first_plan(query, limit, begun=begun, aside=aside)
-    if first.word is not None:
-        lattice.gained(first.word)
-    return first
+            self.gained(first.word)
+        return first
 
+    def _quick(self) -> bool:
+        """Whether a search at the price of time alone found a word in time."""
+        query, limit = self.query, self.limit
+        in_time = replace(query.problem, cost=BY_TIME)
+        quick = lattice_query(in_time, _goals(query), prepared=query.prepared)
+        known, more = quick_word(query, late_at_first(quick), budget=limit)
+        self.found.counts.update(expansions=more)
+        if known is not None:
+            self.gained(known)
+        return known is not None
 
-def _quick(lattice: LatticeWords) -> bool:
-    """Whether a search at the price of time alone found a word in time."""
-    query, limit = lattice.query, lattice.limit
-    in_time = replace(query.problem, cost=BY_TIME)
-    quick = lattice_query(in_time, _goals(query), prepared=query.prepared)
-    known, more = quick_word(query, late_at_first(quick), budget=limit)
-    lattice.found.counts.update(expansions=more)
-    if known is not None:
-        lattice.gained(known)
-    return known is not None
+    def improved(self) -> list[Candidate]:
+        """Plans to be checked, the cheapest first: what was found, and others if asked for."""
+        if not self.words:
+            return []
+        if has_paces(self.query):
+            # take the trims of a large library that fill the time, once the first word is shortened
+            query, left = self.query, self.for_others
+            self.improve(query, self.words[-1], left, patience=AT_ONCE, better=self.gained)
+            self.query, word = paced(query, self.words[-1])
+            if word is not self.words[-1]:
+                self.gained(word)
+        query, found = self.query, self.found
+        if query.problem.moves and self.finds_plans:
+            self._let_pass()
+        better = self.improve(
+            query,
+            self.words[-1],
+            self._for_the_best(),
+            patience=Patience(),
+            floor=found.ended.bound.value - query.padding if found.ended.bound else -math.inf,
+            better=self.gained,
+            every_trim=whole_of(query),
+            meanwhile=lambda: load_checks(query.problem, found.workspace),
+        )
+        if not self.finds_plans:
+            return []
+        candidates = [_candidate(query, word) for word in (*self.words, *better.others)]
+        if found.alternatives and not self.for_others.is_over:
+            # words that are locally optimal in free space: collision-free ones are so here, too
+            goals, most = _goals(query), FREE_WORDS * found.alternatives
+            stages = free_words(found, goals, others=most, share=FREE_WORDS_SHARE)
+            for word, index in words_once(stages):
+                candidates.append(word_candidate(found.problem, word, index, proven=False))
+            candidates += self._detours(better.word, 2 * found.alternatives)
+        return sorted(candidates, key=lambda one: one.cost)
+
+    def _for_the_best(self) -> Budget:
+        """Budget for the improvement of the best plan."""
+        left = self.for_others
+        if self.polish:
+            return left.stage(ALONE_BEFORE_POLISHING if self.alone else BEFORE_POLISHING)
+        share = FOR_THE_BEST if self.finds_plans and self.found.alternatives else 1.0
+        most = None if left.expansions is None else int(share * left.expansions)
+        return replace(left.part(share), expansions=most)
+
+    def _let_pass(self) -> None:
+        """Note the cheapest path among static obstacles, with rests that let others pass."""
+        query, calm = self.query, _among_static(self.query)
+        soon = self.limit.part(PASSING_SHARE)
+        found = self.first_plan(calm, soon)
+        if found.word is None:
+            return
+        better = self.improve(calm, found.word, replace(soon, expansions=None), patience=BRIEF)
+        paths = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
+        distinct = {tuple(path.trims.tolist()): path for path in reversed(paths)}
+        for path in list(distinct.values())[::-1][:MOST_PATHS]:
+            if soon.is_over:
+                return
+            timed = with_waits(query, path)
+            if timed is not None and timed.cost < self.words[-1].cost:
+                self.gained(timed)
+
+    def _detours(self, best: Word, most: int) -> Iterator[Candidate]:
+        """Up to `most` plans round other sides of the obstacles: a stone closes each known path."""
+        query = self.query
+        known: list[Plan] = [plan_of_word(query, best)]
+        for n_th in range(MOST_DETOURS):
+            if n_th >= len(known) or len(known) > most or self.for_others.is_over:
+                return
+            for problem in with_stones(query.problem, known[n_th]):
+                if self.for_others.is_over or self.for_others.expansions == 0:
+                    return
+                closed = lattice_query(problem, _goals(query), prepared=query.prepared)
+                first = self.first_plan(closed, self.for_others)
+                if first.word is None:
+                    continue
+                word = first.word
+                for where in (closed, query):  # away from the stone, then without it
+                    patience = SOME if where is closed else AT_ONCE
+                    word = self.improve(where, word, self.for_others, patience=patience).word
+                plan = plan_of_word(query, word)
+                if is_new(plan, known, UNFINISHED):
+                    known.append(plan)
+                    yield _candidate(query, word)
 
 
 def late_at_first(query: LatticeQuery) -> LatticeQuery:
@@ -236,71 +365,6 @@ def late_at_first(query: LatticeQuery) -> LatticeQuery:
     close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
     timed = close(rates, rates[0]) and close(edges.edge_cost, rates[0] * edges.edge_time)
     return replace(query, most_time=math.inf) if timed else query
-
-
-def improved(lattice: LatticeWords) -> list[Candidate]:
-    """Plans to be checked, the cheapest first: what was found, and others if they are asked for."""
-    if not lattice.words:
-        return []
-    if has_paces(lattice.query):
-        # take the trims of a large library that fill the time, once the first word is shortened
-        query, left = lattice.query, lattice.for_others
-        lattice.improve(query, lattice.words[-1], left, patience=AT_ONCE, better=lattice.gained)
-        lattice.query, word = paced(query, lattice.words[-1])
-        if word is not lattice.words[-1]:
-            lattice.gained(word)
-    query, found = lattice.query, lattice.found
-    if query.problem.moves and lattice.knows_all:
-        _let_pass(lattice)
-    better = lattice.improve(
-        query,
-        lattice.words[-1],
-        _for_the_best(lattice),
-        patience=Patience(),
-        floor=lattice.bound.value - query.padding if lattice.bound else -math.inf,
-        better=lattice.gained,
-        every_trim=whole_of(query),
-        meanwhile=lambda: load_checks(query.problem, found.workspace),
-    )
-    if not lattice.knows_all:
-        return []
-    candidates = [_candidate(query, word) for word in (*lattice.words, *better.others)]
-    if found.alternatives and not lattice.for_others.is_over:
-        # words that are locally optimal in free space: collision-free ones are so here, too
-        goals, most = _goals(query), FREE_WORDS * found.alternatives
-        stages = free_words(found, goals, others=most, share=FREE_WORDS_SHARE)
-        for word, index in words_once(stages):
-            candidates.append(word_candidate(found.problem, word, index, proven=False))
-        candidates += _detours(lattice, better.word, 2 * found.alternatives)
-    return sorted(candidates, key=lambda one: one.cost)
-
-
-def _for_the_best(lattice: LatticeWords) -> Budget:
-    """Budget for the improvement of the best plan."""
-    left = lattice.for_others
-    if lattice.steps.polishes:
-        return left.stage(ALONE_BEFORE_POLISHING if lattice.alone else BEFORE_POLISHING)
-    share = FOR_THE_BEST if lattice.knows_all and lattice.found.alternatives else 1.0
-    most = None if left.expansions is None else int(share * left.expansions)
-    return replace(left.part(share), expansions=most)
-
-
-def _let_pass(lattice: LatticeWords) -> None:
-    """Take note of the cheapest path among static obstacles, with rests that let others pass."""
-    query, calm = lattice.query, _among_static(lattice.query)
-    soon = lattice.limit.part(PASSING_SHARE)
-    found = lattice.first_plan(calm, soon)
-    if found.word is None:
-        return
-    better = lattice.improve(calm, found.word, replace(soon, expansions=None), patience=BRIEF)
-    paths = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
-    distinct = {tuple(path.trims.tolist()): path for path in reversed(paths)}
-    for path in list(distinct.values())[::-1][:MOST_PATHS]:
-        if soon.is_over:
-            return
-        timed = with_waits(query, path)
-        if timed is not None and timed.cost < lattice.words[-1].cost:
-            lattice.gained(timed)
 
 
 def _among_static(query: LatticeQuery) -> LatticeQuery:
@@ -318,30 +382,6 @@ def _goals(query: LatticeQuery) -> list[int]:
 def _candidate(query: LatticeQuery, word: Word) -> Candidate:
     make = functools.partial(plan_of_word, query, word)
     return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
-
-
-def _detours(lattice: LatticeWords, best: Word, most: int) -> Iterator[Candidate]:
-    """Up to `most` plans round other sides of the obstacles: a stone closes each known path."""
-    query = lattice.query
-    known: list[Plan] = [plan_of_word(query, best)]
-    for n_th in range(MOST_DETOURS):
-        if n_th >= len(known) or len(known) > most or lattice.for_others.is_over:
-            return
-        for problem in with_stones(query.problem, known[n_th]):
-            if lattice.for_others.is_over or lattice.for_others.expansions == 0:
-                return
-            closed = lattice_query(problem, _goals(query), prepared=query.prepared)
-            first = lattice.first_plan(closed, lattice.for_others)
-            if first.word is None:
-                continue
-            word = first.word
-            for where in (closed, query):  # away from the stone, then without it
-                patience = SOME if where is closed else AT_ONCE
-                word = lattice.improve(where, word, lattice.for_others, patience=patience).word
-            plan = plan_of_word(query, word)
-            if is_new(plan, known, UNFINISHED):
-                known.append(plan)
-                yield _candidate(query, word)
 
 
 def with_stones(problem: Problem, known: Plan) -> Iterator[Problem]:

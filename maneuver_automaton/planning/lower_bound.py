@@ -16,15 +16,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import as_number, as_whole
-from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
-from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
@@ -243,18 +239,9 @@ class Proving:
         return late or (self.max_work is not None and work >= self.max_work)
 
 
-@functools.cache
-def load_proofs() -> None:
-    """Compile or load what proofs need, before the clock runs."""
-    robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)})
-    tiny = Problem(robot, [0, 0, 0], [1, 0.2, 0.1], obstacles=Box([1, 1], [9, 9]))
-    for _ in proofs_of(tiny, incumbent=lambda: 2.0, ends=lambda _work: True):
-        pass
-
-
 def known_bound(problem: Problem) -> LowerBound:
     """The best bound that takes no search: a formula, or the path of the inscribed disc."""
-    if has_inertia(problem):
+    if problem.has_inertia:
         return bound_along_paths(problem)
     if blocked_ends(problem) is not None or problem.automaton.lattice is not None:
         return formula_bound(problem)
@@ -313,7 +300,7 @@ class _Ramp:
 def _ramp(problem: Problem) -> _Ramp:
     """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
     model, cost = problem.automaton.model, problem.cost
-    if not (follows_paths(model) and has_inertia(problem) and rests_at_both_ends(problem)):
+    if not (follows_paths(model) and problem.has_inertia and problem.rests_at_both_ends):
         return _Ramp()
     twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
     if not isinstance(cost, Cost) or not cost.time or (twists[:, 0] == 0.0).any():

@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.costs import Cost
@@ -61,7 +62,7 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
     from maneuver_automaton.bounds import separation
 
     left = budget.left
-    load_proof()  # the compiler's time is not the budget's
+    load_kernels("separation")  # the compiler's time is not the budget's
     proof = separation(
         result.problem, most_boxes=MOST_BOXES, deadline=Budget.from_now(left).deadline
     )
@@ -82,7 +83,7 @@ def proven_blocked(problem: Problem, budget: Budget) -> bool:
     from maneuver_automaton.bounds import goals_blocked
 
     left = budget.left
-    load_proof()
+    load_kernels("separation")
     deadline = Budget.from_now(left).deadline
     return left >= FIRST_BOXES and goals_blocked(
         problem, most_boxes=MOST_AT_GOALS, deadline=deadline
@@ -95,10 +96,10 @@ def too_long(problem: Problem, budget: Budget) -> str:
     longest = horizon.time or horizon.max_time
     if longest is None or budget.left < FIRST_LOOK:
         return ""
-    from maneuver_automaton.planning.lower_bound import known_bound, load_proofs, proofs_of
+    from maneuver_automaton.planning.lower_bound import known_bound, proofs_of
 
     left = budget.left
-    load_proofs()
+    load_kernels("cells")
     budget = Budget.from_now(left)
     timed = replace(problem, cost=Cost(time=1.0), horizon=Horizon())
     least, polishing = known_bound(timed).value, 0.0
@@ -118,21 +119,6 @@ def too_long(problem: Problem, budget: Budget) -> str:
         f"every plan takes at least {least:.4g} s, and the horizon admits {longest:g} s: no path "
         "that leads to the goal is short enough"
     )
-
-
-@functools.cache
-def load_proof() -> None:
-    """Compile or load what a proof needs."""
-    from maneuver_automaton.automaton import Automaton
-    from maneuver_automaton.bounds import pose_scene, separation
-    from maneuver_automaton.collision import Box
-    from maneuver_automaton.models import Unicycle
-
-    robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
-    walls = [Box([1.0, 9.0], [2.0, 5.0]), Box([1.0, 9.0], [2.0, -5.0])]
-    problem = Problem(robot, [0, 0, 0], [4, 0, 0], obstacles=walls, footprint=Box([1.0, 0.5]))
-    separation(problem, most_boxes=5_000)
-    pose_scene(problem).states(np.zeros((1, 6)))
 
 
 WIDE = 25.0  # times the lattice's distance before contact, that the path keeps if there is room
@@ -162,7 +148,7 @@ def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPla
     from maneuver_automaton.bounds import Connection, widest_path
 
     left = SHARE * budget.left
-    load_proof()  # the compiler's time is not the budget's
+    load_kernels("separation")  # the compiler's time is not the budget's
     budget = replace(budget, deadline=budget.clock() + left)
     answer, poses, apart = widest_path(
         query.problem,

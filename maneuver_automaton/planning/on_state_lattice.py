@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import POLISHED
-from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents
-from maneuver_automaton.planning.result import LowerBound, PlanResult, PlanStatus, Workspace
+from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice import in_frame_of_problem
 from maneuver_automaton.search.lattice_task import WEIGHT
@@ -24,52 +24,53 @@ MOST_WIDER = 2  # times that a window is widened where there is no plan
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
 
-def load_state_lattice(problem: Problem, workspace: Workspace) -> bool:
-    """Have ready what a search needs; whether a problem is one of a state lattice."""
-    if goals_off_lattice(problem) is not None:
-        return True  # which is told without a search
-    graph = graph_of(problem, range(len(problem.goals)), workspace.prepared)
-    if graph is not None:
-        one = GraphSearch.of(graph, weight=1.0, budget=UNLIMITED)
-        one.run(1, 0.0)
-        one.look_ahead(Budget.from_now(0.0))
-    return graph is not None
-
-
-def plan_on_state_lattice(
-    problem: Problem, budget: Budget, workspace: Workspace, *, alternatives: int
-) -> PlanResult | None:
-    """The cheapest plan of a library on a lattice, and the proof; None if it is on none.
+class StateLattice:
+    """The graph of a library on a lattice: its cheapest plan, and the proof.
 
     Every node within the tolerance of a goal is an aim. Obstacles are met where the body comes
-    nearer than `MARGIN` to them, as in the checks of a plan.
+    nearer than `MARGIN` to them, as in the checks of a plan. Of a library that has no such graph
+    nothing is offered.
     """
-    blocked = blocked_ends(problem)
-    open_ends = any(goal.tolerance_m > 0.0 for goal in problem.goals)
-    if blocked is not None and (blocked.status is PlanStatus.START_BLOCKED or not open_ends):
-        return blocked
-    goals = [k for k, goal in enumerate(problem.goals) if not why_off_lattice(problem, goal)]
-    if not goals:
-        return goals_off_lattice(problem)
-    graph = graph_of(problem, goals, workspace.prepared)
-    if graph is None:
-        return None
-    found = Incumbents(
-        problem, budget, workspace.on(problem.obstacles), alternatives, POLISHED
-    ).begun()
-    found.counts.update(expansions=0, collision_queries=0)
-    if problem.search.backwards:
-        graph = graph.backwards() or graph
-    least, why, nodes = _search(found, graph)
-    complete = why[0] is not PlanStatus.OUT_OF_BUDGET
-    if not found.plans:
-        return found.none(*why, nodes=nodes)
-    if not problem.search.improve:  # A* with a weight is off by that factor at most
-        least /= problem.search.weight or WEIGHT
-    if budget.watch is not None and budget.watch.problem is problem:
-        budget.watch.bound = max(budget.watch.bound, min(least, found.cost))
-    kind = "exhaustive" if complete else "open"
-    return found.found(bound=LowerBound(value=least, kind=kind), nodes=nodes)
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> bool:
+        """Load the kernels, and make the graph."""
+        load_kernels("lattice", "state lattice")
+        if goals_off_lattice(problem) is not None:
+            return True  # which is told without a search
+        return graph_of(problem, range(len(problem.goals)), workspace.prepared) is not None
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Always: what is blocked, and what there is no time for, is told."""
+        return True
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer the cheapest path of the graph."""
+        problem, budget, ended = found.problem, found.budget, found.ended
+        blocked = blocked_ends(problem)
+        open_ends = any(goal.tolerance_m > 0.0 for goal in problem.goals)
+        if blocked is not None and (blocked.status is PlanStatus.START_BLOCKED or not open_ends):
+            ended.verdict, ended.is_complete = blocked, True
+            return
+        goals = [k for k, goal in enumerate(problem.goals) if not why_off_lattice(problem, goal)]
+        if not goals:
+            ended.verdict, ended.is_complete = goals_off_lattice(problem), True
+            return
+        graph = graph_of(problem, goals, found.workspace.prepared)
+        if graph is None:
+            return
+        found.likeness, ended.is_complete = POLISHED, True
+        found.offer_nearly_met()
+        found.counts.update(expansions=0, collision_queries=0)
+        if problem.search.backwards:
+            graph = graph.backwards() or graph
+        least, why, ended.nodes = _search(found, graph)
+        ended.why = why
+        if not problem.search.improve:  # A* with a weight is off by that factor at most
+            least /= problem.search.weight or WEIGHT
+        if found.plans and budget.watch is not None and budget.watch.problem is problem:
+            budget.watch.bound = max(budget.watch.bound, min(least, found.cost))
+        complete = why[0] is not PlanStatus.OUT_OF_BUDGET
+        ended.bound = LowerBound(value=least, kind="exhaustive" if complete else "open")
 
 
 def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, str], Array | None]:

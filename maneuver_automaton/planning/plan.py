@@ -13,15 +13,19 @@ from typing import Any
 from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
-from maneuver_automaton.planning.free_space import plan_by_words
-from maneuver_automaton.planning.needs import has_inertia, has_tolerance, uses_lattice
+from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.leaving import plan_leaving
+from maneuver_automaton.planning.lower_bound import kept_bounds, known_bound, plan_to_gap
 from maneuver_automaton.planning.no_way import with_proof
+from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace, workspace_of
+from maneuver_automaton.planning.steps import answer, prepare_steps, uses_lattice
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.beginning import Begun, begin, end, prepare_bench
+from maneuver_automaton.search.beginning import prepare_bench
 from maneuver_automaton.search.choose import load_search
+from maneuver_automaton.search.lattice_query import lattice_query
 
 
 def plan(
@@ -76,8 +80,6 @@ def plan(
     (('spin', 'ahead', 'spin'), 7.6974, True)
     """
     if leave:
-        from maneuver_automaton.planning.leaving import plan_leaving
-
         search = functools.partial(plan, gap=gap, watch=watch)
         return plan_leaving(problem, search, time_limit=time_limit)
     workspace = workspace_of(problem.obstacles)
@@ -100,8 +102,6 @@ def _shown(
     problem: Problem, watch: Watch, on_better: Callable[[PlanResult], None]
 ) -> Callable[[Callable[..., PlanResult]], None]:
     """What hands a better plan on, with the best bound that there is meanwhile."""
-    from maneuver_automaton.planning.lower_bound import known_bound
-
     known = functools.cache(lambda: known_bound(problem))
 
     def show(found: Callable[..., PlanResult]) -> None:
@@ -135,95 +135,37 @@ def plan_in(
         raise ValueError(f"gap must be a share from 0 to below 1, got {gap}")
     _load(problem, workspace)
     if gap is not None:
-        from maneuver_automaton.planning.lower_bound import load_proofs
-
-        load_proofs()
+        load_kernels("cells")
     if alternatives and uses_lattice(problem):
         load_search(problem)
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
     budget = replace(budget, shows=shows)
     with patient():
-        if gap is None:
-            if watch is not None:
-                watch.problem = problem
-                budget = replace(budget, watch=watch)
-            return plan_within(problem, budget, workspace, alternatives=alternatives)
-        from maneuver_automaton.planning.lower_bound import kept_bounds, plan_to_gap
-
-        watch = watch or Watch(gap=gap)
-        watch.gap, watch.problem = gap, problem
-        search = functools.partial(
-            plan_within, problem, workspace=workspace, alternatives=alternatives
-        )
-        kept = kept_bounds(problem, workspace)
-        return plan_to_gap(problem, search, budget, watch, kept=kept)
+        if gap is not None:
+            watch = watch or Watch(gap=gap)
+            watch.gap, watch.problem = gap, problem
+            search = functools.partial(
+                plan_within, problem, workspace=workspace, alternatives=alternatives
+            )
+            kept = kept_bounds(problem, workspace)
+            return plan_to_gap(problem, search, budget, watch, kept=kept)
+        if watch is not None:
+            watch.problem = problem
+            budget = replace(budget, watch=watch)
+        return plan_within(problem, budget, workspace, alternatives=alternatives)
 
 
 def plan_within(
     problem: Problem, budget: Budget, workspace: Workspace, *, alternatives: int
 ) -> PlanResult:
-    """The answer to a problem within a budget, the checks included; kernels are loaded already."""
-    if problem.automaton.lattice is not None and problem.search.method in ("auto", "lattice"):
-        from maneuver_automaton.planning.on_state_lattice import plan_on_state_lattice
-
-        known = plan_on_state_lattice(problem, budget, workspace, alternatives=alternatives)
-        if known is not None:
-            return with_proof(known, budget)
-    if has_tolerance(problem):
-        from maneuver_automaton.planning.within_tolerance import plan_within_tolerance
-
-        result = plan_within_tolerance(
-            problem, _answered, budget, workspace, alternatives=alternatives
-        )
-    else:
-        result = _answered(problem, budget, workspace, alternatives=alternatives)
+    """The answer to a problem within a budget, or the proof that there is none; all is loaded."""
+    result = answer(problem, budget, workspace, alternatives=alternatives)
     return _noted(with_proof(result, budget))
 
 
 def _noted(result: PlanResult) -> PlanResult:
     """The result, with what was left out of planning."""
-    if not has_inertia(result.problem):
-        return result
-    from maneuver_automaton.planning.polishing import left_out
-
     return replace(result, notes=(*result.notes, *left_out(result.problem)))
-
-
-def _answered(
-    problem: Problem, budget: Budget, workspace: Workspace, /, *, alternatives: int
-) -> PlanResult:
-    """The answer to a problem whose goals are met exactly."""
-    begun = begin(problem, workspace.prepared, budget)
-    if begun is not None:  # its ends are free
-        try:
-            return _searched(problem, budget, workspace, alternatives=alternatives, begun=begun)
-        finally:
-            end(problem, begun, workspace.prepared)
-    blocked = blocked_ends(problem) or goals_off_lattice(problem)
-    if blocked is not None:
-        return blocked
-    if problem.zones:
-        from maneuver_automaton.planning.among_zones import plan_among_zones
-
-        return plan_among_zones(problem, _searched, budget, workspace, alternatives=alternatives)
-    return _searched(problem, budget, workspace, alternatives=alternatives)
-
-
-def _searched(
-    problem: Problem,
-    budget: Budget,
-    workspace: Workspace,
-    /,
-    *,
-    alternatives: int,
-    begun: Begun | None = None,
-) -> PlanResult:
-    """The answer of the search that suits a problem without zones."""
-    if has_inertia(problem) or uses_lattice(problem):
-        from maneuver_automaton.planning.in_steps import plan_in_steps
-
-        return plan_in_steps(problem, budget, workspace, alternatives=alternatives, begun=begun)
-    return plan_by_words(problem, budget, workspace, alternatives=alternatives)
 
 
 def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
@@ -231,9 +173,6 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     workspace = workspace or workspace_of(problem.obstacles)
     _load(problem, workspace)
     if uses_lattice(problem):
-        from maneuver_automaton.planning.checking import load_checks
-        from maneuver_automaton.search.lattice_query import lattice_query
-
         goals = tuple(range(len(problem.goals)))
         lattice_query(problem, goals, prepared=workspace.prepared)
         prepare_bench(problem, workspace.prepared)
@@ -244,7 +183,7 @@ def _load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs: once for all like queries."""
     ready = _ready(problem.setting, workspace)
     if problem.ends not in ready:
-        _load_all(problem, workspace)
+        prepare_steps(problem, workspace)
         ready.add(problem.ends)
     if problem.setting is not problem and uses_lattice(problem):  # others may follow it
         prepare_bench(problem, workspace.prepared)
@@ -255,30 +194,6 @@ def _ready(setting: Problem, workspace: Workspace) -> set[Any]:
     """Which kinds of ends everything is loaded for."""
     del setting, workspace  # they say which set is meant
     return set()
-
-
-def _load_all(problem: Problem, workspace: Workspace) -> None:
-    guarded = bool(problem.obstacles or problem.zones)
-    if guarded:
-        from maneuver_automaton.planning.checking import load_checking
-
-        load_checking()  # what is imported in the first check would make it late
-    if problem.automaton.lattice is not None and problem.search.method in ("auto", "lattice"):
-        from maneuver_automaton.planning.on_state_lattice import load_state_lattice
-
-        if load_state_lattice(problem, workspace):
-            return
-    in_space = problem.start.size > 3 and guarded
-    if has_inertia(problem) or uses_lattice(problem) or in_space:
-        from maneuver_automaton.planning.steps import load_steps
-
-        load_steps(problem, workspace)
-        return
-    if guarded:
-        from maneuver_automaton.refinement.ready import load_lattice
-
-        load_lattice()
-    load_search(problem)
 
 
 def plans(

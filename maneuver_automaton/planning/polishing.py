@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,12 @@ from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import BodyPart, Guard
 from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.planning.needs import has_inertia, rests_at_both_ends
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
     polished_price,
 )
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
@@ -97,56 +97,73 @@ def _frames_take_symbols(model: Model) -> bool:
 def left_out(*problems: Problem) -> tuple[str, ...]:
     """What plans of some problems do without that they should have, and why: a sentence each."""
     for one in problems:
-        why = why_not_polished(one) if has_inertia(one) else ""
+        why = why_not_polished(one) if one.has_inertia else ""
         if why and why in (why_no_casadi(), NUMBERS_ALONE):
             return (f"plans are not polished, and may cost much more: {why}",)
     return ()
 
 
-def load_polishing(problem: Problem) -> None:
-    """Have ready what polishing needs: the solver, and tables of the kinematic libraries."""
-    load_casadi()
-    along = path_guesses(problem.automaton.model)
-    for library in along.libraries if along else ():
-        cost_to_go_table(simpler_problem(problem, library, cost=BY_TIME))
+@dataclass(slots=True, eq=False)
+class Polish:
+    """Polish kinematic plans of different gears, and the plans found; offer what is cheaper."""
 
+    guesses: list[Aimed] = field(default_factory=list)  # along kinematic plans that are known
+    otherwise: Callable[[], None] | None = None  # offers what there is where nothing is gained
+    tried: float = math.inf  # cost of the cheapest plan when all guesses were tried before
 
-def polish_found(found: Incumbents, paths: Sequence[Aimed], *, share: float = 1.0) -> bool:
-    """Polish kinematic plans of different gears, and the plans found; keep those that are cheaper.
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """The solver, and tables of the kinematic libraries."""
+        if not problem.rests_at_both_ends:
+            return
+        load_casadi()
+        along = path_guesses(problem.automaton.model)
+        for library in along.libraries if along else ():
+            cost_to_go_table(simpler_problem(problem, library, cost=BY_TIME))
 
-    `paths` are guesses along kinematic plans that are known already. Whether all were tried within
-    a share of the time.
-    """
-    problem, budget = found.problem, found.for_better.stage(share)
-    price = polished_price(problem)
-    known = _worth_polishing(found, price)
-    if budget.is_over or why_not_polished(problem):
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether there is time for more than checks, and a plan that is new, or none."""
+        over = found.for_better.is_over or found.is_enough
+        return not (over or found.cost == self.tried < math.inf)
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer what polishing finds in all the time that is left."""
+        known = found.cost
+        self.polish(found)
+        if self.otherwise and found.cost == known and not found.budget.is_over:
+            self.otherwise()
+
+    def polish(self, found: Incumbents, *, share: float = 1.0) -> bool:
+        """Offer what polishing finds within a share of the time; whether all guesses were tried."""
+        problem, budget = found.problem, found.for_better.stage(share)
+        if budget.is_over or why_not_polished(problem):
+            return not budget.is_over
+        price = polished_price(problem)
+        known = _worth_polishing(found, price)
+        if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
+            return True  # it is there already
+        stage_cost = price.stage_cost(known[0][0] if known else None)
+        solid = _without_passed(problem, known[0][0]) if known else problem
+        work = iterations_within(budget)
+        for goal_index, guesses in _in_groups(problem, known, self.guesses, budget):
+            if budget.is_over or (work is not None and work <= 0):
+                break
+            try:
+                polished = polish_plans(
+                    solid,
+                    guesses,
+                    goal_index,
+                    stage_cost,
+                    budget=budget,
+                    most_iterations=work,
+                    accepts=functools.partial(found.offer, goal_index=goal_index),
+                )
+            except RuntimeError:  # the solver gave up on a number; the plan in hand stays
+                found.counts.update(solver_errors=1)
+                continue
+            found.counts.update(polished=len(polished.attempts))
+            if work is not None:
+                work -= sum(attempt.iterations for attempt in polished.attempts)
         return not budget.is_over
-    if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
-        return True  # it is there already
-    stage_cost = price.stage_cost(known[0][0] if known else None)
-    solid = _without_passed(problem, known[0][0]) if known else problem
-    work = iterations_within(budget)
-    for goal_index, guesses in _in_groups(problem, known, paths, budget):
-        if budget.is_over or (work is not None and work <= 0):
-            break
-        try:
-            polished = polish_plans(
-                solid,
-                guesses,
-                goal_index,
-                stage_cost,
-                budget=budget,
-                most_iterations=work,
-                accepts=functools.partial(found.offer, goal_index=goal_index),
-            )
-        except RuntimeError:  # the solver gave up on a number; the plan in hand stays
-            found.counts.update(solver_errors=1)
-            continue
-        found.counts.update(polished=len(polished.attempts))
-        if work is not None:
-            work -= sum(attempt.iterations for attempt in polished.attempts)
-    return not budget.is_over
 
 
 def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan, int]]:
@@ -172,7 +189,7 @@ def _in_groups(
         return  # a path knows nothing of time
     model = problem.automaton.model
     led = path_guesses(model) is not None and not follows_paths(model)  # paths are guesses only
-    if led and rests_at_both_ends(problem):
+    if led and problem.rests_at_both_ends:
         yield from _by_goal(problem, guesses_along_paths(problem, budget))
 
 
@@ -180,7 +197,7 @@ def _guesses(
     problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
 ) -> Iterator[Aimed]:
     """Guesses along kinematic plans; where there are none, the plans that are known."""
-    if rests_at_both_ends(problem) and follows_paths(problem.automaton.model) and not problem.moves:
+    if problem.rests_at_both_ends and follows_paths(problem.automaton.model) and not problem.moves:
         along = guesses_along_paths(problem, budget)
         if (first := next(along, None)) is not None:
             yield first

@@ -1,117 +1,275 @@
-"""Which steps lead to the plans of a problem: decided once, by what its vehicle and library can do.
+"""Planning, from top to bottom: the steps that lead to the plans of a problem, one after the other.
 
-The order of the steps and all that they share is the same for every vehicle.
+What a vehicle and its library can do decides which steps there are. All of them offer what they
+find to the same incumbents, where it is checked; the answer is made of these.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import functools
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
 
-from maneuver_automaton.automaton.same_motion import POLISHED, UNFINISHED, Likeness
-from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning.bounds import least_price_per_metre
-from maneuver_automaton.planning.checking import load_checking
-from maneuver_automaton.planning.needs import (
-    climbs_among_obstacles,
-    has_inertia,
-    rests_at_both_ends,
+import numpy as np
+
+from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.planning.along_paths import AlongPaths
+from maneuver_automaton.planning.among_zones import AmongZones
+from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
+from maneuver_automaton.planning.bounds import bound_along_paths, least_price_per_metre
+from maneuver_automaton.planning.checking import load_checking, load_checks
+from maneuver_automaton.planning.free_space import (
+    AllWords,
+    FreeWords,
+    TurnedByManeuvers,
+    certificate_of,
 )
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.lattice_words import Lattice
+from maneuver_automaton.planning.on_state_lattice import StateLattice
 from maneuver_automaton.planning.polished_price import prices_metres_alone
-from maneuver_automaton.planning.polishing import load_polishing, why_not_polished
-from maneuver_automaton.planning.result import Workspace
+from maneuver_automaton.planning.polishing import Polish, why_not_polished
+from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
+from maneuver_automaton.planning.within_tolerance import WithinTolerance
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
-from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
-from maneuver_automaton.search.choose import load_insertion_kernels, load_search, load_times_kernels
-from maneuver_automaton.search.cost_to_go import cost_to_go_table
-from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.lattice_trims import stands_for_more
-from maneuver_automaton.search.linked_words import ALPHABET, load_linked_words
-from maneuver_automaton.search.word_setup import word_setup
-
-BY_TIME = Cost(time=1.0)  # one value: what is prepared for it is found again
+from maneuver_automaton.refinement.stop_and_steer import follows_paths
+from maneuver_automaton.search.beginning import begin, end
+from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.words.maneuver_words import only_maneuvers_turn
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Steps:
-    """The steps of planning for a problem, in their order."""
+class Step(Protocol):
+    """One way to plans of a problem."""
 
-    along_paths: bool  # stop and steer along the paths of a kinematic vehicle
-    words: bool  # offer words of free space before the lattice is searched
-    lattice: bool
-    polishes: bool  # at the end, what was found
-    at_will: bool  # trims are switched so: plans are words, and words are all there is
-    likeness: Likeness  # of plans that count as one motion
+    def prepare(self, problem: Problem, workspace: Workspace) -> bool | None:
+        """Have ready what it needs before the clock runs; True if later steps need nothing."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether it is to be tried, after what was found and with the time that is left."""
+        ...
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer plans as they are found, within the budget of the incumbents."""
+
+
+class Steps(NamedTuple):
+    """The steps of a problem in their order, and how what they find is looked at."""
+
+    steps: Sequence[Step]
+    likeness: Likeness = CONVERGED  # of plans that count as one motion
+    certified: bool = False  # whether reduced costs say something of the cheapest plan
+
+
+def answer(
+    problem: Problem,
+    budget: Budget,
+    workspace: Workspace,
+    /,
+    *,
+    alternatives: int,
+    course: Callable[[Problem], Steps] | None = None,
+) -> PlanResult:
+    """The answer to a problem within a budget, the checks included; kernels are loaded already.
+
+    Where the problem limits its expansions, all steps count their work: the plan is then the same
+    at every call, unless the time is over before. The steps are those of `course`, by default
+    `steps_of`.
+    """
+    steps, likeness, certified = (course or steps_of)(problem)
+    workspace = workspace.on(problem.obstacles)
+    found = Incumbents(problem, budget, workspace, alternatives, likeness)
+    ended = found.ended
+    try:
+        for step in steps:
+            if not ended.is_complete and step.is_due(found):
+                step.offer(found)
+    finally:
+        if ended.begun is not None:  # whose memory serves the next query
+            end(problem, ended.begun, workspace.prepared)
+    if ended.verdict is not None:
+        return ended.verdict
+    if not ended.is_complete:
+        found.counts.update(expansions=0, collision_queries=0)
+        if not ended.finds_plans:
+            found.counts["rejected"] = found.rejected
+    if not found.plans:
+        return found.none(*(ended.why or _why_none(found)), nodes=ended.nodes)
+    return found.found(
+        bound=ended.bound or bound_along_paths(problem),
+        searched=ended.searched,
+        certificate=certificate_of(found) if certified else None,
+        nodes=ended.nodes,
+    )
 
 
 def steps_of(problem: Problem) -> Steps:
-    """The steps that lead to plans of a problem.
+    """The steps of a problem: its graph, if it has one, then those to its goals."""
+    graph = [StateLattice()] if _may_be_a_graph(problem) else []
+    if problem.has_tolerance:
+        return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
+    rest = exact_steps(problem)
+    return rest._replace(steps=[*graph, *rest.steps])
+
+
+def exact_steps(problem: Problem) -> Steps:
+    """The steps to plans that end exactly at a goal: of the search, or of several among zones."""
+    if problem.zones:
+        zones = AmongZones(functools.partial(answer, course=search_steps))
+        return Steps([Ends(), NearlyMet(), zones])
+    rest = search_steps(problem)
+    return rest._replace(steps=[Ends(), *rest.steps])
+
+
+def search_steps(problem: Problem) -> Steps:
+    """The steps of one search, from a start and to goals that are free.
 
     Where nothing is in the way, words come before the lattice: they are found sooner, and keep to
     every condition of the horizon. Among obstacles the lattice alone finds a path round them; but
     in space, where it has one more dimension, a word that passes above or below is found sooner.
     """
     method, automaton = problem.search.method, problem.automaton
-    searched = method in ("auto", "lattice")
-    if not has_inertia(problem):
-        return Steps(
-            along_paths=False,
-            words=climbs_among_obstacles(problem),
-            lattice=searched,
-            polishes=False,
-            at_will=True,
-            likeness=UNFINISHED,
-        )
-    linked = bool(automaton.maneuvers)
-    first = method == "auto" and _suits_words(problem)
-    along = searched and follows_paths(automaton.model) and rests_at_both_ends(problem)
+    if not problem.has_inertia:
+        if not uses_lattice(problem):
+            return Steps([NearlyMet(), AllWords()], certified=True)
+        first: list[Step] = [Checks(), FreeWords()] if problem.climbs_among_obstacles else []
+        lattice = [Lattice()] if method in ("auto", "lattice") else []
+        return Steps([NearlyMet(), *first, *lattice], UNFINISHED)
+    searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
+    along = searched and follows_paths(automaton.model) and problem.rests_at_both_ends
     shortest = along and prices_metres_alone(problem.cost)  # to stop and steer costs no metre
-    return Steps(
-        along_paths=along,
-        words=linked and (not searched or first),
-        lattice=linked and searched,
-        polishes=not (shortest or why_not_polished(problem)),
-        at_will=False,
-        likeness=POLISHED,
-    )
+    polish = None if shortest or why_not_polished(problem) else Polish()
+    steps: list[Step] = [NearlyMet(), Checks()]
+    if along:
+        steps.append(AlongPaths(polish))
+    if linked and (not searched or (method == "auto" and _suits_words(problem))):
+        steps.append(FreeWords())
+    if only_maneuvers_turn(automaton):
+        steps.append(TurnedByManeuvers())
+    if linked and searched:
+        steps.append(Lattice(polish))
+    if polish:
+        steps.append(polish)
+    return Steps(steps, POLISHED, certified=True)
 
 
-def load_steps(problem: Problem, workspace: Workspace) -> None:
-    """Compile or load what the steps of a problem need, before the clock runs."""
-    steps = steps_of(problem)
-    if steps.at_will and problem.start.size > 3:
-        load_search(problem)
-        load_maneuver_kernels()
+def prepare_steps(problem: Problem, workspace: Workspace) -> None:
+    """Have ready what the steps of a problem need, before the clock runs."""
+    if problem.obstacles or problem.zones:
+        load_checking()  # what is imported in the first check would make it late
+    if _may_be_a_graph(problem) and StateLattice().prepare(problem, workspace):
         return
-    load_lattice()
-    if steps.at_will:
-        cost_to_go_table(problem, prepared=workspace.prepared)
-        if stands_for_more(problem):
-            load_insertion_kernels()
-        return
-    load_checking()
-    if follows_paths(problem.automaton.model) and rests_at_both_ends(problem):
-        simpler = kinematic_problem(problem, switch=0.0)
-        cost_to_go_table(simpler, prepared=workspace.prepared)
-    if steps.polishes and rests_at_both_ends(problem):
-        load_polishing(problem)
-    if problem.automaton.maneuvers:
-        load_maneuver_kernels()
-        load_times_kernels()
-        least_price_per_metre(problem.automaton, problem.cost)
-        if steps.lattice:
-            goals, horizon = range(len(problem.goals)), problem.horizon
-            library = lattice_library(problem, goals, prepared=workspace.prepared)
-            if horizon.time or horizon.max_time or library.per_metre == 0.0:
-                in_time = replace(problem, cost=BY_TIME)
-                lattice_library(in_time, goals, prepared=workspace.prepared)
-        if _suits_words(problem) or steps.words:
-            load_linked_words()
-            for goal in problem.goals:
-                word_setup(problem, goal, most_trims=ALPHABET, steers=True)
+    for step in search_steps(problem).steps:
+        step.prepare(problem, workspace)
+
+
+def _may_be_a_graph(problem: Problem) -> bool:
+    return problem.automaton.lattice is not None and problem.search.method in ("auto", "lattice")
 
 
 def _suits_words(problem: Problem) -> bool:
     """Whether words may be searched first: nothing is in the way, or they alone meet the time."""
     rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
     return not problem.obstacles or (problem.horizon.time is not None and not rests)
+
+
+def uses_lattice(problem: Problem) -> bool:
+    """Whether the lattice plans: it was asked for, or there is something in the way.
+
+    In the plane it needs two trims that move, one of which turns or leads to another side; and a
+    rest where the time is fixed. Otherwise words are searched, and those that meet obstacles are
+    refused.
+    """
+    return _uses_lattice(problem.setting)
+
+
+@kept_by_first
+def _uses_lattice(problem: Problem) -> bool:
+    if problem.climbs_among_obstacles:
+        return True
+    velocities = problem.automaton.body_velocities
+    moving = velocities[velocities.any(axis=1)]
+    sides = moving[:, 2].any() or np.linalg.matrix_rank(moving[:, :2]) == 2
+    steers = len(moving) > 1 and sides and velocities.shape[1] == 3
+    if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
+        return False
+    method = problem.search.method
+    return method == "lattice" or (method == "auto" and bool(problem.obstacles))
+
+
+class Ends:
+    """Tell where no vehicle can be; where all ends are free, begin the search of the lattice."""
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Nothing: what begins a search is prepared for a map, by `prepare`."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Always."""
+        return True
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer nothing, but a verdict."""
+        problem, ended = found.problem, found.ended
+        ended.begun = begin(problem, found.workspace.prepared, found.budget)
+        if ended.begun is None:
+            ended.verdict = blocked_ends(problem) or goals_off_lattice(problem)
+            ended.is_complete = ended.verdict is not None
+
+
+class NearlyMet:
+    """What meets a goal for the checks, however far an exact end is from it."""
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Nothing has to be ready."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Always."""
+        return True
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer the first that passes the checks."""
+        found.offer_nearly_met()
+
+
+class Checks:
+    """Have the map ready for checks, where plans are checked as they come."""
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Import what checks, and price the maneuvers, which bounds and certificates need."""
+        load_checking()
+        if problem.automaton.maneuvers:
+            load_kernels("times")
+            least_price_per_metre(problem.automaton, problem.cost)
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether there is time."""
+        return not found.budget.is_over
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer nothing."""
+        load_checks(found.problem, found.workspace)
+
+
+def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:
+    """How it ended where no plan was accepted, and why."""
+    first = found.ended.lattice
+    proof = found.ended.proof or (first.enclosed if first else "")
+    proof = proof or ("" if found.problem.has_inertia else why_impossible(found.problem))
+    if proof:
+        return PlanStatus.UNREACHABLE, proof
+    if found.why_unchecked:
+        return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
+    if found.why_refused:
+        return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
+    near = ""
+    if first and math.isfinite(first.nearest[0]):
+        near = "; the nearest node is {:.3g} m and {:.3g} rad off".format(*first.nearest)
+    if first and first.exhausted:
+        return PlanStatus.NO_PLAN, f"none at any resolution tried, which proves nothing{near}"
+    spent = f"{found.counts['expansions']} expansions" if first else "the expansions allowed"
+    return PlanStatus.OUT_OF_BUDGET, (
+        f"no plan within {found.budget.seconds:.4g} s and {spent}{found.ended.remark}{near}"
+    )

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances, free_times
@@ -19,7 +20,6 @@ from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.no_way import along_free_path
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
-from maneuver_automaton.refinement.ready import load_lattice
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
@@ -28,6 +28,7 @@ from maneuver_automaton.search.lattice_worlds import world_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.words.word import Word
 
+AT_ONCE = Patience(attempts=0, passes=0)
 LITTLE = Patience(attempts=800, passes=2)  # where a step's budget is short
 PROVEN = 1e-6  # [m] what a search has proven with its margin passes with this one, once more
 PROVEN_SHARE = 0.2  # of the search's margin, where that is tiny
@@ -161,7 +162,7 @@ def track(
     >>> track(problem, budget=Budget.from_now(5.0)).cost
     9.0
     """
-    load_lattice()
+    load_kernels("lattice", "improvement")
     table = cost_to_go_table(problem, prepared=prepared)
     goals = open_goals(problem)
     if not goals:

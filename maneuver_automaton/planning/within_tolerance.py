@@ -10,13 +10,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.headings import trim_headings
+from maneuver_automaton.automaton.same_motion import CONVERGED
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
@@ -41,39 +42,51 @@ LOOSENED_SHARE = 0.1  # of the time, that is kept back for letting ends loose
 SPARE = 3  # plans asked for each alternative: with loose ends some are one motion
 
 
-def plan_within_tolerance(
-    problem: Problem, answer: Answer, budget: Budget, workspace: Workspace, *, alternatives: int
-) -> PlanResult:
-    """The cheapest plan found that ends within the tolerance of a goal."""
-    found = Incumbents(problem, budget, workspace, alternatives)
-    results: dict[int, PlanResult] = {}
+@dataclass(frozen=True, slots=True, eq=False)
+class WithinTolerance:
+    """Plans that end within the tolerance of a goal, by `answer` to simpler questions."""
 
-    def offer(result: PlanResult) -> None:
-        assert result.plan is not None
-        any(found.offer(result.plan, index) for index in _goals_met(problem, result.plan))
+    answer: Answer
 
-    turns = found.ask(
-        list(_questions(problem)),
-        answer,
-        offer,
-        budget=budget.before(LOOSENED_SHARE * budget.seconds),
-        alternatives=SPARE * alternatives,
-        shares=LATER,
-    )
-    for k, result, _ in turns:
-        results[k] = result
-        for at, cost in result.improvements:
-            found.note(cost, at=at)
-        for plan in (result.plan, *(other.plan for other in result.alternatives)):
-            if plan is not None:
-                _offer_loosened(found, plan)
-    if not found.plans:
-        if found.why_unchecked:
-            return found.none(PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
-        return found.none(*_why_none(problem, results[0], found.why_refused, budget))
-    exact = results[0]
-    bound = exact.bound if exact.problem.goals == problem.goals else None
-    return found.found(bound=bound or formula_bound(problem), nodes=exact.nodes)
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Nothing but what the questions need."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Always: each question has a moment."""
+        return True
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer the answers, their ends let loose."""
+        problem, budget, ended = found.problem, found.budget, found.ended
+        found.likeness, ended.is_complete = CONVERGED, True
+        results: dict[int, PlanResult] = {}
+
+        def offer(result: PlanResult) -> None:
+            assert result.plan is not None
+            any(found.offer(result.plan, index) for index in _goals_met(problem, result.plan))
+
+        turns = found.ask(
+            list(_questions(problem)),
+            self.answer,
+            offer,
+            budget=budget.before(LOOSENED_SHARE * budget.seconds),
+            alternatives=SPARE * found.alternatives,
+            shares=LATER,
+        )
+        for k, result, _ in turns:
+            results[k] = result
+            for at, cost in result.improvements:
+                found.note(cost, at=at)
+            for plan in (result.plan, *(other.plan for other in result.alternatives)):
+                if plan is not None:
+                    _offer_loosened(found, plan)
+        exact = results[0]
+        if not found.plans:
+            late = PlanStatus.OUT_OF_BUDGET, found.why_unchecked
+            ended.why = late if late[1] else _why_none(problem, exact, found.why_refused, budget)
+            return
+        bound = exact.bound if exact.problem.goals == problem.goals else None
+        ended.bound, ended.nodes = bound or formula_bound(problem), exact.nodes
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:

@@ -23,8 +23,7 @@ from maneuver_automaton.receding_horizon.rest_of_plan import (
     rest_of,
 )
 from maneuver_automaton.receding_horizon.settings import EXACT, Settings
-from maneuver_automaton.refinement.effort import effort_report
-from maneuver_automaton.refinement.retiming import retime
+from maneuver_automaton.refinement.retiming import effort_report, retime
 from maneuver_automaton.refinement.shooting import least_effort
 from maneuver_automaton.search.choose import search_goal
 from maneuver_automaton.search.limits import outside, stays_inside

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, as_number
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
@@ -22,7 +23,6 @@ from maneuver_automaton.receding_horizon.candidates import (
     is_rest_of,
     is_uniform,
 )
-from maneuver_automaton.receding_horizon.failsafe import load_fail_safe
 from maneuver_automaton.receding_horizon.guarantees import LoopBounds, broken, promises, too_cheap
 from maneuver_automaton.receding_horizon.log import (
     Decision,
@@ -44,11 +44,8 @@ from maneuver_automaton.receding_horizon.settings import (
 )
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import StepSearch
-from maneuver_automaton.refinement.ready import load_lattice, load_maneuver_kernels
 from maneuver_automaton.search.choose import load_search as load_words
-from maneuver_automaton.search.choose import load_times_kernels
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
-from maneuver_automaton.search.linked_words import load_linked_words
 
 MOST_AHEAD = 10_000  # steps ahead for which a plan gets samples; later steps see to theirs
 
@@ -412,16 +409,15 @@ def _started(
 
 def load_search(problem: Problem) -> None:
     """Prepare the search of a step for a problem, before its clock runs."""
-    load_times_kernels()
+    load_kernels("times")
     if needs_maneuvers(problem):
-        load_linked_words()
+        load_kernels("words")
         if problem.obstacles or problem.zones:
-            load_maneuver_kernels()
+            load_kernels("lattice", "improvement")
         if problem.moves:
-            load_fail_safe()
+            load_kernels("lattice", "fail-safe")
     elif problem.obstacles:
-        load_lattice()
-        load_fail_safe()
+        load_kernels("lattice", "improvement", "fail-safe")
         cost_to_go_table(problem)
     else:
         load_words(problem)

@@ -246,15 +246,6 @@ def _coast(
     times.append(lasting)
 
 
-@functools.cache
-def load_fail_safe() -> None:
-    """Have the kernels ready before the clock runs."""
-    from maneuver_automaton.search.choose import smallest_lattice_query
-
-    problem = smallest_lattice_query().problem
-    stands_free(problem, search_fail_safe(problem, until=1.0).plan.end, time=1.0, duration=1.0)
-
-
 def looked_at(here: Problem, settings: Settings) -> float:
     """Time [s] that is looked at: as far as is asked for, or until all obstacles are static."""
     until = here.start_time + settings.look_ahead

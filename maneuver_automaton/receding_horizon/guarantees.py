@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning.lower_bound import Proving, in_costs, load_proofs
+from maneuver_automaton.planning.lower_bound import Proving, in_costs
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.settings import switches_at_will
@@ -212,7 +213,7 @@ class LoopBounds:
     @classmethod
     def ready(cls, gap: float) -> LoopBounds:
         """Bounds of a loop that begins, with all that is to be compiled."""
-        load_proofs()
+        load_kernels("cells")
         return cls(gap)
 
     def forget(self) -> None:

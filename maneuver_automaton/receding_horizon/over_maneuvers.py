@@ -20,7 +20,6 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
-from maneuver_automaton.planning.needs import climbs_among_obstacles
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
@@ -324,7 +323,7 @@ def needs_maneuvers(problem: Problem) -> bool:
     unfilled = problem.horizon.time is not None and problem.automaton.rest is None
     if not switches_at_will(problem) or unfilled:
         return True
-    return bool(problem.zones) or climbs_among_obstacles(problem)
+    return bool(problem.zones) or problem.climbs_among_obstacles
 
 
 def with_trims_at_ends(problem: Problem) -> Problem:

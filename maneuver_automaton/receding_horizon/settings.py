@@ -8,7 +8,6 @@ import numpy as np
 
 from maneuver_automaton._arrays import plain_numbers
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.planning.needs import climbs_among_obstacles, has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
@@ -74,7 +73,7 @@ class Settings:
     def _check_continuous(self, problem: Problem) -> None:
         """Raise ValueError if plans of a problem cannot be driven with other controls."""
         what, cost = "plans with pieces" if self.pieces else "retimed plans", problem.cost
-        if not self.at_will or problem.zones or climbs_among_obstacles(problem):
+        if not self.at_will or problem.zones or problem.climbs_among_obstacles:
             raise ValueError(
                 f"receding horizon: {'pieces are' if self.pieces else 'retimed is'} for vehicles "
                 "without inertia, and no zones or heights: at another pace a maneuver leads "
@@ -105,7 +104,7 @@ def switches_at_will(problem: Problem) -> bool:
 
     This is the one place of the room where a problem is asked for it.
     """
-    return not has_inertia(problem)
+    return not problem.has_inertia
 
 
 def filling_rest(problem: Problem) -> Trim | None:

@@ -9,7 +9,6 @@ from functools import cached_property
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.needs import has_inertia
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
 from maneuver_automaton.receding_horizon.candidates import (
@@ -102,7 +101,7 @@ class Situation:
         None for a vehicle with inertia whose library has no such trim. Bounds ask for no more.
         """
         here, automaton = self.here, self.here.automaton
-        if not has_inertia(here) or (self.trim.is_rest and not self.busy):
+        if not here.has_inertia or (self.trim.is_rest and not self.busy):
             return here
         moving = next((trim.name for trim in automaton.trims if not trim.is_rest), None)
         return None if moving is None else replace(here, start_trim=moving)

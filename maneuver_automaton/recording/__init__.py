@@ -15,9 +15,9 @@ from maneuver_automaton.recording.values import Fact as Fact
 from maneuver_automaton.recording.values import Mover as Mover
 from maneuver_automaton.recording.values import Recording as Recording
 from maneuver_automaton.recording.values import Search as Search
+from maneuver_automaton.recording.values import Table as Table
 from maneuver_automaton.recording.values import bodies_of as bodies_of
 from maneuver_automaton.recording.values import world_of as world_of
-from maneuver_automaton.recording.values import Table as Table
 
 ROOMS = {  # of results: who records them, loaded only where there is such a result
     "automaton": "plans",

@@ -11,90 +11,27 @@ and the answer in common.
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Unicycle
-from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.free_insertion import compile_calming, free_stages
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.free_insertion import free_stages
 from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
 from maneuver_automaton.search.setup import SearchSetup, search_setup, sub_library
-from maneuver_automaton.search.word_scan import MOST_AT_ONCE, MOST_TRIMS, tables_of
+from maneuver_automaton.search.word_scan import MOST_TRIMS, tables_of
 from maneuver_automaton.search.words import resting, search_words
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.word import Word
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.lattice_query import LatticeQuery
-
-
-MANY = 10**9
-
-
-@functools.cache
-def load_word_kernels(max_trims: int) -> None:
-    """Have the kernels of exhaustive search ready, for words of up to `max_trims` trims."""
-    problem = replace(_smallest_problem(), horizon=Horizon(max_trims=max_trims))
-    at_once = replace(problem, horizon=Horizon(max_trims=min(max_trims, MOST_AT_ONCE)))
-    search_words(at_once, at_once.goals[0])
-    counted = SearchSettings(max_expansions=MANY)  # which is never done at once
-    found = search_words(replace(problem, search=counted), problem.goals[0])
-    for solution in found.solutions[:1]:  # none where a signal ended the search
-        certificate(problem, problem.goals[0], solution)
-
-
-@functools.cache
-def load_insertion_kernels() -> None:
-    """Have the kernels of insertion ready."""
-    problem = _smallest_problem()
-    search_insertion(problem, problem.goals[0])
-    compile_calming(problem)
-
-
-@functools.cache
-def load_times_kernels() -> None:
-    """Have the kernels that solve the times of a given word ready, and those that price it."""
-    solve_switching_times([[1.0, 0.0, 0.0]], [1.0], [1.0, 0.0, 0.0])
-    problem = _smallest_problem()
-    straight = Word(trims=np.array([0]), durations=np.array([1.0]), cost=1.0)
-    certificate(problem, problem.goals[0], straight)
-
-
-def smallest_lattice_query() -> LatticeQuery:
-    """A query with a wall and a map, which compiles every kernel of the lattice."""
-    from maneuver_automaton.collision import Box, Obstacle, OccupancyMap
-    from maneuver_automaton.search._kernels_distance import distances
-    from maneuver_automaton.search.distance_grid import distance_grid
-    from maneuver_automaton.search.lattice import plane_bound
-    from maneuver_automaton.search.lattice_query import lattice_query
-
-    wall = Obstacle(Box([1.0, 1.0], [0.0, 9.0]))
-    room = OccupancyMap(np.eye(2, dtype=np.bool_), resolution=0.5, origin=[5.0, 9.0, 0.1])
-    query = lattice_query(replace(_smallest_problem(), obstacles=(wall, room)), (0,))
-    plane_bound(query)
-    grid = distance_grid(query.world, query.box, query.goals, query.start)
-    distances(grid, query.world.arrays.field, np.zeros((1, 2)))
-    return query
-
-
-def _smallest_problem() -> Problem:
-    robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (1.0, 1.0)})
-    goal = Goal(pose=np.array([1.0, 0.0, 0.0]))
-    return Problem(robot, np.zeros(3), (goal,), cost=Cost(time=1.0))
-
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
 SHORT = 4  # trims of words that are a second opinion
@@ -105,19 +42,15 @@ SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measu
 def load_search(problem: Problem) -> None:
     """Compile or load what the search will need: that does not count as searching."""
     if problem.horizon.min_coast > 0.0:
-        load_times_kernels()
+        load_kernels("times")
         return
     affordable = all(_affordable(problem, goal) for goal in problem.goals)
     if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
-        tail = int(any(goal.free_heading for goal in problem.goals))
-        load_word_kernels(min((problem.horizon.max_trims or MOST_TRIMS) + tail, MOST_TRIMS))
+        load_kernels("words")
         if len(problem.automaton) > LARGE:
             tables_of(search_setup(problem, problem.goals[0]))
     else:
-        more = problem.start.size > 3 or problem.horizon.time or problem.horizon.max_time
-        turned = any(goal.free_heading for goal in problem.goals)
-        load_word_kernels(MOST_TRIMS if more or turned else 4)
-        load_insertion_kernels()
+        load_kernels("words", "insertion")
 
 
 def search_goal(
@@ -219,8 +152,7 @@ def search_with_least_times(
     Examples
     --------
     >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.problem import Horizon
+    >>>     >>> from maneuver_automaton.problem import Horizon
     >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> problem = Problem(robot, [0, 0, 0], [4, 1, 0], horizon=Horizon(max_trims=3, min_coast=0.5))
@@ -350,9 +282,7 @@ def search_insertion(
     Examples
     --------
     >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.costs import Cost
-    >>> from maneuver_automaton.models import Unicycle
-    >>> speeds = [-2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2]
+    >>>     >>>     >>> speeds = [-2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2]
     >>> robot = Automaton.of_grid(Unicycle(), [speeds, speeds])
     >>> from maneuver_automaton.problem import Horizon
     >>> cost, horizon = Cost(effort=1), Horizon(time=1.25)

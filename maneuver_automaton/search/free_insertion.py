@@ -208,12 +208,6 @@ def _cost(word: TimedWord) -> float:
     return word.cost
 
 
-def compile_calming(problem: Problem) -> None:
-    """Have the kernel that shortens chattering words compiled, for any problem like this one."""
-    library = library_arrays(problem, search_setup(problem, problem.goals[0]))
-    _calmed(library, TimedWord((0,) * CHATTER, np.ones(CHATTER), cost=1.0))
-
-
 def _from_longer(
     work: _Work, begun: list[TimedWord], counts: dict[str, int]
 ) -> Iterator[TimedWord]:

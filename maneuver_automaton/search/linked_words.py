@@ -246,16 +246,3 @@ def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[Time
         word = np.append(arrays.words[rows[k]], climbs[k])
         used = word >= 0
         yield TimedWord(tuple(word[used].tolist()), times[k, used], cost=float(costs[k]))
-
-
-@functools.cache
-def load_linked_words() -> None:
-    """Have the kernels ready that search words with transitions."""
-    from maneuver_automaton.automaton import Automaton
-    from maneuver_automaton.models import Unicycle
-
-    robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    goal = Goal(pose=[1.0, 1.0, 1.0], trim="ahead")
-    problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
-    steer_linked_words(problem, goal)
-    scan_linked_words(problem, goal)

@@ -10,7 +10,7 @@ import pytest
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
-from maneuver_automaton.planning import checking, steps
+from maneuver_automaton.planning import steps
 from maneuver_automaton.planning.plan import plan_within, prepare
 from maneuver_automaton.planning.result import PlanStatus, workspace_of
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
@@ -71,7 +71,7 @@ def test_a_first_plan_is_checked_before_it_is_improved() -> None:
 def test_what_checks_is_imported_before_the_clock_starts(monkeypatch: pytest.MonkeyPatch) -> None:
     """The first check of a process would be late for its imports, and its plan lost."""
     loaded: list[str] = []
-    monkeypatch.setattr(checking, "load_checking", lambda: loaded.append("checks"))
+    monkeypatch.setattr(steps, "load_checking", lambda: loaded.append("checks"))
     prepare(replace(TASKS["among obstacles"]))  # one for which nothing is ready yet
     assert loaded == ["checks"]
 

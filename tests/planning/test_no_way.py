@@ -77,7 +77,6 @@ def test_work_that_nobody_can_stop_is_not_begun_late(monkeypatch, seconds, yield
             asked.append(work)
             yield Proof(value=0.0, optimal=False, cells=10**12, size=1.0, work=work)
 
-    lower_bound.load_proofs()  # proves something itself, the first time
     monkeypatch.setattr(lower_bound, "proofs_of", proofs_of)
     problem = dataclasses.replace(bend(3.2), horizon=Horizon(max_time=1e3))
     assert too_long(problem, Budget.from_now(seconds)) == ""

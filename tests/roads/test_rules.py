@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.cli import run
-from maneuver_automaton.formats.road_json import joint_notes
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.recording.road_drives import joint_notes
 from maneuver_automaton.roads import RoadVehicle, drive_road, drive_roads, plan_road, plan_roads
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine
 from maneuver_automaton.roads.route import route_of

@@ -1,0 +1,116 @@
+"""Plans of a vehicle with inertia along the paths of a simpler one, which switches at will.
+
+It stops at each switch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._kernel_list import load_kernels
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.collision import Obstacle
+from maneuver_automaton.planning.checking import TooLate, what_is_hit
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.polishing import Polish, guess_along
+from maneuver_automaton.planning.result import Workspace
+from maneuver_automaton.planning.tracking import AT_ONCE, Tracked, track
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.guesses import path_guesses
+from maneuver_automaton.refinement.stop_and_steer import kinematic_problem, stop_and_steer
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
+
+FIRST_SHARE = 0.8  # of the time limit, for a first path
+IMPROVED_SHARE = 0.2  # of what is left, for a path that is faster to follow
+STOPPING_S = 0.01  # [s] that it takes to stop and steer along a path
+WAITS = 9  # at rest, before a path is followed among moving obstacles
+
+
+@dataclass(slots=True, eq=False)
+class AlongPaths:
+    """Stop and steer along the paths of a kinematic vehicle."""
+
+    polish: Polish | None  # what guesses along the paths are for
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Load the kernels, and make the table of the simpler vehicle."""
+        load_kernels("lattice", "improvement")
+        simpler = kinematic_problem(problem, switch=0.0)
+        cost_to_go_table(simpler, prepared=workspace.prepared)
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether there is time, and more is asked for."""
+        return found.wants_more
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer plans along a first path, then along one that is fast to follow so."""
+        found.offer_as_they_come(self._plans(found))
+
+    def _plans(self, found: Incumbents) -> Iterator[tuple[Plan, int]]:
+        problem, ended = found.problem, found.ended
+        free = kinematic_problem(problem, switch=0.0)
+        first = _path(found, free, found.budget.stage(FIRST_SHARE), patience=AT_ONCE)
+        if first.plan is None or first.goal_index is None:
+            ended.proof = first.reason if first.enclosed else ""
+            ended.remark = f" ({first.reason})" if first.reason else ""
+            return
+        yield from _stopping(found, first.plan, first.goal_index)
+        if found.budget.is_over:
+            return
+        along = path_guesses(problem.automaton.model)
+        if self.polish and along and first.plan.duration > 0.0:
+            self.polish.guesses.append(guess_along(problem, along, first.plan))
+        soon = found.budget.stage(IMPROVED_SHARE)
+        better = _path(found, kinematic_problem(problem), soon, known=first.plan)
+        if better.plan is not None and better.goal_index is not None and found.may_check:
+            yield from _stopping(found, better.plan, better.goal_index)
+
+
+def _path(found: Incumbents, problem: Problem, budget: Budget, **more: Any) -> Tracked:
+    """A path of the simpler vehicle; what it takes is counted."""
+    path = track(problem, budget=budget, prepared=found.workspace.prepared, **more)
+    found.counts.update(expansions=path.expansions, collision_queries=path.queries)
+    return path
+
+
+def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
+    """Stop and steer along a path, once moving obstacles let it pass.
+
+    The path was free at the pace of the simpler vehicle. This one is slower, so that it meets
+    moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
+    """
+    problem, goal = found.problem, found.problem.goals[goal_index]
+    if found.for_checks.left_to_check < STOPPING_S:
+        return
+    plan = stop_and_steer(
+        problem.automaton.model,  # type: ignore[arg-type]
+        path,
+        first=problem.first_trim,
+        last=problem.last_trim(goal),
+    )
+    if not problem.moves:
+        yield plan, goal_index
+        return
+    settled = max(
+        float(one.motion.time[-1])
+        for one in problem.obstacles
+        if isinstance(one, Obstacle) and one.motion is not None
+    )
+    for wait in np.linspace(0.0, max(settled - problem.start_time, 0.0), WAITS):
+        if found.budget.is_over:
+            return
+        durations = plan.durations.copy()
+        durations[0] += wait
+        later = replace(plan, durations=durations)
+        try:
+            hit = what_is_hit(problem, later, goal, found.workspace, budget=found.for_checks)
+        except TooLate:
+            return
+        if not hit:
+            yield later, goal_index
+            return
