@@ -23,8 +23,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.refinement.conditions import broken_condition
 from maneuver_automaton.words import TimesStatus, solve_switching_times
-from maneuver_automaton.words.closing import EndConditions, closest_times
-from maneuver_automaton.words.conjugation import conjugated
+from maneuver_automaton.words.closing import EndConditions, closest_times, conjugated
 
 CHANGED = 2  # trims at most that are left out, or no longer so, to meet a least coasting time
 RESTARTS = 2

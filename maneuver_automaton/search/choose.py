@@ -28,11 +28,11 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.free_insertion import compile_calming, free_stages
+from maneuver_automaton.search.free_insertion import compile_short_runs, free_stages
 from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
 from maneuver_automaton.search.setup import SearchSetup, search_setup, sub_library
-from maneuver_automaton.search.word_scan import MOST_AT_ONCE, MOST_TRIMS, tables_of
+from maneuver_automaton.search.word_scan import MOST_TRIMS, tables_of
 from maneuver_automaton.search.words import resting, search_words
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.word import Word
@@ -48,8 +48,7 @@ MANY = 10**9
 def load_word_kernels(max_trims: int) -> None:
     """Have the kernels of exhaustive search ready, for words of up to `max_trims` trims."""
     problem = replace(_smallest_problem(), horizon=Horizon(max_trims=max_trims))
-    at_once = replace(problem, horizon=Horizon(max_trims=min(max_trims, MOST_AT_ONCE)))
-    search_words(at_once, at_once.goals[0])
+    search_words(problem, problem.goals[0])
     counted = SearchSettings(max_expansions=MANY)  # which is never done at once
     found = search_words(replace(problem, search=counted), problem.goals[0])
     for solution in found.solutions[:1]:  # none where a signal ended the search
@@ -61,7 +60,7 @@ def load_insertion_kernels() -> None:
     """Have the kernels of insertion ready."""
     problem = _smallest_problem()
     search_insertion(problem, problem.goals[0])
-    compile_calming(problem)
+    compile_short_runs(problem)
 
 
 @functools.cache
@@ -99,7 +98,7 @@ def _smallest_problem() -> Problem:
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
 SHORT = 4  # trims of words that are a second opinion
 LARGE = 200  # trims of a library whose tables are worth to be had ready
-SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5, 2e-3)  # by moving trims, measured, generous
+SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5)  # by moving trims, measured, generous
 
 
 def load_search(problem: Problem) -> None:
@@ -114,9 +113,7 @@ def load_search(problem: Problem) -> None:
         if len(problem.automaton) > LARGE:
             tables_of(search_setup(problem, problem.goals[0]))
     else:
-        more = problem.start.size > 3 or problem.horizon.time or problem.horizon.max_time
-        turned = any(goal.free_heading for goal in problem.goals)
-        load_word_kernels(MOST_TRIMS if more or turned else 4)
+        load_word_kernels(MOST_TRIMS)
         load_insertion_kernels()
 
 
