@@ -30,17 +30,16 @@ MATCH = 1e-4  # [s] between times of the same solution, found by two methods
 EXACT = 1e-9  # [m, rad]
 
 
-def planted(rng, n: int, dof: int):
-    """Random trims (n, k, dof) and the ends (n, dof) of random times in them."""
-    k = 3 if dof == 3 else 4
-    twists = rng.uniform(0.2, 2.0, (n, k, dof)) * rng.choice([-1.0, 1.0], (n, k, dof))
-    straight = rng.integers(k + 1, size=n)  # one straight in most words, none in the others
+def planted(rng, n: int):
+    """Random trims (n, 3, 3) and the ends (n, 3) of random times in them."""
+    twists = rng.uniform(0.2, 2.0, (n, 3, 3)) * rng.choice([-1.0, 1.0], (n, 3, 3))
+    straight = rng.integers(4, size=n)  # one straight in most words, none in the others
     for row, which in enumerate(straight):
-        if which < k:
+        if which < 3:
             twists[row, which, 2] = 0.0
     with np.errstate(divide="ignore"):
         longest = np.minimum(2.0 * np.pi / np.abs(twists[:, :, 2]), 3.0)
-    times = rng.uniform(0.05, 0.95, (n, k)) * longest
+    times = rng.uniform(0.05, 0.95, (n, 3)) * longest
     ends = [reference.plain_end(row, known) for row, known in zip(twists, times, strict=True)]
     return twists, times, np.array(ends)
 
@@ -48,7 +47,7 @@ def planted(rng, n: int, dof: int):
 def triples(n: int, repeats: int) -> None:
     """Closed form against root finding on the same random triples."""
     rng = np.random.default_rng(0)
-    twists, times, goals = planted(rng, n, 3)
+    twists, times, goals = planted(rng, n)
     flat = twists.reshape(3 * n, 3)
     rows = np.arange(3 * n).reshape(n, 3)
     displacements = np.zeros((n, 2, 3))
@@ -92,20 +91,6 @@ def triples(n: int, repeats: int) -> None:
     print(f"  ratio to the closed form: {scipy / kernel:.0f}, to steer(): {scipy / wrapper:.0f}")
     print(f"  known times found: steer() {met} of {n}, least_squares {theirs} of {few}")
     print(f"  found by least_squares and not by steer(): {extra}")
-
-
-def climbs(n: int) -> None:
-    """Four trims with a climb."""
-    rng = np.random.default_rng(1)
-    twists, times, goals = planted(rng, n, 4)
-    laps, met = [], 0
-    for row, known, goal in zip(twists, times, goals, strict=True):
-        began = time.perf_counter()
-        found = steer(row, goal)
-        laps.append(time.perf_counter() - began)
-        met += bool(len(found)) and bool(np.abs(found - known).max(axis=1).min() < MATCH)
-    print(f"{n} random words of four climbing trims")
-    print(f"  steer(): {1e3 * statistics.median(laps):.1f} ms, known times found: {met}")
 
 
 def pairs(n: int, moves: int) -> None:
@@ -154,7 +139,6 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=30)
     options = parser.parse_args()
     triples(options.triples, options.repeats)
-    climbs(options.climbs)
     pairs(options.pairs, options.moves)
 
 

@@ -1,6 +1,6 @@
 """Exhaustive search over words against multi-start SLSQP over the same words, in one run.
 
-``python benchmarks/words.py``: times of the best word, the complete list and five trims, with
+``python benchmarks/words.py``: times of the best word and the complete list, with
 the ratio to SLSQP; and whether both agree on the complete list (``--starts`` per word).
 """
 
@@ -108,24 +108,20 @@ def main() -> None:
     options = parser.parse_args()
     for name, controls in (("Table 2", TABLE_2), ("trim 5 reversed", REVERSED_SPIN)):
         print(f"{name}, (0, 1, 0) -> (0, 0, 0), T = 8, |u|^2 + |u|/2")
-        speed(parking(controls), parking(controls, max_trims=5), options.repeats)
+        speed(parking(controls), options.repeats)
         agreement(parking(controls), options.starts)
 
 
-def speed(four, five, repeats: int) -> None:
-    """Print times for at most four and at most five trims, and of SLSQP."""
+def speed(four, repeats: int) -> None:
+    """Print times for at most four trims, and of SLSQP."""
     goal = four.goals[0]
     best = median_ms(lambda: search_words(four, goal), repeats)
     full = median_ms(lambda: search_words(four, goal, alternatives=None), repeats)
-    longer = median_ms(lambda: search_words(five, goal), repeats)
-    all_five = median_ms(lambda: search_words(five, goal, alternatives=None), 3)
     began = time.perf_counter()
     all_optima(four, 1)
     slsqp = 1e3 * (time.perf_counter() - began)
     print(f"  best word of at most 4 trims: {best:.2f} ms (need 2)")
     print(f"  complete list, at most 4:     {full:.2f} ms (need 20)")
-    print(f"  best word of at most 5 trims: {longer:.2f} ms (need 100)")
-    print(f"  complete list, at most 5:     {all_five:.0f} ms")
     print(f"  SLSQP, one start per word:    {slsqp:.0f} ms, {slsqp / full:.0f} times the list")
 
 

@@ -34,11 +34,18 @@ def candidates(
     begin[0, : len(start)], end[0, : len(goal)] = start, goal
     scratch, arrays = library.scratch(), library.arrays
     n = kernels.candidate_batch(
-        arrays, len(arrays.words), begin, start_trim, end, goal_trim, float(upper_bound), scratch
+        arrays,
+        len(arrays.tried.words),
+        begin,
+        start_trim,
+        end,
+        goal_trim,
+        float(upper_bound),
+        scratch,
     )
     found = []
     for k in np.argsort(scratch.costs[:n], kind="stable"):
-        word = arrays.words[scratch.rows[k]]
+        word = arrays.tried.words[scratch.rows[k]]
         trims, times = word[word >= 0], scratch.times[k, :3][word >= 0]
         if scratch.climbs[k] >= 0:
             trims = np.append(trims, scratch.climbs[k])

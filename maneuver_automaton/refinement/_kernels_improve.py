@@ -72,7 +72,7 @@ def put_middle(
     Between classes a trim counts also where it lasts no time: maneuvers lead to it and on.
     """
     row = scratch.rows[which]
-    passed = lib.library.cost.shape[0] > 1
+    passed = lib.library.transitions.cost.shape[0] > 1
     for n_th in range(4):
         trim = words[row, n_th] if n_th < 3 else scratch.climbs[which]
         t = scratch.times[which, n_th]
@@ -177,8 +177,8 @@ def cheapest_of(scratch: Scratch, n: int) -> float:
 def words_to(lib: LatticeArrays, free_heading: bool) -> tuple[IntArray, int]:
     """Words of a connection and how many of them are tried."""
     if free_heading:
-        return lib.library.free_words, lib.library.free_words.shape[0]
-    return lib.library.words, lib.library.n_few
+        return lib.library.tried.free_words, lib.library.tried.free_words.shape[0]
+    return lib.library.tried.words, lib.library.tried.n_few
 
 
 @bare_inner_kernel
@@ -272,7 +272,7 @@ def via_pose(
     x += spread * shift[0]
     y += spread * shift[1]
     heading += 0.5 * spread / task.radius * shift[2]
-    trim = work.trims[k] if lib.library.cost.shape[0] > 1 else NO_TRIM
+    trim = work.trims[k] if lib.library.transitions.cost.shape[0] > 1 else NO_TRIM
     return (x, y, heading, z), trim_and_gear(trim, 0)
 
 

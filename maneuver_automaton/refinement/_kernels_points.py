@@ -77,7 +77,7 @@ def price_along(lib: LatticeArrays, work: Work, j: int) -> float:
 @inlined_kernel
 def trim_at(lib: LatticeArrays, work: Work, j: int) -> tuple[int, int]:
     """Trim at a point, as the search for connections is told: any where all are of one class."""
-    trim = work.trims[work.owners[j]] if lib.library.cost.shape[0] > 1 else NO_TRIM
+    trim = work.trims[work.owners[j]] if lib.library.transitions.cost.shape[0] > 1 else NO_TRIM
     return trim_and_gear(trim, 0)
 
 
@@ -135,7 +135,9 @@ def unwound(lib: LatticeArrays, task: ImproveTask, work: Work, n: int, points: i
         work.legs[n_legs] = j
         n_legs += 1
         j = work.back[j] if work.back[j] >= 0 else j - 1
-    passed = lib.library.cost.shape[0] > 1  # trims that last no time, too, are passed through
+    passed = (
+        lib.library.transitions.cost.shape[0] > 1
+    )  # trims that last no time, too, are passed through
     size = begun(task, work)
     for leg in range(n_legs - 1, -1, -1):
         j = work.legs[leg]
@@ -191,9 +193,9 @@ def join_points(
     for j in range(first, min(points, work.at.shape[0])):
         work.best[j] = work.best[j - 1] + price_along(lib, work, j)
         work.spent[j] = work.spent[j - 1] + work.at[j, TIME] - work.at[j - 1, TIME]
-        words, tried = lib.library.words, n_words
+        words, tried = lib.library.tried.words, n_words
         if task.free_heading and j == work.at.shape[0] - 1:
-            words, tried = lib.library.free_words, lib.library.free_words.shape[0]
+            words, tried = lib.library.tried.free_words, lib.library.tried.free_words.shape[0]
         for i in range(j - 1):
             join(lib, task, scene, work, words, tried, i, j, gain)
 

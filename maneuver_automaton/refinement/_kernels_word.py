@@ -151,7 +151,7 @@ def put_edge(lib: LatticeArrays, work: Work, size: int, edge: int) -> int:
 @bare_inner_kernel
 def append(lib: LatticeArrays, work: Work, size: int, trim: int, t: float) -> int:
     """Append a coast of the class that the word is in, joined with the last one of its trim."""
-    if t < lib.library.shortest or size >= work.new_trims.shape[0]:
+    if t < lib.library.rounding.shortest or size >= work.new_trims.shape[0]:
         return size
     if size > 0 and work.new_trims[size - 1] == trim:
         work.new_durations[size - 1] += t

@@ -25,6 +25,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.chain import coasted
 from maneuver_automaton.refinement.fitting import TIME_TOLERANCE
 from maneuver_automaton.refinement.work import SNAP, VIA
+from maneuver_automaton.search import _kernels_insertion
 from maneuver_automaton.search.lattice_library import library_with
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import (
@@ -36,6 +37,7 @@ from maneuver_automaton.search.lattice_trims import (
     stands_for_more,
 )
 from maneuver_automaton.search.waiting import is_free
+from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.library import MovingTrims, four_columns, moving_trims
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
@@ -269,8 +271,6 @@ class _Work:
         self, trims: IntArray, times: Array, goal: SE2, spare: float, most: int, rounds: int
     ) -> list[tuple[int, float]] | None:
         """The best trims and times from a section's own on; None if they miss its end."""
-        from maneuver_automaton.search import _kernels_insertion as kernels
-
         n = len(trims)
         if n == 0 or n > LONGEST:
             return None
@@ -283,12 +283,8 @@ class _Work:
             n += 1
             targets = np.array([float(lasting[:n].sum())])
         end = np.append(goal.pose, 0.0)
-        size, cost, _, _ = kernels.improve_word(
-            self.twists,
-            self.rates,
-            end,
-            self.rows,
-            targets,
+        size, cost, _, _ = _kernels_insertion.improve_word(
+            TimesProblem(self.twists, self.rates, self.rows, end, targets),
             len(self.columns),
             0,
             word,

@@ -331,8 +331,8 @@ class Improvement:
         arrays = self.query.library.arrays.library
         restarts = self.restarts
         rounds = restarts.moving_rounds if self.query.moves else restarts.rounds
-        most = len(arrays.words) if restart.all_words else arrays.n_few
-        for n_words in sorted({arrays.n_few, most}):
+        most = len(arrays.tried.words) if restart.all_words else arrays.tried.n_few
+        for n_words in sorted({arrays.tried.n_few, most}):
             for n in range(rounds):
                 if n > 0 and self.budget.is_over:
                     return word

@@ -16,8 +16,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
-from maneuver_automaton.words.closing import EndConditions
-from maneuver_automaton.words.conjugation import conjugated
+from maneuver_automaton.words.closing import EndConditions, conjugated
 
 INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100

@@ -220,11 +220,12 @@ def _names_of(value: Any, own: Model | None) -> dict[str, Any]:
 
 def _refuse_long_words(document: Document, file: ScenarioFile) -> None:
     """Exhaustive search is for short words."""
-    from maneuver_automaton.search.word_scan import MOST_TRIMS
+    from maneuver_automaton.search.words import most_admitted
 
-    most = MOST_TRIMS - any(goal.heading == "free" for goal in file.goals)
+    turned = any(goal.heading == "free" for goal in file.goals)
+    most = most_admitted(free_heading=turned, fixed=file.horizon.time_s != "free")
     if file.horizon.max_trims is not None and file.horizon.max_trims > most:
-        free = " where a heading is free" if most < MOST_TRIMS else ""
+        free = " where a heading is free" if turned else ""
         raise document.error(
             ("horizon", "max_trims"),
             f"got {file.horizon.max_trims} for the method words, need at most {most}{free}; "

@@ -101,17 +101,19 @@ def has_bounds(problem: WordProblem, word: IntArray, triple: IntArray, q: int) -
     straights = 0
     for s in range(3):
         trim = word[triple[s]]
-        if problem.rates[trim] < 0.0:
+        if problem.library.rates[trim] < 0.0:
             return False
-        straights += problem.twists[trim, 2] == 0.0
-    turns_between = q > triple[0] and problem.twists[word[q], 2] != 0.0
-    return not (straights > 1 or q > triple[2] or turns_between or problem.rates[word[q]] < 0.0)
+        straights += problem.library.twists[trim, 2] == 0.0
+    turns_between = q > triple[0] and problem.library.twists[word[q], 2] != 0.0
+    return not (
+        straights > 1 or q > triple[2] or turns_between or problem.library.rates[word[q]] < 0.0
+    )
 
 
 @bare_inner_kernel
 def closed_form(problem: WordProblem, word: IntArray, triple: IntArray, q: int) -> ClosedForm:
     """What the closed form of a word has for every time at `q`."""
-    twists = problem.twists
+    twists = problem.library.twists
     free, a, b, c = word[q], word[triple[0]], word[triple[1]], word[triple[2]]
     v_q, w_q = complex(twists[free, 0], twists[free, 1]), twists[free, 2]
     v_a, w_a = complex(twists[a, 0], twists[a, 1]), twists[a, 2]
@@ -120,7 +122,11 @@ def closed_form(problem: WordProblem, word: IntArray, triple: IntArray, q: int) 
     r_a = -1j * v_a / w_a if w_a != 0.0 else 0j
     r_b = -1j * v_b / w_b if w_b != 0.0 else 0j
     r_c = -1j * v_c / w_c if w_c != 0.0 else 0j
-    d = complex(problem.goal[0], problem.goal[1]) + r_a - r_c * unit(problem.goal[2])
+    d = (
+        complex(problem.library.goal[0], problem.library.goal[1])
+        + r_a
+        - r_c * unit(problem.library.goal[2])
+    )
     centre, arm = d, 0j
     if q < triple[0] and w_q != 0.0:
         r_q = -1j * v_q / w_q
@@ -129,13 +135,18 @@ def closed_form(problem: WordProblem, word: IntArray, triple: IntArray, q: int) 
     while place < 3 and q > triple[place]:
         place += 1
     return (
-        (place, problem.goal[2]),
+        (place, problem.library.goal[2]),
         (v_q, w_q),
         (w_a, w_b, w_c),
         (v_a, v_b, v_c),
         (r_a - r_b, r_b - r_c),
         (d, centre, arm),
-        (problem.rates[free], problem.rates[a], problem.rates[b], problem.rates[c]),
+        (
+            problem.library.rates[free],
+            problem.library.rates[a],
+            problem.library.rates[b],
+            problem.library.rates[c],
+        ),
         (phase(r_a - r_b), phase(r_b - r_c), abs(r_a - r_b), abs(r_b - r_c)),
     )
 

@@ -56,10 +56,10 @@ def connect_ends(
     here = trim_and_gear(int(links[node, TRIM]), int(links[node, GEAR]))
     for g in range(task.aims.shape[0]):
         free_heading = task.sign > 0.0 and task.aim_free[g]
-        words = lib.library.free_words if free_heading else lib.library.words
+        words = lib.library.tried.free_words if free_heading else lib.library.tried.words
         n_words = words.shape[0]
         if not free_heading and links[node, PARENT] >= 0:
-            n_words = lib.library.n_few
+            n_words = lib.library.tried.n_few
         aim = (task.aims[g, 0], task.aims[g, 1], task.aims[g, 2], task.aims[g, 3])
         # What a connection may cost: less than is left to the best plan, and not much more than the
         # estimate.

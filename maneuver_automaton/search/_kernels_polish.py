@@ -19,7 +19,8 @@ from maneuver_automaton.search._kernels_problem import (
     write,
 )
 from maneuver_automaton.words._kernels_times import (
-    assign,
+    TimesProblem,
+    columns_of,
     curvature,
     newton_feasible,
     newton_stationary,
@@ -73,24 +74,26 @@ def accept(
     for i in range(n):
         if times[i] <= 1e-9:
             return
-        if problem.more_turns == 0 and times[i] > problem.periods[word[i]] * (1.0 + 1e-9):
+        if problem.terms.more_turns == 0 and times[i] > problem.trims.periods[word[i]] * (
+            1.0 + 1e-9
+        ):
             return
-        if problem.weights[word[i]] > 0.0:
-            if times[i] < problem.shortest - 1e-9:
+        if problem.trims.weights[word[i]] > 0.0:
+            if times[i] < problem.terms.shortest - 1e-9:
                 return
             trims += 1
             total += times[i]
-            cost += times[i] * problem.rates[word[i]]
+            cost += times[i] * problem.library.rates[word[i]]
     if total > time_left(problem) + 1e-9:
         return
     padded = 0
-    if problem.pad == 1:
-        cost += problem.pad_cost
+    if problem.terms.pad == 1:
+        cost += problem.terms.pad_cost
         if time_left(problem) - total > 1e-9:
             padded = 1
     if trims + padded > max_trims:
         return
-    cost += word_extra(problem, word, trims) + problem.switch * padded
+    cost += word_extra(problem, word, trims) + problem.terms.switch * padded
     place(problem, found, word, n, times, cost)
 
 
@@ -100,13 +103,17 @@ def accept_with_turns(
 ) -> None:
     """Record a solution and, where admitted, the same with whole extra turns."""
     accept(problem, found, word, n, times, max_trims)
-    if problem.more_turns == 0 or time_left(problem) == np.inf or problem.targets.size > 0:
+    if (
+        problem.terms.more_turns == 0
+        or time_left(problem) == np.inf
+        or problem.library.targets.size > 0
+    ):
         return
     total = 0.0
     shortest = np.inf
     for i in range(n):
-        total += problem.weights[word[i]] * times[i]
-        shortest = min(shortest, problem.periods[word[i]])
+        total += problem.trims.weights[word[i]] * times[i]
+        shortest = min(shortest, problem.trims.periods[word[i]])
     if total + shortest > time_left(problem) + 1e-9:
         return
     extra = np.zeros(n, dtype=np.int64)
@@ -118,10 +125,10 @@ def accept_with_turns(
             total = 0.0
             for i in range(n):
                 longer[i] = times[i]
-                if extra[i] > 0 and problem.weights[word[i]] > 0.0:
-                    longer[i] += extra[i] * problem.periods[word[i]]
-                total += problem.weights[word[i]] * longer[i]
-            if total <= time_left(problem) + 1e-9 and problem.weights[word[k]] > 0.0:
+                if extra[i] > 0 and problem.trims.weights[word[i]] > 0.0:
+                    longer[i] += extra[i] * problem.trims.periods[word[i]]
+                total += problem.trims.weights[word[i]] * longer[i]
+            if total <= time_left(problem) + 1e-9 and problem.trims.weights[word[k]] > 0.0:
                 break
             extra[k] = 0
             k += 1
@@ -146,40 +153,31 @@ def polish(
     Newton changes its cost by next to nothing. A start much dearer than all words asked for
     need not be refined: most of the time would go there.
     """
-    m = problem.targets.size
+    m = problem.library.targets.size
     if n <= 4 and m == 0:
         dearest = found.best[found.best.size - 1]
-        cost = problem.pad_cost + word_extra(problem, word, n)
+        cost = problem.terms.pad_cost + word_extra(problem, word, n)
         for i in range(n):
-            cost += problem.rates[word[i]] * times[i]
+            cost += problem.library.rates[word[i]] * times[i]
         if cost > dearest + NEXT * (1.0 + abs(dearest)):
             return
-    twists = np.empty((n, 4))
-    rates = np.empty(n)
-    rows = np.empty((m, n))
-    for i in range(n):
-        assign(twists[i], problem.twists[word[i]])
-        rates[i] = problem.rates[word[i]]
-        for r in range(m):
-            rows[r, i] = problem.rows[r, word[i]]
+    some = columns_of(problem.library, word, n)
     if isolated == 0:
-        p, worst, slope = newton_stationary(
-            rates, twists, problem.goal, rows, problem.targets, times, 30
-        )
+        p, worst, slope = newton_stationary(some, times, 30)
         if not (worst < 1e-10 and slope < 1e-8):
             return
         for i in range(n):
             if times[i] <= 1e-9:
                 return
-        if not curvature(rates, twists, problem.goal, rows, problem.targets, times, p) > 1e-10:
+        if not curvature(some, times, p) > 1e-10:
             return
-    worst = newton_feasible(twists, problem.goal, rows, problem.targets, times, 8)
-    if worst < 1e-10 and not is_neighbour(problem, twists, rows, n, times):
+    worst = newton_feasible(some, times, 8)
+    if worst < 1e-10 and not is_neighbour(some, n, times):
         accept_with_turns(problem, found, word, n, times, max_trims)
 
 
 @inner_kernel
-def is_neighbour(problem: WordProblem, twists: Array, rows: Array, n: int, times: Array) -> bool:
+def is_neighbour(problem: TimesProblem, n: int, times: Array) -> bool:
     """Whether a solution is one with a trim less, which rounding gives a moment.
 
     Where the conditions are tangent, times wrong by the root of the rounding error meet them to
@@ -193,17 +191,12 @@ def is_neighbour(problem: WordProblem, twists: Array, rows: Array, n: int, times
             k = i
     if n < 2 or times[k] > MOMENT * total:
         return False
-    m = rows.shape[0]
-    fewer = np.empty((n - 1, 4))
-    fewer_rows = np.empty((m, n - 1))
+    kept = np.empty(n - 1, dtype=np.int64)
     left = np.empty(n - 1)
     for i in range(n - 1):
-        source = i if i < k else i + 1
-        assign(fewer[i], twists[source])
-        left[i] = times[source]
-        for r in range(m):
-            fewer_rows[r, i] = rows[r, source]
-    worst = newton_feasible(fewer, problem.goal, fewer_rows, problem.targets, left, 8)
+        kept[i] = i if i < k else i + 1
+        left[i] = times[kept[i]]
+    worst = newton_feasible(columns_of(problem, kept, n - 1), left, 8)
     return worst < 1e-13 * (1.0 + abs(problem.goal[0]) + abs(problem.goal[1]))
 
 

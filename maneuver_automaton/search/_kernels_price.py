@@ -16,7 +16,13 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.words._kernels_times import assign, end_and_columns, jacobian, multipliers
+from maneuver_automaton.words._kernels_times import (
+    TimesProblem,
+    columns_of,
+    end_and_columns,
+    jacobian,
+    multipliers,
+)
 
 SLACK = 1e-12  # relative, of prices
 
@@ -94,33 +100,26 @@ def least_on_arc(
 
 @inner_kernel
 def price_positions(
-    twists: Array,
-    rates: Array,
-    rows: Array,
-    n_priced: int,
-    word: IntArray,
-    times: Array,
-    n: int,
-    p: Array,
-    values: Array,
-    trims: IntArray,
-    moments: Array,
-) -> int:
+    library: TimesProblem, n_priced: int, word: IntArray, times: Array, n: int, p: Array
+) -> tuple[int, Array, IntArray, Array]:
     """Smallest reduced cost of all trims within each of the first `n` trims of a word.
 
-    Fills `values`, `trims` and `moments` (the time within the trim); returns the position of the
-    least. A turn on the spot that follows does not move the end's position.
+    Returns the position of the least, and for each position the reduced cost, its trim and the time
+    within the trim that it interrupts. A turn on the spot that follows does not move the end's
+    position. `n_priced` are the first trims of the library, those that can be inserted.
     """
-    some = np.empty((n, 4))
-    for i in range(n):
-        assign(some[i], twists[word[i]])
+    twists = library.twists
+    values = np.empty(max(n, 1))
+    trims = np.empty(max(n, 1), dtype=np.int64)
+    moments = np.empty(max(n, 1))
+    some = columns_of(library, word, n).twists
     columns = np.empty((n, 3))
     end_x, end_y, _ = end_and_columns(some, times[:n], columns)
     least_position = 0
     base = np.empty(n_priced)
     across = np.empty((3, n_priced))  # v, u and turn rate of all trims
     for j in range(n_priced):
-        base[j] = rates[j] + price_of_row(rows, p, j)
+        base[j] = library.rates[j] + price_of_row(library.rows, p, j)
         for k in range(3):
             across[k, j] = twists[j, k]
     # Most trims of a large library are far from being the least anywhere. A first pass, without
@@ -187,32 +186,21 @@ def price_positions(
         if n > 0:
             dx, dy, dh = coast(v_i, u_i, w_i, time)
             x, y, heading = compose(x, y, heading, dx, dy, dh)
-    return least_position
+    return least_position, values, trims, moments
 
 
 @inner_kernel
-def word_multipliers(
-    twists: Array, rates: Array, rows: Array, word: IntArray, times: Array, n: int
-) -> Array:
+def word_multipliers(library: TimesProblem, word: IntArray, times: Array, n: int) -> Array:
     """Multipliers that best explain a word's times as optimal."""
-    some = np.empty((n, 4))
-    some_rates = np.empty(n)
-    some_rows = np.empty((rows.shape[0], n))
-    for i in range(n):
-        assign(some[i], twists[word[i]])
-        some_rates[i] = rates[word[i]]
-        for r in range(rows.shape[0]):
-            some_rows[r, i] = rows[r, word[i]]
+    some = columns_of(library, word, n)
     columns = np.empty((n, 3))
-    end_and_columns(some, times[:n], columns)
-    return multipliers(jacobian(columns, some_rows), some_rates)
+    end_and_columns(some.twists, times[:n], columns)
+    return multipliers(jacobian(columns, some.rows), some.rates)
 
 
 @kernel
 def price_word(
-    twists: Array,
-    rates: Array,
-    rows: Array,
+    library: TimesProblem,
     n_priced: int,
     word: IntArray,
     times: Array,
@@ -224,11 +212,7 @@ def price_word(
 
     The stretch reaches from the trim at position `first` of the word to the one before `last`.
     """
-    n = word.size
-    values = np.empty(n)
-    trims = np.empty(n, dtype=np.int64)
-    moments = np.empty(n)
-    price_positions(twists, rates, rows, n_priced, word, times, n, p, values, trims, moments)
+    _, values, trims, moments = price_positions(library, n_priced, word, times, word.size, p)
     k = first
     for i in range(first, last):
         if values[i] < values[k]:
@@ -237,8 +221,6 @@ def price_word(
 
 
 @kernel
-def multipliers_of_word(
-    twists: Array, rates: Array, rows: Array, word: IntArray, times: Array
-) -> Array:
+def multipliers_of_word(library: TimesProblem, word: IntArray, times: Array) -> Array:
     """Multipliers (3 + m,) of a plan."""
-    return word_multipliers(twists, rates, rows, word, times, word.size)
+    return word_multipliers(library, word, times, word.size)

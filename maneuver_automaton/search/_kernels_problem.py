@@ -12,47 +12,59 @@ Source: ``D exp(xi) = exp(Ad(D) xi) D``; Solà, Deray, Atchuthan (2018), Eq. (30
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel
 from maneuver_automaton.groups._kernels import back_from, compose
+from maneuver_automaton.words._kernels_times import TimesProblem
 
 PARALLEL = 1e-9  # sine of the angle between twists below which they span one line
 
 
-class WordProblem(NamedTuple):
-    """Trims and conditions: of all words of one search, or of the one word that is seen.
+class Alphabet(NamedTuple):
+    """What a search over words knows of its trims, beside their motion and rates."""
 
-    Times are in seconds, angles in radians.
-    """
+    numbers: IntArray  # (M,) the number of each row in the whole problem
+    prices: Array  # (M, 2) cost per metre and per radian, inf where a trim makes none
+    periods: Array  # (M,) [s] time of a full turn, inf for straights
+    reaches: Array  # (M,) [s] longest time of interest
+    parallel: NDArray[np.bool_]  # (M, M) whether two twists are parallel
+    weights: Array  # (M,) 1 where a trim takes time and counts, 0 for the turn of a free heading
 
-    trims: Any  # (M,) the number of each row in the whole problem
-    size: Any  # (1,) trims of the word that is seen; 0 in the whole problem
-    twists: Any  # (M, 4) conjugated in the problem that is seen
-    rates: Any  # (M,) cost per second, that of rest taken off where rest pads
-    prices: Any  # (M, 2) cost per metre and per radian, inf where a trim makes none
-    rows: Any  # (m, M) linear conditions on the times: altitude, fixed time
-    targets: Any  # (m,)
-    periods: Any  # (M,) time of a full turn, inf for straights
-    reaches: Any  # (M,) longest time of interest
-    parallel: Any  # (M, M) whether two twists are parallel
-    weights: Any  # (M,) 1 where a trim takes time and counts, 0 for the turn of a free heading
-    goal: Any  # (4,) relative to the start
-    fixed: Any  # (9,) what is known of a word before its times are: COST, TIME, ... below
-    time_limit: float  # sum of all times at most this, transitions included; inf
+
+class WordTerms(NamedTuple):
+    """Limits and prices of a whole word."""
+
+    time_limit: float  # [s] sum of all times at most this, transitions included; inf
     pad: int  # 1 where rest fills up to time_limit
     pad_cost: float  # cost of time_limit seconds of rest
     switch: float
     direction_change: float
     more_turns: int  # 1 where whole extra turns are admitted
-    nodes: int  # grid nodes per scanned time, for words with one scanned time
-    nodes_2d: int  # the same for two scanned times
-    slack: float  # share by which a grid node may be dearer than the upper bound, and be looked at
-    tolerance: float
     shortest: float  # [s] a shorter coasting time is not admitted
+
+
+class ScanSettings(NamedTuple):
+    """How closely the free time of a word is looked at."""
+
+    nodes: int  # of the grid
+    slack: float  # share by which a grid node may be dearer than the upper bound, and be looked at
+    tolerance: float  # of the steering function, relative
+
+
+class WordProblem(NamedTuple):
+    """Trims and conditions: of all words of one search, or of the one word that is seen."""
+
+    library: TimesProblem  # M trims; rates less that of rest where it pads, twists as they are seen
+    trims: Alphabet
+    size: IntArray  # (1,) trims of the word that is seen; 0 in the whole problem
+    fixed: Array  # (9,) what is known of a word before its times are: COST, TIME, ... below
+    terms: WordTerms
+    scan: ScanSettings
     tail: int  # trim that ends every word without counting, -1 for none
 
 
@@ -67,35 +79,35 @@ AIM = 7  # x and y of the goal itself
 class Links(NamedTuple):
     """The transitions between C classes of trims; one class, whose transition is the identity."""
 
-    class_of: Any  # (M,) of each trim of the whole problem
+    class_of: IntArray  # (M,) of each trim of the whole problem
     start: int  # class of the trim before the word
     goal: int  # class of the trim after it
-    displacement: Any  # (C, C, 4)
-    cost: Any  # (C, C) inf where there is none
-    time: Any  # (C, C)
-    gains: Any  # (m, C, C) what a transition adds to each linear condition
+    displacement: Array  # (C, C, 4)
+    cost: Array  # (C, C) inf where there is none
+    time: Array  # (C, C)
+    gains: Array  # (m, C, C) what a transition adds to each linear condition
 
 
 class Candidates(NamedTuple):
     """Starting points for Newton, filled by the scan and emptied by `polish_candidates`."""
 
-    words: Any  # (capacity, S)
-    times: Any  # (capacity, S)
-    sizes: Any  # (capacity,) trims in the word
-    isolated: Any  # (capacity,) 1 where the conditions alone fix the times
-    counter: Any  # (3,): candidates, words looked at, steering calls
-    turns: Any  # (3, S) integers to work with
-    work: Any  # (S,) numbers to work with
+    words: IntArray  # (capacity, S)
+    times: Array  # (capacity, S)
+    sizes: IntArray  # (capacity,) trims in the word
+    isolated: IntArray  # (capacity,) 1 where the conditions alone fix the times
+    counter: IntArray  # (3,): candidates, words looked at, steering calls
+    turns: IntArray  # (3, S) integers to work with
+    work: Array  # (S,) numbers to work with
 
 
 class Found(NamedTuple):
     """Buffers of what has been found."""
 
-    words: Any  # (capacity + 1, S) -1 after the last trim; the last row to work with
-    times: Any  # (capacity + 1, S)
-    costs: Any  # (capacity,)
-    counter: Any  # (1,)
-    best: Any  # (K + 1,) cheapest costs so far, ascending; the last is the upper bound
+    words: IntArray  # (capacity + 1, S) -1 after the last trim; the last row to work with
+    times: Array  # (capacity + 1, S)
+    costs: Array  # (capacity,)
+    counter: IntArray  # (1,)
+    best: Array  # (K + 1,) cheapest costs so far, ascending; the last is the upper bound
 
 
 @bare_inner_kernel
@@ -110,14 +122,14 @@ def switch_prices(problem: WordProblem, word: IntArray, n: int) -> float:
 
     A problem with transitions has none: a conjugated twist has no gear.
     """
-    price = problem.switch * (n - 1)
-    if problem.direction_change > 0.0:
+    price = problem.terms.switch * (n - 1)
+    if problem.terms.direction_change > 0.0:
         sign = 0.0
         for i in range(n):
-            v = problem.twists[word[i], 0]
+            v = problem.library.twists[word[i], 0]
             if v != 0.0:
                 if sign * v < 0.0:
-                    price += problem.direction_change
+                    price += problem.terms.direction_change
                 sign = v
     return price
 
@@ -125,7 +137,7 @@ def switch_prices(problem: WordProblem, word: IntArray, n: int) -> float:
 @bare_inner_kernel
 def time_left(problem: WordProblem) -> float:
     """What the coasting times of a word may add up to."""
-    return problem.time_limit - problem.fixed[TIME]
+    return problem.terms.time_limit - problem.fixed[TIME]
 
 
 @bare_inner_kernel
@@ -139,11 +151,11 @@ def write(
     """
     size = problem.size[0]
     for i in range(trims.size):
-        trims[i] = problem.trims[i] if i < size else -1
+        trims[i] = problem.trims.numbers[i] if i < size else -1
         lasting[i] = 0.0
     for i in range(n):
         at = i if size == 0 else word[i]
-        trims[at], lasting[at] = problem.trims[word[i]], times[i]
+        trims[at], lasting[at] = problem.trims.numbers[word[i]], times[i]
     return n if size == 0 else size
 
 
@@ -157,14 +169,14 @@ def propose(
         candidates.sizes[count] = write(
             problem, word, n, times, candidates.words[count], candidates.times[count]
         )
-        candidates.isolated[count] = 1 if n <= 3 + problem.targets.size else 0
+        candidates.isolated[count] = 1 if n <= 3 + problem.library.targets.size else 0
     candidates.counter[0] = count + 1
 
 
 @bare_inner_kernel
 def is_straight(problem: WordProblem, trim: int) -> bool:
     """Whether a trim does not turn."""
-    return problem.twists[trim, 2] == 0.0
+    return problem.library.twists[trim, 2] == 0.0
 
 
 @bare_inner_kernel
@@ -172,7 +184,7 @@ def condition(problem: WordProblem, word: IntArray, n: int, r: int, times: Array
     """Left-hand side of linear condition r."""
     value = 0.0
     for i in range(n):
-        value += problem.rows[r, word[i]] * times[i]
+        value += problem.library.rows[r, word[i]] * times[i]
     return value
 
 
@@ -197,32 +209,21 @@ def transitions_cost(links: Links, word: IntArray, n: int, tail: int) -> float:
 @inner_kernel
 def room_for(problem: WordProblem, n: int) -> WordProblem:
     """A problem of `n` rows as yet empty, in which words of so many trims are seen."""
-    m = problem.targets.size
+    m = problem.library.targets.size
     return WordProblem(
-        np.zeros(n, dtype=np.int64),
+        TimesProblem(np.zeros((n, 4)), np.zeros(n), np.zeros((m, n)), np.zeros(4), np.zeros(m)),
+        Alphabet(
+            np.zeros(n, dtype=np.int64),
+            np.zeros((n, 2)),
+            np.zeros(n),
+            np.zeros(n),
+            np.zeros((n, n), dtype=np.bool_),
+            np.zeros(n),
+        ),
         np.zeros(1, dtype=np.int64),
-        np.zeros((n, 4)),
-        np.zeros(n),
-        np.zeros((n, 2)),
-        np.zeros((m, n)),
-        np.zeros(m),
-        np.zeros(n),
-        np.zeros(n),
-        np.zeros((n, n), dtype=np.bool_),
-        np.zeros(n),
-        np.zeros(4),
         np.zeros(problem.fixed.size),
-        problem.time_limit,
-        problem.pad,
-        problem.pad_cost,
-        problem.switch,
-        problem.direction_change,
-        problem.more_turns,
-        problem.nodes,
-        problem.nodes_2d,
-        problem.slack,
-        problem.tolerance,
-        problem.shortest,
+        problem.terms,
+        problem.scan,
         problem.tail,
     )
 
@@ -237,8 +238,8 @@ def look_ahead(
     """
     for k in range(seen.fixed.size):
         seen.fixed[k] = problem.fixed[k]
-    for r in range(problem.targets.size):
-        seen.targets[r] = problem.targets[r]
+    for r in range(problem.library.targets.size):
+        seen.library.targets[r] = problem.library.targets[r]
     before = links.start
     for i in range(n + 1):
         after = class_after(problem, links, word, n, i)
@@ -252,8 +253,8 @@ def look_ahead(
         seen.fixed[TURN] -= abs(step[2])
         if i > 0:
             seen.fixed[FOLLOWING] += distance
-        for r in range(problem.targets.size):
-            seen.targets[r] -= links.gains[r, before, after]
+        for r in range(problem.library.targets.size):
+            seen.library.targets[r] -= links.gains[r, before, after]
         before = after
 
 
@@ -291,31 +292,31 @@ def look(
         if i < n:
             rows[i] = i
             copy_row(problem, word[i], seen, i)
-            conjugate(seen.twists[i], x, y, heading)
-    seen.goal[0], seen.goal[1], seen.goal[2] = back_from(
-        problem.goal[0], problem.goal[1], problem.goal[2], x, y, heading
+            conjugate(seen.library.twists[i], x, y, heading)
+    seen.library.goal[0], seen.library.goal[1], seen.library.goal[2] = back_from(
+        problem.library.goal[0], problem.library.goal[1], problem.library.goal[2], x, y, heading
     )
-    seen.goal[3] = problem.goal[3] - rise
+    seen.library.goal[3] = problem.library.goal[3] - rise
     for i in range(n):
         for k in range(i + 1):
-            seen.parallel[i, k] = is_parallel(seen.twists[i], seen.twists[k])
-            seen.parallel[k, i] = seen.parallel[i, k]
+            seen.trims.parallel[i, k] = is_parallel(seen.library.twists[i], seen.library.twists[k])
+            seen.trims.parallel[k, i] = seen.trims.parallel[i, k]
 
 
 @inlined_kernel
 def copy_row(problem: WordProblem, trim: int, seen: WordProblem, row: int) -> None:
     """What a search knows of a trim, as a row of the problem that is seen."""
-    seen.trims[row] = trim
+    seen.trims.numbers[row] = trim
     for k in range(4):
-        seen.twists[row, k] = problem.twists[trim, k]
-    seen.rates[row] = problem.rates[trim]
+        seen.library.twists[row, k] = problem.library.twists[trim, k]
+    seen.library.rates[row] = problem.library.rates[trim]
     for k in range(2):
-        seen.prices[row, k] = problem.prices[trim, k]
-    seen.periods[row] = problem.periods[trim]
-    seen.reaches[row] = problem.reaches[trim]
-    seen.weights[row] = problem.weights[trim]
-    for r in range(problem.targets.size):
-        seen.rows[r, row] = problem.rows[r, trim]
+        seen.trims.prices[row, k] = problem.trims.prices[trim, k]
+    seen.trims.periods[row] = problem.trims.periods[trim]
+    seen.trims.reaches[row] = problem.trims.reaches[trim]
+    seen.trims.weights[row] = problem.trims.weights[trim]
+    for r in range(problem.library.targets.size):
+        seen.library.rows[r, row] = problem.library.rows[r, trim]
 
 
 @bare_inner_kernel

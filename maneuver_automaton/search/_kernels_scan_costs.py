@@ -33,10 +33,10 @@ def affordable(
     problem: WordProblem, word: IntArray, n: int, trim: int, upper_bound: float
 ) -> float:
     """How long one trim of a word may last before it alone costs more than `upper_bound`."""
-    reach = problem.reaches[trim]
-    if problem.rates[trim] > 0.0:
-        left = upper_bound - problem.pad_cost - word_extra(problem, word, n)
-        reach = min(reach, left / problem.rates[trim])
+    reach = problem.trims.reaches[trim]
+    if problem.library.rates[trim] > 0.0:
+        left = upper_bound - problem.terms.pad_cost - word_extra(problem, word, n)
+        reach = min(reach, left / problem.library.rates[trim])
     return reach
 
 
@@ -62,14 +62,19 @@ def any_node_may_do(
     reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
         return False
-    m = problem.targets.size
+    m = problem.library.targets.size
     most = nearly_cheap(problem, word, n, upper_bound)
-    lowest = upper_bound - problem.pad_cost - word_extra(problem, word, n)
-    nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
+    lowest = upper_bound - problem.terms.pad_cost - word_extra(problem, word, n)
+    nodes = max(8, math.ceil(problem.scan.nodes * reach / problem.trims.reaches[word[q]]))
     is_cheap, is_near = False, m == 0 or time_left(problem) == np.inf
     before = (math.nan, math.nan)  # what each branch lacked at the node before
     per_metre = least_per_metre(problem, word, n, q)
-    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    steering = (
+        problem.library.twists,
+        problem.library.goal,
+        problem.scan.tolerance,
+        candidates.counter,
+    )
     for j in range(nodes + 1):
         times[q] = reach * j / nodes
         if is_near and q == 0 and least_after(problem, word[0], times[0], per_metre) >= lowest:
@@ -83,7 +88,7 @@ def any_node_may_do(
                 continue
             for s in range(3):
                 times[triple[s]] = out[branch, s]
-            lack = problem.targets[m - 1] - condition(problem, word, n, m - 1, times)
+            lack = problem.library.targets[m - 1] - condition(problem, word, n, m - 1, times)
             is_near = is_met_nearby(problem, word, triple, lack, before[branch])
             lacks = (lack, lacks[1]) if branch == 0 else (lacks[0], lack)
         if is_cheap and is_near:
@@ -95,10 +100,10 @@ def any_node_may_do(
 @inlined_kernel
 def nearly_cheap(problem: WordProblem, word: IntArray, n: int, upper_bound: float) -> float:
     """What the trims of a word may cost at a node for it to be looked at."""
-    if problem.slack == np.inf:
+    if problem.scan.slack == np.inf:
         return np.inf
-    extra = problem.pad_cost + word_extra(problem, word, n)
-    return upper_bound * (1.0 + problem.slack) - extra
+    extra = problem.terms.pad_cost + word_extra(problem, word, n)
+    return upper_bound * (1.0 + problem.scan.slack) - extra
 
 
 @bare_inner_kernel
@@ -122,9 +127,9 @@ def coasting_cost(
 
     A negative time, of a straight, costs as much as a positive one: so far it is from admissible.
     """
-    cost = problem.rates[word[free]] * time
+    cost = problem.library.rates[word[free]] * time
     for s in range(3):
-        cost += problem.rates[word[triple[s]]] * abs(solved[s])
+        cost += problem.library.rates[word[triple[s]]] * abs(solved[s])
     return cost
 
 
@@ -134,8 +139,8 @@ def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int)
     price = np.inf
     for i in range(n):
         if i != left_out:
-            price = min(price, problem.prices[word[i], 0])
-            if problem.rates[word[i]] < 0.0:
+            price = min(price, problem.trims.prices[word[i], 0])
+            if problem.library.rates[word[i]] < 0.0:
                 price = -np.inf
     return price
 
@@ -147,14 +152,18 @@ def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) 
     From where it ends, and the transition before it began, the rest of the word has to lead to the
     goal: as far as its transitions cannot, at `per_metre`. NaN for no bound.
     """
-    v, u, w = problem.twists[trim, 0], problem.twists[trim, 1], problem.twists[trim, 2]
+    v, u, w = (
+        problem.library.twists[trim, 0],
+        problem.library.twists[trim, 1],
+        problem.library.twists[trim, 2],
+    )
     dx, dy, heading = coast(v, u, w, time)
     x, y, _ = compose(dx, dy, heading, problem.fixed[FIRST], problem.fixed[FIRST + 1], 0.0)
     distance = math.hypot(problem.fixed[AIM] - x, problem.fixed[AIM + 1] - y)
     left = distance - problem.fixed[FOLLOWING]
     if per_metre < 0.0:
         return math.nan
-    return problem.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)
+    return problem.library.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)
 
 
 @inlined_kernel
@@ -165,14 +174,17 @@ def is_met_nearby(
 
     Somewhere it lacks nothing if that changes its sign since the node `before`: NaN for none.
     """
-    target = problem.targets[problem.targets.size - 1]
-    if abs(lack) <= problem.slack * abs(target) or lack * before <= 0.0:
+    target = problem.library.targets[problem.library.targets.size - 1]
+    if abs(lack) <= problem.scan.slack * abs(target) or lack * before <= 0.0:
         return True
-    if problem.more_turns == 1:
+    if problem.terms.more_turns == 1:
         for s in range(3):
             i = word[triple[s]]
-            if problem.periods[i] < np.inf:
-                turn = problem.periods[i] * problem.rows[problem.targets.size - 1, i]
-                if lack * turn > 0.0 and abs(lack) >= (1.0 - problem.slack) * abs(turn):
+            if problem.trims.periods[i] < np.inf:
+                turn = (
+                    problem.trims.periods[i]
+                    * problem.library.rows[problem.library.targets.size - 1, i]
+                )
+                if lack * turn > 0.0 and abs(lack) >= (1.0 - problem.scan.slack) * abs(turn):
                     return True
     return False

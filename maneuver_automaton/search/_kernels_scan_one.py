@@ -34,12 +34,14 @@ from maneuver_automaton.search._kernels_scan_costs import (
     nearly_cheap,
 )
 from maneuver_automaton.search._kernels_triple import (
+    FreeTime,
     evaluate,
-    scratch_for,
+    levels,
     solve_triple,
     take_branch,
+    unwrap,
+    with_free_time,
 )
-from maneuver_automaton.search._kernels_turns import levels, unwrap
 from maneuver_automaton.words._kernels_times import assign
 
 
@@ -50,16 +52,16 @@ def scan_one(
     word: IntArray,
     n: int,
     triple: IntArray,
-    free: IntArray,
     upper_bound: float,
 ) -> None:
     """Words with one free time: roots of a scalar function along both branches."""
-    q = free[0]
-    m = problem.targets.size
+    four = with_free_time(problem, word, n, triple)
+    q = four.q
+    m = problem.library.targets.size
     reach = affordable(problem, word, n, word[q], upper_bound)
     if not reach > 0.0:
         return
-    nodes = max(8, math.ceil(problem.nodes * reach / problem.reaches[word[q]]))
+    nodes = max(8, math.ceil(problem.scan.nodes * reach / problem.trims.reaches[word[q]]))
     # cells between nodes in which a branch may be cheap enough: the others have no solution that
     # counts, and most words have none of these
     live = np.ones((2, nodes), dtype=np.bool_)
@@ -67,7 +69,7 @@ def scan_one(
     cheap = np.inf  # what its trims may cost
     if m == 0 and upper_bound < np.inf and has_bounds(problem, word, triple, q):
         cheap = upper_bound + TINY * (1.0 + abs(upper_bound))
-        cheap -= problem.pad_cost + word_extra(problem, word, n)
+        cheap -= problem.terms.pad_cost + word_extra(problem, word, n)
         if not mark_cheap_cells(known, reach, cheap, live):
             return
     needed = np.zeros((2, nodes + 1), dtype=np.bool_)  # a cell's nodes, and one on either side
@@ -76,31 +78,33 @@ def scan_one(
             if live[branch, j]:
                 for k in range(max(j - 1, 0), min(j + 2, nodes) + 1):
                     needed[branch, k] = True
-    scratch = scratch_for(problem, word, n, 1)
-    values = np.zeros(2)
-    both = np.empty((2, 3))
     times = np.zeros(n)
     there = np.zeros((2, nodes + 1), dtype=np.bool_)
     node_times = np.zeros((2, nodes + 1, n))
     node_values = np.zeros((2, nodes + 1))
     costs = np.zeros((2, nodes + 1))
-    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    steering = (
+        problem.library.twists,
+        problem.library.goal,
+        problem.scan.tolerance,
+        candidates.counter,
+    )
     most = nearly_cheap(problem, word, n, upper_bound)
     for j in range(nodes + 1):
         if not (needed[0, j] or needed[1, j]):
             continue
         times[q] = reach * j / nodes
-        solve_triple(steering, word, n, triple, times, both)
+        solve_triple(steering, word, n, triple, times, four.both)
         for branch in range(2):
             if not needed[branch, j]:
                 continue
-            costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], both[branch])
-            copy_branches(scratch[0], both)
-            if take_branch(problem, word, n, triple, free, branch, scratch, times, values):
+            costs[branch, j] = coasting_cost(problem, word, triple, q, times[q], four.both[branch])
+            value = take_branch(problem, four, branch, times)
+            if not math.isnan(value):
                 there[branch, j] = True
                 assign(node_times[branch, j], times)
                 if m == 0:
-                    node_values[branch, j] = values[0]
+                    node_values[branch, j] = value
                 elif j > 0 and there[branch, j - 1]:  # continuous from node to node
                     unwrap(problem, word, triple, node_times[branch, j - 1], times)
                     step = condition(problem, word, n, m - 1, times)
@@ -134,58 +138,38 @@ def scan_one(
             numbers[0, 2], numbers[0, 3] = bend, 0.0
             if not there[branch, j + 1]:  # the branch ends in between
                 assign(high[0], low[0])
-                numbers[0, 1] = fold(
-                    problem, candidates, word, n, triple, free, high[0], reach * (j + 1) / nodes,
-                    branch, scratch, values,
-                )  # fmt: skip
+                beyond = reach * (j + 1) / nodes
+                numbers[0, 1] = end_of_branch(problem, candidates, four, high[0], beyond, branch)
             elif not there[branch, j]:
                 assign(low[0], high[0])
-                numbers[0, 0] = fold(
-                    problem, candidates, word, n, triple, free, low[0], reach * j / nodes,
-                    branch, scratch, values,
-                )  # fmt: skip
-            bisect(
-                problem, candidates, word, n, triple, free, branch, scratch, values, stack,
-                known, cheap,
-            )  # fmt: skip
-
-
-@bare_inner_kernel
-def copy_branches(target: Array, source: Array) -> None:
-    """Copy what `solve_triple` filled in."""
-    for branch in range(2):
-        assign(target[branch], source[branch])
+                beyond = reach * j / nodes
+                numbers[0, 0] = end_of_branch(problem, candidates, four, low[0], beyond, branch)
+            bisect(problem, candidates, four, branch, stack, known, cheap)
 
 
 @inner_kernel
-def fold(
+def end_of_branch(
     problem: WordProblem,
     candidates: Candidates,
-    word: IntArray,
-    n: int,
-    triple: IntArray,
-    free: IntArray,
+    four: FreeTime,
     edge: Array,
     beyond: float,
     branch: int,
-    scratch: tuple[Array, Array, Array, Array],
-    values: Array,
 ) -> float:
     """Move `edge` along its branch as far towards `beyond` as the branch goes; its value there."""
-    q = free[0]
+    q = four.q
     trial = np.empty(edge.size)
     assign(trial, edge)
-    evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values)
-    value = values[0]
+    value = evaluate(problem, candidates, four, trial, branch)
     good = edge[q]
     for _ in range(30):
         trial[q] = 0.5 * (good + beyond)
-        if evaluate(problem, candidates, word, n, triple, free, trial, branch, scratch, values):
-            good = trial[q]
-            assign(edge, trial)
-            value = values[0]
-        else:
+        there = evaluate(problem, candidates, four, trial, branch)
+        if math.isnan(there):
             beyond = trial[q]
+        else:
+            good, value = trial[q], there
+            assign(edge, trial)
     return value
 
 
@@ -193,13 +177,8 @@ def fold(
 def bisect(
     problem: WordProblem,
     candidates: Candidates,
-    word: IntArray,
-    n: int,
-    triple: IntArray,
-    free: IntArray,
+    four: FreeTime,
     branch: int,
-    scratch: tuple[Array, Array, Array, Array],
-    values: Array,
     stack: tuple[Array, Array, Array],
     known: ClosedForm,
     cheap: float,
@@ -209,8 +188,8 @@ def bisect(
     Intervals in which the trims of the word cost more than `cheap` are dropped.
     """
     lows, highs, numbers = stack
-    q = free[0]
-    m = problem.targets.size
+    word, n, triple, q = four.word, four.n, four.triple, four.q
+    m = problem.library.targets.size
     middle = np.empty(n)
     ends = np.empty((2, n))
     span = np.empty((m, 2))
@@ -232,8 +211,8 @@ def bisect(
                 possible = False  # flat: all these times cost the same
             settled = bend <= 0.5 * change
             if possible and settled and value_low < 0.0 <= value_high:
-                secant(problem, candidates, word, n, triple, free, branch, scratch, values,
-                       low, value_low, high, value_high, middle, span)  # fmt: skip
+                ends_of_root = (low[q], value_low, high[q], value_high)
+                secant(problem, candidates, four, branch, ends_of_root, middle, span)
         else:
             unwrap(problem, word, triple, low, high)
             at_low = condition(problem, word, n, m - 1, low)
@@ -257,12 +236,11 @@ def bisect(
         if not possible or depth >= 8.0 or (settled and bend <= 0.25 * change):
             continue
         middle[q] = 0.5 * (low[q] + high[q])
-        if not evaluate(
-            problem, candidates, word, n, triple, free, middle, branch, scratch, values
-        ):
+        value = evaluate(problem, candidates, four, middle, branch)
+        if math.isnan(value):
             continue
         if m == 0:
-            off = abs(values[0] - 0.5 * (value_low + value_high))
+            off = abs(value - 0.5 * (value_low + value_high))
         else:
             unwrap(problem, word, triple, low, middle)
             off = abs(condition(problem, word, n, m - 1, middle) - 0.5 * (at_low + at_high))
@@ -270,8 +248,8 @@ def bisect(
         assign(lows[top + 2], middle)
         assign(highs[top + 2], high)
         assign(highs[top + 1], middle)
-        numbers[top + 2, 0], numbers[top + 2, 1] = values[0], value_high
-        numbers[top + 1, 0], numbers[top + 1, 1] = value_low, values[0]
+        numbers[top + 2, 0], numbers[top + 2, 1] = value, value_high
+        numbers[top + 1, 0], numbers[top + 1, 1] = value_low, value
         for k in range(1, 3):
             numbers[top + k, 2], numbers[top + k, 3] = off, depth + 1.0
         top += 2
@@ -281,36 +259,27 @@ def bisect(
 def secant(
     problem: WordProblem,
     candidates: Candidates,
-    word: IntArray,
-    n: int,
-    triple: IntArray,
-    free: IntArray,
+    four: FreeTime,
     branch: int,
-    scratch: tuple[Array, Array, Array, Array],
-    values: Array,
-    low: Array,
-    value_low: float,
-    high: Array,
-    value_high: float,
+    ends: tuple[float, float, float, float],
     middle: Array,
     span: Array,
 ) -> None:
     """Narrow down where the reduced gradient rises through zero, and propose it."""
-    q = free[0]
-    left, right = low[q], high[q]
+    q = four.q
+    left, value_low, right, value_high = ends
     for step in range(12):
         share = 0.5
         if step % 3 != 2 and value_high > value_low:
             share = min(0.9, max(0.1, -value_low / (value_high - value_low)))
         middle[q] = left + share * (right - left)
-        if not evaluate(
-            problem, candidates, word, n, triple, free, middle, branch, scratch, values
-        ):
+        value = evaluate(problem, candidates, four, middle, branch)
+        if math.isnan(value):
             return
-        if values[0] < 0.0:
-            left, value_low = middle[q], values[0]
+        if value < 0.0:
+            left, value_low = middle[q], value
         else:
-            right, value_high = middle[q], values[0]
+            right, value_high = middle[q], value
         if right - left < 1e-3:
             break
-    levels(problem, candidates, word, n, middle, middle, middle, span)
+    levels(problem, candidates, four.word, four.n, middle, middle, middle, span)

@@ -1,18 +1,26 @@
 """Three times of a word in closed form, the others given, and the gradient left for the others.
 
 A word of n trims has n - 3 times more than the planar pose fixes. Three are solved for, `triple`
-says at which positions; both branches of the closed form are continuous in the others.
+says at which positions; both branches of the closed form are continuous in the others, but for
+whole turns, which it leaves open.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
-from maneuver_automaton.search._kernels_problem import Candidates, WordProblem, is_straight
+from maneuver_automaton.search._kernels_problem import (
+    Candidates,
+    WordProblem,
+    is_straight,
+    propose,
+    time_left,
+)
 from maneuver_automaton.words._kernels_steering import steer, unit
 from maneuver_automaton.words._kernels_times import assign, end_and_columns
 
@@ -27,10 +35,10 @@ def choose_triple(problem: WordProblem, word: IntArray, n: int, triple: IntArray
     for straights in range(1, 3):
         for k in range(n - 1, 1, -1):
             for j in range(k - 1, 0, -1):
-                if j == k - 1 and problem.parallel[word[j], word[k]]:
+                if j == k - 1 and problem.trims.parallel[word[j], word[k]]:
                     continue
                 for i in range(j - 1, -1, -1):
-                    if i == j - 1 and problem.parallel[word[i], word[j]]:
+                    if i == j - 1 and problem.trims.parallel[word[i], word[j]]:
                         continue
                     count = 0
                     for position in (i, j, k):
@@ -114,115 +122,162 @@ def solve_triple(
     )
 
 
+class FreeTime(NamedTuple):
+    """A word of four trims with one time free, and room to solve for the other three."""
+
+    word: IntArray  # (n,)
+    n: int
+    triple: IntArray  # (3,) positions that are solved for
+    q: int  # the position that is free
+    twists: Array  # (n, 4) of its trims
+    columns: Array  # (n, 3) derivatives of the end by the times
+    both: Array  # (2, 3) times of the triple on both branches
+
+
 @inner_kernel
-def scratch_for(
-    problem: WordProblem, word: IntArray, n: int, n_free: int
-) -> tuple[Array, Array, Array, Array]:
-    """Room for one word: branches (2, 3), columns (n, 3), gradients (1 + m, d), twists (n, 4)."""
+def with_free_time(problem: WordProblem, word: IntArray, n: int, triple: IntArray) -> FreeTime:
+    """A word of four trims, of which `triple` are solved for."""
     twists = np.empty((n, 4))
     for i in range(n):
-        assign(twists[i], problem.twists[word[i]])
-    return np.empty((2, 3)), np.empty((n, 3)), np.empty((1 + problem.targets.size, n_free)), twists
+        assign(twists[i], problem.library.twists[word[i]])
+    return FreeTime(
+        word,
+        n,
+        triple,
+        6 - triple[0] - triple[1] - triple[2],
+        twists,
+        np.empty((n, 3)),
+        np.empty((2, 3)),
+    )
 
 
 @bare_inner_kernel
-def reduced_gradient(
-    problem: WordProblem,
-    word: IntArray,
-    triple: IntArray,
-    times: Array,
-    free: IntArray,
-    scratch: tuple[Array, Array, Array, Array],
-) -> bool:
-    """Fill the gradients of `scratch`: of the cost, and each linear condition, by the free times.
-
-    The three solved times follow; row 0 is the cost, row 1 + r condition r. False if singular.
-    """
-    _, columns, out, twists = scratch
-    end_and_columns(twists, times, columns)
-    a, b, c = triple[0], triple[1], triple[2]
+def reduced_gradient(problem: WordProblem, four: FreeTime, times: Array) -> float:
+    """How the cost changes with the free time, the other three following; NaN if singular."""
+    columns, rates, word = four.columns, problem.library.rates, four.word
+    end_and_columns(four.twists, times, columns)
+    # Cramer's rule: the three change so that the end stays where it is.
+    a, b, c = four.triple[0], four.triple[1], four.triple[2]
     u0 = columns[b, 1] * columns[c, 2] - columns[b, 2] * columns[c, 1]
     u1 = columns[b, 2] * columns[c, 0] - columns[b, 0] * columns[c, 2]
     u2 = columns[b, 0] * columns[c, 1] - columns[b, 1] * columns[c, 0]
     det = columns[a, 0] * u0 + columns[a, 1] * u1 + columns[a, 2] * u2
     if det == 0.0:
-        return False
+        return math.nan
     v0 = columns[c, 1] * columns[a, 2] - columns[c, 2] * columns[a, 1]
     v1 = columns[c, 2] * columns[a, 0] - columns[c, 0] * columns[a, 2]
     v2 = columns[c, 0] * columns[a, 1] - columns[c, 1] * columns[a, 0]
     w0 = columns[a, 1] * columns[b, 2] - columns[a, 2] * columns[b, 1]
     w1 = columns[a, 2] * columns[b, 0] - columns[a, 0] * columns[b, 2]
     w2 = columns[a, 0] * columns[b, 1] - columns[a, 1] * columns[b, 0]
-    for q in range(free.size):
-        x, y, h = columns[free[q], 0], columns[free[q], 1], columns[free[q], 2]
-        share_a = (x * u0 + y * u1 + h * u2) / det
-        share_b = (x * v0 + y * v1 + h * v2) / det
-        share_c = (x * w0 + y * w1 + h * w2) / det
-        out[0, q] = (
-            problem.rates[word[free[q]]]
-            - share_a * problem.rates[word[a]]
-            - share_b * problem.rates[word[b]]
-            - share_c * problem.rates[word[c]]
-        )
-        for r in range(problem.targets.size):
-            out[1 + r, q] = (
-                problem.rows[r, word[free[q]]]
-                - share_a * problem.rows[r, word[a]]
-                - share_b * problem.rows[r, word[b]]
-                - share_c * problem.rows[r, word[c]]
-            )
-    return True
+    x, y, h = columns[four.q, 0], columns[four.q, 1], columns[four.q, 2]
+    share_a = (x * u0 + y * u1 + h * u2) / det
+    share_b = (x * v0 + y * v1 + h * v2) / det
+    share_c = (x * w0 + y * w1 + h * w2) / det
+    return (
+        rates[word[four.q]]
+        - share_a * rates[word[a]]
+        - share_b * rates[word[b]]
+        - share_c * rates[word[c]]
+    )
 
 
 @bare_inner_kernel
-def take_branch(
-    problem: WordProblem,
-    word: IntArray,
-    n: int,
-    triple: IntArray,
-    free: IntArray,
-    branch: int,
-    scratch: tuple[Array, Array, Array, Array],
-    times: Array,
-    values: Array,
-) -> bool:
-    """Fill `times` and `values` from one branch of `solve_triple`; False if it is empty.
+def take_branch(problem: WordProblem, four: FreeTime, branch: int, times: Array) -> float:
+    """Fill `times` from a branch that is solved; the reduced gradient there, NaN if it is empty.
 
-    values[0] is what must vanish besides the linear conditions: the reduced gradient by the first
-    free time, or its cross product with the condition's; values[1] by the second.
+    With linear conditions these must vanish, and not the gradient: it is 0.
     """
-    out, _, gradient, _ = scratch
-    if math.isnan(out[branch, 0]):
-        return False
+    if math.isnan(four.both[branch, 0]):
+        return math.nan
     for s in range(3):
-        times[triple[s]] = out[branch, s]
-    d, m = free.size, problem.targets.size
-    if d <= m:
-        return True
-    if not reduced_gradient(problem, word, triple, times, free, scratch):
-        return False
-    if m == 0:
-        for q in range(d):
-            values[q] = gradient[0, q]
-    elif d == 2:
-        values[0] = gradient[0, 0] * gradient[1, 1] - gradient[0, 1] * gradient[1, 0]
-    return True
+        times[four.triple[s]] = four.both[branch, s]
+    if problem.library.targets.size > 0:
+        return 0.0
+    return reduced_gradient(problem, four, times)
 
 
 @bare_inner_kernel
 def evaluate(
+    problem: WordProblem, candidates: Candidates, four: FreeTime, times: Array, branch: int
+) -> float:
+    """Solve for the triple at a given free time, and take one branch."""
+    library = problem.library
+    steering = (library.twists, library.goal, problem.scan.tolerance, candidates.counter)
+    solve_triple(steering, four.word, four.n, four.triple, times, four.both)
+    return take_branch(problem, four, branch, times)
+
+
+@bare_inner_kernel
+def unwrap(
+    problem: WordProblem, word: IntArray, triple: IntArray, reference: Array, times: Array
+) -> None:
+    """Shift the solved turning times by whole turns to lie nearest to `reference`, in place."""
+    for s in range(3):
+        i = triple[s]
+        period = problem.trims.periods[word[i]]
+        if period < np.inf:
+            times[i] -= period * round((times[i] - reference[i]) / period)
+
+
+@bare_inner_kernel
+def levels(
     problem: WordProblem,
     candidates: Candidates,
     word: IntArray,
     n: int,
-    triple: IntArray,
-    free: IntArray,
-    times: Array,
-    branch: int,
-    scratch: tuple[Array, Array, Array, Array],
-    values: Array,
-) -> bool:
-    """Solve one branch at given free times, and take it."""
-    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
-    solve_triple(steering, word, n, triple, times, scratch[0])
-    return take_branch(problem, word, n, triple, free, branch, scratch, times, values)
+    start: Array,
+    low: Array,
+    high: Array,
+    span: Array,
+) -> None:
+    """Propose `start` for all whole turns with which the linear conditions can be met.
+
+    `low` and `high` bound the times in a cell, unwrapped; `span` (m, 2) the conditions' values.
+    """
+    m = problem.library.targets.size
+    shifts, first, last = candidates.turns[0], candidates.turns[1], candidates.turns[2]
+    times = candidates.work
+    for i in range(n):
+        first[i], last[i] = 0, 0
+        period = problem.trims.periods[word[i]]
+        if period < np.inf:
+            first[i] = -math.floor(high[i] / period)
+            last[i] = 1 if low[i] <= 1e-9 else 0
+            if problem.terms.more_turns == 1 and m > 0:
+                most = (
+                    2 if time_left(problem) == np.inf else math.floor(time_left(problem) / period)
+                )
+                last[i] += int(most)
+            last[i] = max(last[i], first[i])
+        shifts[i] = first[i]
+    while True:
+        inside = True
+        for i in range(n):
+            times[i] = start[i]
+            if shifts[i] != 0:
+                times[i] += shifts[i] * problem.trims.periods[word[i]]
+            if times[i] + (high[i] - low[i]) <= 0.0:
+                inside = False
+        for r in range(m):
+            shift = 0.0
+            for i in range(n):
+                if shifts[i] != 0:
+                    shift += (
+                        shifts[i]
+                        * problem.trims.periods[word[i]]
+                        * problem.library.rows[r, word[i]]
+                    )
+            if not span[r, 0] <= problem.library.targets[r] - shift <= span[r, 1]:
+                inside = False
+        if inside:
+            propose(problem, candidates, word, n, times)
+        k = 0
+        while k < n:
+            shifts[k] += 1
+            if shifts[k] <= last[k]:
+                break
+            shifts[k] = first[k]
+            k += 1
+        if k == n:
+            return

@@ -12,11 +12,13 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
+from maneuver_automaton.search._kernels_polish import polish_all
 from maneuver_automaton.search._kernels_problem import (
     COST,
     DISTANCE,
     TURN,
     Candidates,
+    Found,
     Links,
     WordProblem,
     condition,
@@ -33,9 +35,7 @@ from maneuver_automaton.search._kernels_problem import (
 )
 from maneuver_automaton.search._kernels_scan_costs import any_node_may_do
 from maneuver_automaton.search._kernels_scan_one import scan_one
-from maneuver_automaton.search._kernels_scan_two import scan_two
-from maneuver_automaton.search._kernels_triple import choose_triple, solve_triple
-from maneuver_automaton.search._kernels_turns import levels
+from maneuver_automaton.search._kernels_triple import choose_triple, levels, solve_triple
 from maneuver_automaton.words._kernels_steering import phase, unit
 from maneuver_automaton.words._kernels_times import least_squares
 
@@ -55,21 +55,26 @@ def closed_form_words(
 ) -> None:
     """Words of three trims: isolated solutions."""
     times, out, span = room
-    steering = (problem.twists, problem.goal, problem.tolerance, candidates.counter)
+    steering = (
+        problem.library.twists,
+        problem.library.goal,
+        problem.scan.tolerance,
+        candidates.counter,
+    )
     solve_triple(steering, word, n, triple, times, out)
     for branch in range(2):
         admissible = not math.isnan(out[branch, 0])
-        cost = problem.pad_cost + word_extra(problem, word, n)
+        cost = problem.terms.pad_cost + word_extra(problem, word, n)
         for i in range(3):
             times[i] = out[branch, i]
             if times[i] <= 1e-9:
-                times[i] += problem.periods[word[i]]  # a full turn instead of none
+                times[i] += problem.trims.periods[word[i]]  # a full turn instead of none
             if not 1e-9 < times[i] < np.inf:
                 admissible = False
                 break
-            cost += problem.rates[word[i]] * times[i]
+            cost += problem.library.rates[word[i]] * times[i]
         if admissible and cost < upper_bound:
-            for r in range(problem.targets.size):
+            for r in range(problem.library.targets.size):
                 span[r, 0] = condition(problem, word, n, r, times) - 1e-9
                 span[r, 1] = span[r, 0] + 2e-9
             levels(problem, candidates, word, n, times, times, times, span)
@@ -82,7 +87,7 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     The goal must lie where they can go. What each subgroup contributes follows in closed form;
     the times are then the solution of a square linear system.
     """
-    m = problem.targets.size
+    m = problem.library.targets.size
     straight = True
     # Positions of the first trim of either subgroup; n: no trim is of it. One that only climbs or
     # rests is of none: it would be taken for parallel to any.
@@ -90,17 +95,17 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     for i in range(n):
         if not is_straight(problem, word[i]):
             straight = False
-        if not moves_in_plane(problem.twists[word[i]]):
+        if not moves_in_plane(problem.library.twists[word[i]]):
             continue
         if begin == n:
             begin = i
-        elif split == n and not problem.parallel[word[begin], word[i]]:
+        elif split == n and not problem.trims.parallel[word[begin], word[i]]:
             split = i
     rank = (begin < n) + (split < n)
     if n > rank + m:
         return
-    z = complex(problem.goal[0], problem.goal[1])
-    heading = problem.goal[2]
+    z = complex(problem.library.goal[0], problem.library.goal[1])
+    heading = problem.library.goal[2]
     full = 2.0 * math.pi
     if straight:
         if abs(heading - full * round(heading / full)) > 1e-9:
@@ -108,25 +113,27 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
         matrix = np.empty((2 + m, n))
         rhs = np.empty(2 + m)
         for i in range(n):
-            matrix[0, i] = problem.twists[word[i], 0]
-            matrix[1, i] = problem.twists[word[i], 1]
+            matrix[0, i] = problem.library.twists[word[i], 0]
+            matrix[1, i] = problem.library.twists[word[i], 1]
             for r in range(m):
-                matrix[2 + r, i] = problem.rows[r, word[i]]
+                matrix[2 + r, i] = problem.library.rows[r, word[i]]
         rhs[0], rhs[1] = z.real, z.imag
         for r in range(m):
-            rhs[2 + r] = problem.targets[r]
+            rhs[2 + r] = problem.library.targets[r]
         times, found_rank = least_squares(matrix, rhs, 1e-11)
         if found_rank == n:
             propose(problem, candidates, word, n, times)
         return
     blocks = np.zeros(2)
-    w_1, w_2 = problem.twists[word[begin], 2], 0.0
-    v_1 = complex(problem.twists[word[begin], 0], problem.twists[word[begin], 1])
+    w_1, w_2 = problem.library.twists[word[begin], 2], 0.0
+    v_1 = complex(problem.library.twists[word[begin], 0], problem.library.twists[word[begin], 1])
     if rank == 1:
         blocks[0] = heading
     else:
-        w_2 = problem.twists[word[split], 2]
-        v_2 = complex(problem.twists[word[split], 0], problem.twists[word[split], 1])
+        w_2 = problem.library.twists[word[split], 2]
+        v_2 = complex(
+            problem.library.twists[word[split], 0], problem.library.twists[word[split], 1]
+        )
         if w_1 != 0.0 and w_2 != 0.0:
             r_1, r_2 = -1j * v_1 / w_1, -1j * v_2 / w_2
             blocks[0] = phase((z + r_1 - r_2 * unit(heading)) / (r_1 - r_2))
@@ -143,9 +150,9 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
     blocks[1] = blocks[1] - full * round(blocks[1] / full) if w_2 != 0.0 else blocks[1]
     fastest = 0.0
     for i in range(n):
-        fastest = max(fastest, abs(problem.twists[word[i], 2]))
+        fastest = max(fastest, abs(problem.library.twists[word[i], 2]))
     most = 1
-    if problem.more_turns == 1 and time_left(problem) < np.inf:
+    if problem.terms.more_turns == 1 and time_left(problem) < np.inf:
         most += math.floor(time_left(problem) * fastest / full)
     for turns_1 in range(-most if w_1 != 0.0 else 0, (most if w_1 != 0.0 else 0) + 1):
         for turns_2 in range(-most if w_2 != 0.0 else 0, (most if w_2 != 0.0 else 0) + 1):
@@ -157,18 +164,21 @@ def low_rank_word(problem: WordProblem, candidates: Candidates, word: IntArray, 
             for i in range(n):
                 block = 0 if i < split else 1
                 head = word[begin] if i < split else word[split]
-                twist = problem.twists[word[i]]
-                if problem.twists[head, 2] != 0.0:
+                twist = problem.library.twists[word[i]]
+                if problem.library.twists[head, 2] != 0.0:
                     matrix[block, i] = twist[2]
                 else:
-                    along = problem.twists[head, 0] ** 2 + problem.twists[head, 1] ** 2
+                    along = (
+                        problem.library.twists[head, 0] ** 2 + problem.library.twists[head, 1] ** 2
+                    )
                     matrix[block, i] = (
-                        twist[0] * problem.twists[head, 0] + twist[1] * problem.twists[head, 1]
+                        twist[0] * problem.library.twists[head, 0]
+                        + twist[1] * problem.library.twists[head, 1]
                     ) / along
                 for r in range(m):
-                    matrix[rank + r, i] = problem.rows[r, word[i]]
+                    matrix[rank + r, i] = problem.library.rows[r, word[i]]
             for r in range(m):
-                rhs[rank + r] = problem.targets[r]
+                rhs[rank + r] = problem.library.targets[r]
             times, found_rank = least_squares(matrix, rhs, 1e-11)
             positive = found_rank == n
             for i in range(n):
@@ -236,9 +246,9 @@ def promising(
         return True
     per_metre, per_radian, per_second = np.inf, np.inf, np.inf
     for i in range(n):
-        per_metre = min(per_metre, problem.prices[word[i], 0])
-        per_radian = min(per_radian, problem.prices[word[i], 1])
-        per_second = min(per_second, problem.rates[word[i]])
+        per_metre = min(per_metre, problem.trims.prices[word[i], 0])
+        per_radian = min(per_radian, problem.trims.prices[word[i], 1])
+        per_second = min(per_second, problem.library.rates[word[i]])
     if per_second < 0.0:
         return True
     bound = 0.0
@@ -246,21 +256,21 @@ def promising(
         bound = max(bound, left.fixed[DISTANCE] * per_metre)
     if left.fixed[TURN] > 0.0:
         bound = max(bound, left.fixed[TURN] * per_radian)
-    for r in range(left.targets.size):
-        target = left.targets[r]
+    for r in range(left.library.targets.size):
+        target = left.library.targets[r]
         if abs(target) > NONE_LEFT:  # no trim of the other direction brings it nearer
             per_unit = np.inf
             for i in range(n):
-                pace = problem.rows[r, word[i]] * math.copysign(1.0, target)
+                pace = problem.library.rows[r, word[i]] * math.copysign(1.0, target)
                 if pace > 0.0:
-                    per_unit = min(per_unit, problem.rates[word[i]] / pace)
+                    per_unit = min(per_unit, problem.library.rates[word[i]] / pace)
             bound = max(bound, abs(target) * per_unit)
-    bound += problem.pad_cost + left.fixed[COST] + switch_prices(problem, word, n)
+    bound += problem.terms.pad_cost + left.fixed[COST] + switch_prices(problem, word, n)
     return bound < upper_bound
 
 
-# The three scans repeat how a word is looked at: with one function for that, inlined or called, a
-# scan of words with transitions takes twice the time.
+# The transitions of a word are looked at where they stand in the loop: with a function for that,
+# inlined or called, a scan of words with transitions takes twice the time.
 
 
 @inner_kernel
@@ -268,15 +278,16 @@ def propose_words(
     problem: WordProblem,
     links: Links,
     candidates: Candidates,
-    n: int,
-    first: int,
-    last: int,
+    flat: bool,
+    numbers: tuple[int, int, int],
     upper_bound: float,
 ) -> int:
-    """Propose starts for words of `n` trims, at most one time free, number `first` to `last`.
+    """Propose starts for words of n trims, at most one time free, of `numbers` (n, first, last).
 
-    Returns the number of the word to go on with: before `last` when the buffer is full.
+    Those that cannot span the plane if `flat`, otherwise those that can. Returns the number of the
+    word to go on with: before the last when the buffer is full.
     """
+    n, first, last = numbers
     linked = links.cost.shape[0] > 1
     seen = room_for(problem, n) if linked else problem
     word = np.zeros(n, dtype=np.int64)
@@ -284,15 +295,16 @@ def propose_words(
     triple = np.zeros(3, dtype=np.int64)
     less = np.zeros((2, n), dtype=np.int64)  # rows that last where one is passed, their triple
     # times of a word, both branches of those that are solved for, and what conditions come to
-    room = np.zeros(n), np.empty((2, 3)), np.empty((problem.targets.size, 2))
-    most = upper_bound - problem.pad_cost
-    passes = linked and problem.targets.size == 0
-    everything, tail, n_trims = problem.slack == np.inf, problem.tail, problem.twists.shape[0]
+    room = np.zeros(n), np.empty((2, 3)), np.empty((problem.library.targets.size, 2))
+    most = upper_bound - problem.terms.pad_cost
+    passes = linked and problem.library.targets.size == 0
+    everything, tail = problem.scan.slack == np.inf, problem.tail
+    n_trims = problem.library.twists.shape[0]
     counter, full = candidates.counter, candidates.words.shape[0] // 2
     for number in range(first, last):
         if counter[0] > full:
             return number
-        spell(n_trims, word, n, number, tail)
+        word_of_number(n_trims, word, n, number, tail)
         if linked:
             if not transitions_cost(links, word, n, tail) < most:
                 continue
@@ -302,13 +314,16 @@ def propose_words(
                 continue
             look(problem, links, seen, word, n, rows)
         spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
-        if spans == 2 and n == 3:
+        if flat:
+            if spans == 1:
+                low_rank_word(seen, candidates, rows, n)
+        elif spans == 2 and n == 3:
             closed_form_words(seen, candidates, rows, n, triple, room, upper_bound)
         elif spans == 2:
             if passes:
                 passing_words(links, seen, candidates, word, rows, n, tail, less, room, upper_bound)
             if everything or any_node_may_do(seen, candidates, rows, n, triple, room, upper_bound):
-                scan_one(seen, candidates, rows, n, triple, others(n, triple), upper_bound)
+                scan_one(seen, candidates, rows, n, triple, upper_bound)
     return last
 
 
@@ -317,101 +332,16 @@ def scan_words(
     problem: WordProblem,
     links: Links,
     candidates: Candidates,
-    n: int,
-    first: int,
-    last: int,
+    flat: bool,
+    numbers: tuple[int, int, int],
     upper_bound: float,
 ) -> int:
     """`propose_words`, for Python to call."""
-    return propose_words(problem, links, candidates, n, first, last, upper_bound)
-
-
-@inner_kernel
-def propose_flat_words(
-    problem: WordProblem,
-    links: Links,
-    candidates: Candidates,
-    n: int,
-    first: int,
-    last: int,
-    upper_bound: float,
-) -> int:
-    """`propose_words` for words that cannot span the plane."""
-    linked = links.cost.shape[0] > 1
-    seen = room_for(problem, n) if linked else problem
-    word = np.zeros(n, dtype=np.int64)
-    rows = np.zeros(n, dtype=np.int64) if linked else word
-    triple = np.zeros(3, dtype=np.int64)
-    most = upper_bound - problem.pad_cost
-    for number in range(first, last):
-        if candidates.counter[0] > candidates.words.shape[0] // 2:
-            return number
-        spell(problem.twists.shape[0], word, n, number, problem.tail)
-        if linked:
-            if not transitions_cost(links, word, n, problem.tail) < most:
-                continue
-            look_ahead(problem, links, seen, word, n)
-            if not promising(problem, seen, word, n, upper_bound):
-                candidates.counter[1] += 1
-                continue
-            look(problem, links, seen, word, n, rows)
-        spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
-        if spans == 1:
-            low_rank_word(seen, candidates, rows, n)
-    return last
-
-
-@kernel
-def scan_flat_words(
-    problem: WordProblem,
-    links: Links,
-    candidates: Candidates,
-    n: int,
-    first: int,
-    last: int,
-    upper_bound: float,
-) -> int:
-    """`propose_flat_words`, for Python to call."""
-    return propose_flat_words(problem, links, candidates, n, first, last, upper_bound)
-
-
-@kernel
-def scan_long_words(
-    problem: WordProblem,
-    links: Links,
-    candidates: Candidates,
-    n: int,
-    first: int,
-    last: int,
-    upper_bound: float,
-) -> int:
-    """`propose_words` for words that span and have two times free."""
-    linked = links.cost.shape[0] > 1
-    seen = room_for(problem, n) if linked else problem
-    word = np.zeros(n, dtype=np.int64)
-    rows = np.zeros(n, dtype=np.int64) if linked else word
-    triple = np.zeros(3, dtype=np.int64)
-    most = upper_bound - problem.pad_cost
-    for number in range(first, last):
-        if candidates.counter[0] > candidates.words.shape[0] // 2:
-            return number
-        spell(problem.twists.shape[0], word, n, number, problem.tail)
-        if linked:
-            if not transitions_cost(links, word, n, problem.tail) < most:
-                continue
-            look_ahead(problem, links, seen, word, n)
-            if not promising(problem, seen, word, n, upper_bound):
-                candidates.counter[1] += 1
-                continue
-            look(problem, links, seen, word, n, rows)
-        spans = prepare_word(seen, candidates, rows, n, triple, upper_bound)
-        if spans == 2:
-            scan_two(seen, candidates, rows, n, triple, others(n, triple), upper_bound)
-    return last
+    return propose_words(problem, links, candidates, flat, numbers, upper_bound)
 
 
 @bare_inner_kernel
-def spell(n_trims: int, word: IntArray, n: int, number: int, tail: int) -> None:
+def word_of_number(n_trims: int, word: IntArray, n: int, number: int, tail: int) -> None:
     """Fill `word` with the digits of its number, and with the turn of a free heading.
 
     It takes few arguments, as does the price of the transitions: for most words with transitions
@@ -451,18 +381,6 @@ def prepare_word(
     return 2 if choose_triple(problem, word, n, triple) else 0
 
 
-@inner_kernel
-def others(n: int, triple: IntArray) -> IntArray:
-    """Positions of a word that are not among the three of `triple`."""
-    free = np.empty(n - 3, dtype=np.int64)
-    count = 0
-    for i in range(n):
-        if i != triple[0] and i != triple[1] and i != triple[2]:
-            free[count] = i
-            count += 1
-    return free
-
-
 @bare_inner_kernel
 def word_blocks(problem: WordProblem, word: IntArray, n: int) -> int:
     """Number of runs of parallel trims; negative where the word cannot span, 0 where it is useless.
@@ -477,10 +395,93 @@ def word_blocks(problem: WordProblem, word: IntArray, n: int) -> int:
         if i > 0:
             if word[i] == word[i - 1]:
                 return 0
-            if problem.targets.size == 0 and problem.parallel[word[i], word[i - 1]]:
+            if problem.library.targets.size == 0 and problem.trims.parallel[word[i], word[i - 1]]:
                 return 0
-        if moves_in_plane(problem.twists[word[i]]):
-            if last < 0 or not problem.parallel[word[i], last]:
+        if moves_in_plane(problem.library.twists[word[i]]):
+            if last < 0 or not problem.trims.parallel[word[i], last]:
                 blocks += 1
             last = word[i]
     return -max(blocks, 1) if blocks <= 2 or straights == n else blocks
+
+
+@inner_kernel
+def tied_to_best(found: Found, tie: float) -> float:
+    """Largest cost that counts as equal to the dearest solution asked for."""
+    best: float = found.best[found.best.size - 1]
+    return best + tie * (1.0 + abs(best))
+
+
+@inner_kernel
+def scan_mode(
+    problem: WordProblem,
+    links: Links,
+    candidates: Candidates,
+    found: Found,
+    n: int,
+    tail: int,
+    portions: IntArray,
+    most: int,
+    tie: float,
+    not_first: int,
+) -> None:
+    """Scan all words of `n` trims, and of a free turn where `tail` is 1; polish what comes up.
+
+    But for those that begin with the trim `not_first`.
+    """
+    last = (problem.library.twists.shape[0] - tail) ** n
+    each = (problem.library.twists.shape[0] - tail) ** (
+        n - 1
+    )  # words that begin with the same trim
+    left_out = not_first * each if not_first >= 0 else last
+    n += tail
+    for scan in range(2):  # words that cannot span the plane; those that can
+        if (scan == 0 and n > 2 + problem.library.targets.size) or (scan == 1 and n < 3):
+            continue
+        portion = portions[0] if scan == 0 or n == 3 else portions[1]
+        number = 0
+        while number < last:
+            if number == left_out:
+                number += each
+                continue
+            upper_bound = tied_to_best(found, tie)
+            end = min(number + portion, left_out if number < left_out else last)
+            numbers = (n, number, end)
+            number = propose_words(problem, links, candidates, scan == 0, numbers, upper_bound)
+            if candidates.counter[0] > 0:
+                polish_all(problem, links, candidates, found, most)
+
+
+@kernel
+def scan_all_words(
+    one: WordProblem,
+    links_of_one: Links,
+    other: WordProblem,
+    links_of_other: Links,
+    most_moving: IntArray,
+    at_least: Array,
+    candidates: Candidates,
+    found: Found,
+    tail: int,
+    portions: IntArray,
+    most: int,
+    tie: float,
+    not_first: int,
+) -> None:
+    """Scan and polish all words of up to `most` trims, at most four with the free turn.
+
+    It does what `WordScan` does portion by portion. Where a whole scan takes less than a glance at
+    the clock is worth, calls from Python would take most of the time.
+
+    In one or two ways to meet the time, each with its greatest number of moving trims, 0 for a way
+    that is none, and with a lower bound of what its words cost. Shorter words come first;
+    `portions` says how many words, of three trims and of four, are scanned before the solutions of
+    some lower the upper bound of the others. Where `not_first` is a trim, only words of `most`
+    trims that do not begin with it are scanned.
+    """
+    for n in range(1 if not_first < 0 else most, most + 1):
+        if n <= most_moving[0] and not at_least[0] > tied_to_best(found, tie):
+            scan_mode(one, links_of_one, candidates, found, n, tail, portions, most, tie, not_first)
+        if n <= most_moving[1] and not at_least[1] > tied_to_best(found, tie):
+            scan_mode(
+                other, links_of_other, candidates, found, n, tail, portions, most, tie, not_first
+            )

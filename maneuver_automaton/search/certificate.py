@@ -18,7 +18,9 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.words.conjugation import conjugated, conjugated_turn
+from maneuver_automaton.search import _kernels_price as kernels
+from maneuver_automaton.words._kernels_times import TimesProblem
+from maneuver_automaton.words.closing import conjugated, conjugated_turn
 from maneuver_automaton.words.library import FULL_TURN, four_columns
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, displacements_of
@@ -77,16 +79,16 @@ class PricedWord:
 
         The column says how the end and the conditions move, and comes with the trim's rate.
         """
-        from maneuver_automaton.search import _kernels_price as kernels
-
         best, where = np.inf, (self.stretches[0], 0, 0, 0.0)
         n = self.times.size
         for stretch in self.stretches:
             k = len(stretch.rates)
             value, trim, position, when = kernels.price_word(
-                np.vstack([stretch.twists, self.twists]),
-                np.append(stretch.rates, self.rates),
-                np.hstack([stretch.rows, self.rows]),
+                _library(
+                    np.vstack([stretch.twists, self.twists]),
+                    np.append(stretch.rates, self.rates),
+                    np.hstack([stretch.rows, self.rows]),
+                ),
                 k,
                 k + np.arange(n),
                 self.times,
@@ -123,11 +125,9 @@ class PricedWord:
 
 def smallest_reduced_cost(word: PricedWord) -> float:
     """`certificate` of a word that is prepared for it."""
-    from maneuver_automaton.search import _kernels_price as kernels
-
     lasting = np.flatnonzero(word.times > 0.0)
     p = kernels.multipliers_of_word(
-        word.twists, word.rates, word.rows, lasting, word.times[lasting].copy()
+        _library(word.twists, word.rates, word.rows), lasting, word.times[lasting].copy()
     )
     best, cut = word.least(p)
     columns, enough = word.columns(), -NEGLIGIBLE * word.scale
@@ -145,6 +145,11 @@ def smallest_reduced_cost(word: PricedWord) -> float:
             return best
         cuts.append(cut)
     return best
+
+
+def _library(twists: Array, rates: Array, rows: Array) -> TimesProblem:
+    """Trims for the kernels that price them: whatever their word ends at."""
+    return TimesProblem(twists, rates, rows, np.zeros(4), np.zeros(len(rows)))
 
 
 def _priced(problem: Problem, goal: Goal, word: Word) -> PricedWord:

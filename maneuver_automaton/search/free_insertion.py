@@ -18,6 +18,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
+from maneuver_automaton.search import _kernels_insertion
 from maneuver_automaton.search.library_arrays import (
     UNUSED,
     LibraryArrays,
@@ -37,6 +38,7 @@ from maneuver_automaton.search.result import (
 from maneuver_automaton.search.setup import FEW, SearchSetup, search_setup, sub_library
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.words import resting, search_setup_words
+from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.word import Word
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
@@ -51,7 +53,7 @@ ROUNDS = 60  # insertions into these
 SECONDS_A_ROUND = 3e-6  # for every trim of the library, measured
 GROWN = 2  # seeds that may grow beyond the limit before they are shortened
 SHORTENED = 3  # words that are tried with fewer trims where switches cost
-CHATTER = 5  # trims of a word in which two may chatter
+RUN = 5  # trims of a word in which two may alternate, the faster the better
 CLOSING = 1e-6  # relative, by which a cost changes where a word is closed at the exact goal
 LATE = 1e-9  # [s] by which rounding may exceed a time
 
@@ -164,7 +166,7 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
     for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
         if words[k].certificate < -ACCURACY * library.scale and not task.budget.is_over:
             words[k] = _with_insertions(library, words[k], most, _fitting(work, ROUNDS), counts)
-    words = [_calmed(library, word) for word in words]
+    words = [_with_short_runs(library, word) for word in words]
     binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
@@ -217,7 +219,7 @@ def _from_longer(
         if work.task.budget.is_over:
             return
         word = _with_insertions(library, seed, LONGEST, _fitting(work, ROUNDS), counts)
-        grown.append(_calmed(library, word))
+        grown.append(_with_short_runs(library, word))
     longer = [word for word in grown if math.isfinite(word.cost) and len(word.trims) > most]
     for word in sorted(longer, key=_cost)[:1]:
         short = None if work.task.budget.is_over else shortened(library, word, most)
@@ -252,10 +254,8 @@ def _with_insertions(
     library: LibraryArrays, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
 ) -> TimedWord:
     """The word with its best times, after inserting what pays, at most `rounds` times."""
-    from maneuver_automaton.search import _kernels_insertion as kernels
-
     trims, times = _with_room(word)
-    size, cost, least, used = kernels.improve_word(
+    size, cost, least, used = _kernels_insertion.improve_word(
         *_seen_by_kernels(library),
         trims,
         times,
@@ -268,20 +268,18 @@ def _with_insertions(
     return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 
 
-def _seen_by_kernels(library: LibraryArrays) -> tuple[Array, Array, Array, Array, Array, int, int]:
-    """The library and the conditions of a problem, in the order in which kernels take them."""
-    conditions = library.goal, library.rows, library.targets
-    return library.twists, library.rates, *conditions, library.n_priced, library.tail
+def _seen_by_kernels(library: LibraryArrays) -> tuple[TimesProblem, int, int]:
+    """The library, how many of its trims are priced, and its turns of a free heading."""
+    seen = TimesProblem(library.twists, library.rates, library.rows, library.goal, library.targets)
+    return seen, library.n_priced, library.tail
 
 
-def _calmed(library: LibraryArrays, word: TimedWord) -> TimedWord:
-    """The word with its runs of trims that chatter shortened."""
-    from maneuver_automaton.search import _kernels_chatter as kernels
-
-    if len(word.trims) - library.tail < CHATTER:
+def _with_short_runs(library: LibraryArrays, word: TimedWord) -> TimedWord:
+    """The word with its runs of two trims that alternate shortened."""
+    if len(word.trims) - library.tail < RUN:
         return word
     trims, times = _with_room(word)
-    size, cost, least = kernels.calm_word(
+    size, cost, least = _kernels_insertion.word_with_short_runs(
         *_seen_by_kernels(library),
         trims,
         times,

@@ -117,7 +117,7 @@ def first_plan(
         if stages and (not alive or total >= stages[0][0]):
             _, resolutions = stages.pop(0)
             # To make the reversed library cannot be stopped: all maneuvers are sampled and priced.
-            words = len(query.library.arrays.library.words)
+            words = len(query.library.arrays.library.tried.words)
             takes = SECONDS_A_MANEUVER * len(query.automaton.maneuvers) + SECONDS_A_WORD * words
             if any(one.backwards for one in resolutions) and budget.left < takes:
                 left_out = True

@@ -172,7 +172,7 @@ def lattice_arrays(
     `edge_durations` (m, 2) [s] of the coasts of each trim, `via_edge` (C, C) the first edge of the
     transition between two classes; the parts are those of the trims of the library, in its order.
     """
-    m, n_classes = library.n_trims, len(library.cost)
+    m, n_classes = library.n_trims, len(library.transitions.cost)
     classes = library.class_of[:m]
     twists = library.twists[:m]
     bodies = bodies_of(parts)

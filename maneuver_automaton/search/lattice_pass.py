@@ -169,7 +169,7 @@ def first_takes(library: LatticeArrays, task: Task) -> float:
 def _steered(library: LatticeArrays, task: Task) -> int:
     """Words that are steered at the first expansion."""
     known = library.library
-    return max(len(known.words) * (1 + len(known.climbs)) * len(task.aims), 1)
+    return max(len(known.tried.words) * (1 + len(known.tried.climbs)) * len(task.aims), 1)
 
 
 def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> LatticeArrays:
@@ -192,7 +192,7 @@ def _word(one: Pass) -> Word:
     arrays, library, query = one.arrays, one.library, one.query
     state, links = arrays.state.tolist(), arrays.links
     numbered = library.library
-    words = numbered.free_words if state[layout.FREE] else numbered.words
+    words = numbered.tried.free_words if state[layout.FREE] else numbered.tried.words
     row = [*words[state[layout.ROW]].tolist(), state[layout.CLIMB]]
     connection = [
         (NO_EDGE, trim, t)

@@ -98,13 +98,15 @@ def trims_at_will(
             transitions=identities(automaton),
             maneuver_costs=np.zeros(0),
             arrays=_with_prices(arrays, cost)._replace(
-                words=words,
-                n_few=len(words),
-                free_words=np.array(
-                    [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
-                    or [(int(i), int(i), m) for i in moving],
-                    dtype=np.int64,
-                ).reshape(-1, 3),
+                tried=arrays.tried._replace(
+                    words=words,
+                    n_few=len(words),
+                    free_words=np.array(
+                        [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
+                        or [(int(i), int(i), m) for i in moving],
+                        dtype=np.int64,
+                    ).reshape(-1, 3),
+                ),
                 min_coast=float(min_coast),
             ),
         ),
@@ -138,7 +140,7 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
         per_turn=None,
         rest=library.automaton.rest,
         rest_rate=0.0,
-        interval=(library.arrays.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
+        interval=(library.arrays.tried.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
         at_will=False,
     )
 

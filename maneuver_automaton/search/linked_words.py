@@ -212,17 +212,18 @@ def _headings(goal: Goal) -> Array:
 def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[TimedWord]:
     """Words of up to three trims and a climb to the goal, cheapest first, as time allows."""
     arrays, scratch = setup.library.arrays, setup.library.scratch()
+    tried = arrays.tried
     start, goal = four_columns(np.array([setup.problem.start, setup.goal.pose]))[:, None]
     found: list[tuple[NDArray[Any], ...]] = []  # costs, numbers of headings, climbs, rows, times
     for number, heading in enumerate(headings):
         goal[0, 2], row = heading, 0
-        pace = Pace(budget, steps=max(1, STEERED // (1 + len(arrays.climbs))))
-        while left := len(arrays.words) - row:
+        pace = Pace(budget, steps=max(1, STEERED // (1 + len(arrays.tried.climbs))))
+        while left := len(tried.words) - row:
             step = pace.take(left) or (0 if found else min(pace.steps, left))
             if not step:
                 break
             n = kernels.candidate_batch(
-                arrays._replace(words=arrays.words[row : row + step]),
+                arrays._replace(tried=tried._replace(words=tried.words[row : row + step])),
                 step,
                 start,
                 setup.start_trim,
@@ -241,8 +242,8 @@ def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[Time
         np.concatenate(each) for each in zip(*found, strict=True)
     )
     costs = costs + setup.switch * np.maximum(np.count_nonzero(times > 0.0, axis=1) - 1, 0)
-    in_turn = (climbs[:, None] == [NO_TRIM, *arrays.climbs]).argmax(axis=1)
+    in_turn = (climbs[:, None] == [NO_TRIM, *arrays.tried.climbs]).argmax(axis=1)
     for k in np.lexsort((rows, in_turn, numbers, costs)):  # the same however it is parted
-        word = np.append(arrays.words[rows[k]], climbs[k])
+        word = np.append(tried.words[rows[k]], climbs[k])
         used = word >= 0
         yield TimedWord(tuple(word[used].tolist()), times[k, used], cost=float(costs[k]))

@@ -9,7 +9,7 @@ import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,28 +19,36 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search import _kernels_words
+from maneuver_automaton.search._kernels_polish import polish_candidates
+from maneuver_automaton.search._kernels_problem import (
+    Alphabet,
+    Candidates,
+    Found,
+    Links,
+    ScanSettings,
+    WordProblem,
+    WordTerms,
+)
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import FEW, SearchSetup, few_of
+from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims
 from maneuver_automaton.words.transitions import Transitions
 from maneuver_automaton.words.word import Word
 
-if TYPE_CHECKING:
-    from maneuver_automaton.search._kernels_problem import Links
-
-MOST_TRIMS = 5  # moving trims of one word; each beyond three is scanned on a grid
+MOST_TRIMS = 4  # trims of one word, the free turn among them: three in closed form, one scanned
 NODES = 64  # per scanned time, bisected where the function bends
-NODES_2D = 32  # per scanned time where there are two
 TOLERANCE = 1e-12  # relative, for tangent circles and parallel lines
 CAPACITY = 4096
 SECONDS_IF_FREE = (0.0, 1e-6, 1e-6, 1e-6, 5e-5)  # by trims, for words of no linear condition
 PORTIONS_AT_ONCE = np.array([128, 8])  # words of three trims, and of four, before solutions count
-MOST_AT_ONCE = 4  # trims, the free turn among them, of words that are scanned in one call
 MOMENT = 0.02  # [s] that nobody minds to wait for
 AT_ONCE = 0.1  # share of the time left that a scan may take without a look at the clock
-SECONDS_PER_WORD = (1e-6, 1e-6, 1e-6, 5e-6, 1e-3, 2e-2)  # by trims, where little time is left
+SECONDS_PER_WORD = (1e-6, 1e-6, 1e-6, 5e-6, 1e-3)  # by trims, where little time is left
 
 BoolArray = NDArray[np.bool_]
+KernelProblem = tuple[WordProblem, Links]
 
 
 def scanned(
@@ -62,7 +70,7 @@ def scanned(
 class Mode:
     """One way to meet the time: padded by rest, exactly, or free."""
 
-    kernel_problem: tuple[Any, Any]  # its trims and conditions, its transitions
+    kernel_problem: KernelProblem  # its trims and conditions, its transitions
     most_moving: int
     at_least: float = -math.inf  # cost of the whole time at the cheapest trim, where it is fixed
 
@@ -88,10 +96,6 @@ class WordScan:
         upper_bound: float = math.inf,
         not_first: int | None = None,
     ) -> None:
-        from maneuver_automaton.search import _kernels_polish, _kernels_problem, _kernels_words
-
-        self.kernels = _kernels_words
-        self.polish = _kernels_polish.polish_candidates
         self.problem = problem
         self.setup = setup
         self.most = most
@@ -101,7 +105,6 @@ class WordScan:
         self.tables = tables_of(setup)
         rows = [] if not_first is None else np.flatnonzero(setup.trims == not_first).tolist()
         self.not_first = rows[0] if rows else -1  # a row of the search
-        self.gridded = False  # whether a word with two times free, which may miss a solution, was
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = not isinstance(problem.cost, Cost)
@@ -109,7 +112,7 @@ class WordScan:
             alternatives = None
         self.pruned = alternatives is not None or upper_bound < math.inf
         asked = capacity if alternatives is None else alternatives + 1
-        self.candidates = _kernels_problem.Candidates(
+        self.candidates = Candidates(
             words=np.empty((CAPACITY, width), dtype=np.int64),
             times=np.empty((CAPACITY, width)),
             sizes=np.empty(CAPACITY, dtype=np.int64),
@@ -118,7 +121,7 @@ class WordScan:
             turns=np.zeros((3, width), dtype=np.int64),
             work=np.zeros(width),
         )
-        self.found = _kernels_problem.Found(
+        self.found = Found(
             words=np.empty((capacity + 1, width), dtype=np.int64),
             times=np.empty((capacity + 1, width)),
             costs=np.empty(capacity),
@@ -154,20 +157,17 @@ class WordScan:
             for mode in modes:
                 if n > mode.most_moving or mode.at_least > tied(float(self.found.best[-1])):
                     continue
-                calls = self.n_steering
-                for scan, chunk in self._scans(n + tail, mode):
-                    if not self._scan_all(scan, chunk, mode, n, budget, max_words):
+                for flat, chunk in self._scans(n + tail, mode):
+                    if not self._scan_all(flat, chunk, mode, n, budget, max_words):
                         return False
-                if n + tail > 4 and self.n_steering > calls:
-                    self.gridded = True
         return True
 
     def _takes_a_moment(self, mode: Mode, budget: Budget) -> bool:
         """Whether a whole scan is so short that nobody asks the clock meanwhile."""
         tail = 1 if self.setup.free_heading else 0
-        if self.most + tail > MOST_AT_ONCE:
+        if self.most + tail > MOST_TRIMS:
             return False
-        each = SECONDS_PER_WORD if mode.kernel_problem[0].targets.size else SECONDS_IF_FREE
+        each = SECONDS_PER_WORD if mode.kernel_problem[0].library.targets.size else SECONDS_IF_FREE
         most = min(self.most, mode.most_moving)
         numbers = range(1, most + 1)
         seconds = math.fsum(len(self.setup.trims) ** n * each[n + tail] for n in numbers)
@@ -175,11 +175,9 @@ class WordScan:
 
     def _run_at_once(self, modes: Sequence[Mode], tail: int) -> None:
         """The whole scan of some modes in one call: calls take longer than a scan of few words."""
-        from maneuver_automaton.search import _kernels_all_words
-
         both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
         limits = [min(mode.most_moving, self.most) for mode in modes]
-        _kernels_all_words.scan_all_words(
+        _kernels_words.scan_all_words(
             *both[0].kernel_problem,
             *both[1].kernel_problem,
             np.array([*limits, 0][:2]),
@@ -195,46 +193,43 @@ class WordScan:
 
     def _scan_all(
         self,
-        scan: Callable[..., int],
+        flat: bool,
         chunk: int,
         mode: Mode,
         n: int,
         budget: Budget,
         max_words: int | None,
     ) -> bool:
-        """Scan all words of `n` trims with one kernel, `chunk` at a time; False at a limit."""
+        """Scan all words of `n` trims that span the plane, or not; `chunk` at a time."""
         tail = 1 if self.setup.free_heading else 0
         number, last = 0, len(self.setup.trims) ** n
         # Another portion may prune other words, and count them so: it is smaller only at the end.
-        pace = EvenPace(budget, most=chunk, each=SECONDS_PER_WORD[min(n + tail, 5)])
+        pace = EvenPace(budget, most=chunk, each=SECONDS_PER_WORD[n + tail])
         while number < last:
             left = last if max_words is None else max(max_words - self.n_words, 1)
             step = pace.take(min(left, last - number))
             if not step:
                 return False
             upper_bound = tied(float(self.found.best[-1]))
-            number = scan(
-                *mode.kernel_problem, self.candidates, n + tail, number, number + step, upper_bound
+            numbers = (n + tail, number, number + step)
+            number = _kernels_words.scan_words(
+                *mode.kernel_problem, self.candidates, flat, numbers, upper_bound
             )
             if self.candidates.counter[0]:
-                self.polish(*mode.kernel_problem, self.candidates, self.found, self.most)
+                polish_candidates(*mode.kernel_problem, self.candidates, self.found, self.most)
             if max_words is not None and self.n_words >= max_words:
                 return False
         return True
 
-    def _scans(self, n: int, mode: Mode) -> Iterator[tuple[Callable[..., int], int]]:
-        """Kernels that words of `n` trims need, and how many words at a time."""
+    def _scans(self, n: int, mode: Mode) -> Iterator[tuple[bool, int]]:
+        """Whether words of `n` trims are looked at that do not span; how many at a time."""
         # Every chunk may lower the upper bound, and costs a call with all arrays. The clock is
         # asked between chunks: one of long words takes up to 25 ms.
         few = 1024 if self.pruned else 2048
-        if n <= 2 + mode.kernel_problem[0].targets.size:
-            yield self.kernels.scan_flat_words, few
-        if n == 3:
-            yield self.kernels.scan_words, few
-        elif n == 4:
-            yield self.kernels.scan_words, 50
-        elif n > 4:
-            yield self.kernels.scan_long_words, 2
+        if n <= 2 + mode.kernel_problem[0].library.targets.size:
+            yield True, few
+        if n >= 3:
+            yield False, few if n == 3 else 50
 
     def modes(self) -> Iterator[Mode]:
         """A fixed time padded by rest; free; a fixed or longest time met exactly.
@@ -249,16 +244,14 @@ class WordScan:
             # of `max_trims`, rest is one, unless the rest of the time happens to be none
             yield Mode(self._kernel_problem(horizon.time, pad=True, fixed=False), self.most - 1)
         if exact is not None:
-            most = min(2, self.most) if self.spare else self.most
+            most = min(self.most, 2 if self.spare else MOST_TRIMS - int(setup.free_heading))
             at_least = exact * self.tables.least_rate if len(setup.rates) else math.inf
             if at_least > tied(float(self.found.best[-1])):
                 return
             yield Mode(self._kernel_problem(exact, pad=False, fixed=True), most, at_least)
 
-    def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> tuple[Any, Any]:
+    def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> KernelProblem:
         """The kernels' problem and its transitions; of one class of trims, the identity."""
-        from maneuver_automaton.search._kernels_problem import WordProblem
-
         setup, cost, tables = self.setup, self.problem.cost, self.tables
         rest_rate = setup.rest_rate if pad else 0.0
         ends = setup.start_class, setup.goal_class
@@ -273,30 +266,33 @@ class WordScan:
         bounded = math.inf if limit is None else limit
         fixed_time = self.problem.horizon.time is not None
         problem = WordProblem(
-            trims=same.trims,
+            library=TimesProblem(
+                twists=tables.twists,
+                rates=same.rates,
+                rows=same.rows,
+                goal=np.array(setup.goal),
+                targets=np.array(targets, dtype=np.float64),
+            ),
+            trims=Alphabet(
+                numbers=same.trims,
+                prices=same.per_unit,
+                periods=tables.periods,
+                reaches=tables.reaches(setup, most=bounded),
+                parallel=tables.parallel,
+                weights=tables.weights,
+            ),
             size=same.size,
-            twists=tables.twists,
-            rates=same.rates,
-            prices=same.per_unit,
-            rows=same.rows,
-            targets=np.array(targets, dtype=np.float64),
-            periods=tables.periods,
-            reaches=tables.reaches(setup, most=bounded),
-            parallel=tables.parallel,
-            weights=tables.weights,
-            goal=np.array(setup.goal),
             fixed=np.array([0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y]),
-            time_limit=float(bounded),
-            pad=int(pad),
-            pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
-            switch=float(getattr(cost, "switch", 0.0)),
-            direction_change=0.0 if linked else float(getattr(cost, "direction_change", 0.0)),
-            more_turns=int((fixed_time and not self.spare) or setup.climbs),
-            nodes=self.nodes,
-            nodes_2d=NODES_2D,
-            slack=self.slack,
-            tolerance=TOLERANCE,
-            shortest=setup.shortest,
+            terms=WordTerms(
+                time_limit=float(bounded),
+                pad=int(pad),
+                pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
+                switch=float(getattr(cost, "switch", 0.0)),
+                direction_change=0.0 if linked else float(getattr(cost, "direction_change", 0.0)),
+                more_turns=int((fixed_time and not self.spare) or setup.climbs),
+                shortest=setup.shortest,
+            ),
+            scan=ScanSettings(nodes=self.nodes, slack=self.slack, tolerance=TOLERANCE),
             tail=len(same.rates) - 1 if setup.free_heading else -1,
         )
         return problem, same.links
@@ -385,8 +381,6 @@ def _same_for_all(
     goal: int,
 ) -> _SameForAll:
     """Trims above a rest of this rate, linear conditions, transitions; kernels only read them."""
-    from maneuver_automaton.search._kernels_problem import Links
-
     rates, per_unit = _rates_above(tables, rest_rate)
     rows, gains = [], []
     if climbs:

@@ -265,7 +265,9 @@ class WordSetup:
         group, dof = self.group, self.problem.start.size
         (over,) = self.library.displacements([self.start_trim, self.goal_trim])
         end = np.array((group(self.problem.start) @ group(over[:dof])).pose)
-        if max(self.goal.off(end)) > self.library.arrays.met or self._is_late(self.fixed(())[1]):
+        if max(self.goal.off(end)) > self.library.arrays.rounding.met or self._is_late(
+            self.fixed(())[1]
+        ):
             return None
         return None if self.exactly else self.priced((), np.zeros(0))
 
@@ -346,8 +348,9 @@ def _library(
     chosen |= set(wanted) & set(moving.tolist())
     if steers:
         words, n_few = words_of(sorted(chosen), library.transitions)
-        library = replace(library, arrays=library.arrays._replace(words=words, n_few=n_few))
-    upright = library.arrays.climbs[: library.arrays.n_upright].tolist()
+        tried = library.arrays.tried._replace(words=words, n_few=n_few)
+        library = replace(library, arrays=library.arrays._replace(tried=tried))
+    upright = library.arrays.tried.climbs[: library.arrays.tried.n_upright].tolist()
     return tuple(sorted(chosen.union(upright))), library
 
 

@@ -33,9 +33,8 @@ def search_words(
     """Search every word of at most ``max_trims`` trims for its locally optimal coasting times.
 
     *Locally optimal*: all times are positive and no small feasible change of them is cheaper;
-    isolated solutions count. Words of up to four moving trims are scanned in one dimension with
-    roots bracketed; words of five on a grid of two, which can miss solutions that lie closer than
-    its cells.
+    isolated solutions count. Three times follow in closed form; of four trims one is scanned, with
+    its roots bracketed.
 
     Parameters
     ----------
@@ -80,7 +79,7 @@ def search_words(
     """
     setup = search_setup(problem, goal)
     most = problem.horizon.max_trims
-    limit = MOST_TRIMS - (1 if setup.free_heading else 0)
+    limit = most_admitted(free_heading=setup.free_heading, fixed=problem.horizon.time is not None)
     if most is None:
         most = limit
     elif most > limit:
@@ -115,9 +114,14 @@ def search_words(
         status=status,
         solutions=solutions,
         complete=alternatives is None and finished and upper_bound == math.inf,
-        exhaustive=finished and problem.horizon.max_trims is not None and not job.gridded,
+        exhaustive=finished and problem.horizon.max_trims is not None and most <= MOST_TRIMS,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
+
+
+def most_admitted(*, free_heading: bool, fixed: bool) -> int:
+    """Trims of a word that is searched for, with the rest that may fill a fixed time."""
+    return MOST_TRIMS - int(free_heading) + int(fixed)
 
 
 def search_setup_words(

@@ -75,7 +75,7 @@ def climb_time(
             before = trim
     if climb < 0:
         left -= rise_of(lib, before, goal_trim)
-        return 0.0 if abs(left) <= lib.met * (1.0 + abs(altitude)) else math.nan
+        return 0.0 if abs(left) <= lib.rounding.met * (1.0 + abs(altitude)) else math.nan
     left -= rise_of(lib, before, climb) + rise_of(lib, climb, goal_trim)
     return left / lib.twists[climb, 3]
 
@@ -147,13 +147,13 @@ def candidates(
     size = 1.0 + abs(g_x - x) + abs(g_y - y)
     # One class: all transitions are the identity at the price of a switch, so nothing is folded,
     # and every word is steered from the same pose to the same pose.
-    one_class = lib.cost.shape[0] == 1
+    one_class = lib.transitions.cost.shape[0] == 1
     count = 0
     # Without a climb first, then each trim that climbs as the last of the word: those that only
     # climb, then those that drive as they do, whose time has to be known before the word is
     # steered.
-    for climbing in range(-1, lib.climbs.shape[0]):
-        climb = lib.climbs[climbing] if climbing >= 0 else NO_TRIM
+    for climbing in range(-1, lib.tried.climbs.shape[0]):
+        climb = lib.tried.climbs[climbing] if climbing >= 0 else NO_TRIM
         first_before, last_before = -2, -2
         cost_in, cost_out = 0.0, 0.0
         # What a word is steered between: from s, the start after the transition into its first
@@ -190,7 +190,7 @@ def candidates(
                 distance = length(rel[0])
             fixed = cost_in + cost_out
             slope = 0.0
-            if climbing >= lib.n_upright:  # it drives as it climbs: its time is known before
+            if climbing >= lib.tried.n_upright:  # it drives as it climbs: its time is known before
                 if not fixed < upper_bound or not is_level(lib, words[row]):
                     continue
                 level = scratch.branches[0]
@@ -198,7 +198,7 @@ def candidates(
                 slope = climb_time(
                     lib, words[row], last, goal_trim, climb, start_trim, g_z - z, level
                 )
-                if not lib.shortest <= slope <= lib.longest[climb]:
+                if not lib.rounding.shortest <= slope <= lib.longest[climb]:
                     continue
                 e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, slope)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
@@ -209,7 +209,7 @@ def candidates(
             # is the hot test of the search, so it knows no transition.
             if one_class and n_trims == 3:
                 price = min(lib.per_metre[a], lib.per_metre[b], lib.per_metre[c])
-                if distance > lib.met and not distance * price < upper_bound:
+                if distance > lib.rounding.met and not distance * price < upper_bound:
                     continue
             else:
                 if n_trims >= 2:
@@ -223,8 +223,18 @@ def candidates(
             if n_trims == 3 and one_class:  # displacements known to be none cost no time
                 nothing = (0j, 0.0)
                 first, second, third = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
-                least = -lib.tolerance  # no branch with a time below is of use
-                steer(first, nothing, second, nothing, third, rel, lib.tolerance, branches, least)
+                least = -lib.rounding.tolerance  # no branch with a time below is of use
+                steer(
+                    first,
+                    nothing,
+                    second,
+                    nothing,
+                    third,
+                    rel,
+                    lib.rounding.tolerance,
+                    branches,
+                    least,
+                )
                 n_branches = 2
             elif n_trims == 3:
                 steer(
@@ -234,9 +244,9 @@ def candidates(
                     step_of(lib, b, c),
                     motion_of(lib, c),
                     rel,
-                    lib.tolerance,
+                    lib.rounding.tolerance,
                     branches,
-                    -lib.tolerance,
+                    -lib.rounding.tolerance,
                 )
                 n_branches = 2
             elif n_trims == 2:
@@ -245,7 +255,7 @@ def candidates(
                     step_of(lib, a, b),
                     motion_of(lib, b),
                     rel,
-                    lib.tolerance,
+                    lib.rounding.tolerance,
                     branches[0],
                 )
             elif n_trims == 1:
@@ -261,10 +271,10 @@ def candidates(
                 trim, gear = start_trim, start_gear
                 for n in range(n_trims):
                     t, this = branches[branch, n], words[row, n]
-                    if not t >= -lib.tolerance:
+                    if not t >= -lib.rounding.tolerance:
                         usable = False
                         break
-                    if t >= lib.periods[this] * (1.0 - WHOLE) or t < lib.shortest:
+                    if t >= lib.periods[this] * (1.0 - WHOLE) or t < lib.rounding.shortest:
                         t = 0.0
                     scratch.times[count, n] = t
                     if t > 0.0 and this < lib.n_trims:  # the turn of a free heading is no trim
@@ -291,7 +301,7 @@ def candidates(
                 t = slope
                 if slope > 0.0:
                     duration += slope
-                elif lib.climbs.shape[0] > 0:
+                elif lib.tried.climbs.shape[0] > 0:
                     t = climb_time(
                         lib,
                         words[row],
@@ -302,7 +312,7 @@ def candidates(
                         g_z - z,
                         scratch.times[count],
                     )
-                    if not t >= 0.0 or (climb >= 0 and t < lib.shortest):
+                    if not t >= 0.0 or (climb >= 0 and t < lib.rounding.shortest):
                         continue
                     if climb >= 0:
                         cost += t * lib.rates[climb]
@@ -310,7 +320,7 @@ def candidates(
                 if n_trims < 3:  # fewer times than the goal has coordinates: does it meet the goal?
                     folded, target = (s_x, s_y, s_heading), (e_x, e_y, e_heading)
                     missed = word_misses(lib, words[row], folded, target, scratch.times[count])
-                    if not missed <= lib.met * size:
+                    if not missed <= lib.rounding.met * size:
                         continue
                 if not one_class:
                     if n_trims:
@@ -351,7 +361,7 @@ def candidate_batch(
         goal = (goals[k, 0], goals[k, 1], goals[k, 2], goals[k, 3])
         count = candidates(
             lib,
-            lib.words,
+            lib.tried.words,
             n_words,
             start,
             trim_and_gear(start_trim, 0),

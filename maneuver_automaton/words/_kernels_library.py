@@ -32,25 +32,29 @@ def class_of(lib: LibraryArrays, trim: int) -> int:
 def displacement_of(lib: LibraryArrays, before: int, after: int) -> tuple[float, float, float]:
     """Displacement (x, y, heading) of the transition between two trims."""
     a, b = class_of(lib, before), class_of(lib, after)
-    return lib.displacement[a, b, 0], lib.displacement[a, b, 1], lib.displacement[a, b, 2]
+    return (
+        lib.transitions.displacement[a, b, 0],
+        lib.transitions.displacement[a, b, 1],
+        lib.transitions.displacement[a, b, 2],
+    )
 
 
 @inlined_kernel
 def rise_of(lib: LibraryArrays, before: int, after: int) -> float:
     """Altitude that the transition between two trims gains."""
-    return lib.displacement[class_of(lib, before), class_of(lib, after), 3]
+    return lib.transitions.displacement[class_of(lib, before), class_of(lib, after), 3]
 
 
 @inlined_kernel
 def cost_between(lib: LibraryArrays, before: int, after: int) -> float:
     """Cost of the transition between two trims; inf where there is none."""
-    return lib.cost[class_of(lib, before), class_of(lib, after)]
+    return lib.transitions.cost[class_of(lib, before), class_of(lib, after)]
 
 
 @inlined_kernel
 def time_between(lib: LibraryArrays, before: int, after: int) -> float:
     """Duration of the transition between two trims."""
-    return lib.time[class_of(lib, before), class_of(lib, after)]
+    return lib.transitions.time[class_of(lib, before), class_of(lib, after)]
 
 
 @inner_kernel
@@ -73,12 +77,12 @@ def distance_cost(lib: LibraryArrays, distance: float, a: int, b: int, c: int) -
     if a >= 0:
         price = lib.per_metre[a]
     if b >= 0:
-        left -= lib.length[class_of(lib, a), class_of(lib, b)]
+        left -= lib.transitions.length[class_of(lib, a), class_of(lib, b)]
         price = min(price, lib.per_metre[b])
     if c >= 0:
-        left -= lib.length[class_of(lib, b), class_of(lib, c)]
+        left -= lib.transitions.length[class_of(lib, b), class_of(lib, c)]
         price = min(price, lib.per_metre[c])
-    return left * price if left > lib.met else 0.0
+    return left * price if left > lib.rounding.met else 0.0
 
 
 @inner_kernel

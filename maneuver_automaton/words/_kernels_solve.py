@@ -13,7 +13,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.words._kernels_times import (
+    TimesProblem,
     assign,
+    columns_of,
     jacobian,
     lagrangian_hessian,
     least_squares,
@@ -39,15 +41,7 @@ def merit(rates: Array, times: Array, barrier: float, gap: Array, weight: float)
 
 
 @inner_kernel
-def correct(
-    twists: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    times: Array,
-    gap: Array,
-    columns: Array,
-) -> bool:
+def correct(problem: TimesProblem, times: Array, gap: Array, columns: Array) -> bool:
     """Bring times after a full step, in place, nearer to the conditions; whether they stay inside.
 
     The conditions are curved, so that a step along their tangent misses them, and the merit may
@@ -57,7 +51,7 @@ def correct(
 
     Source: Nocedal, Wright, Numerical Optimization, 2nd ed., Sec. 15.6.
     """
-    scaled = jacobian(columns, rows)
+    scaled = jacobian(columns, problem.rows)
     for e in range(gap.size):
         gap[e] = -gap[e]
         for i in range(times.size):
@@ -68,24 +62,18 @@ def correct(
             return False
     for i in range(times.size):
         times[i] += times[i] * change[i]
-    residual(twists, times, goal, rows, targets, columns, gap)
+    residual(problem, times, columns, gap)
     return True
 
 
 @inner_kernel
 def interior_point(
-    rates: Array,
-    twists: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    times: Array,
-    barrier: float,
-    iterations: int,
+    problem: TimesProblem, times: Array, barrier: float, iterations: int
 ) -> tuple[bool, Array]:
     """Primal-dual Newton from `times` > 0, in place; returns (converged, slack of each bound)."""
+    rates, twists = problem.rates, problem.twists
     n = times.size
-    n_rows = 3 + targets.size
+    n_rows = 3 + problem.targets.size
     columns = np.empty((n, 3))
     gap = np.empty(n_rows)
     trial_gap = np.empty(n_rows)
@@ -99,15 +87,15 @@ def interior_point(
     for i in range(n):
         slack[i] = barrier / times[i]
         trial[i] = rates[i] - slack[i]
-    worst = residual(twists, times, goal, rows, targets, columns, gap)
-    p = multipliers(jacobian(columns, rows), trial)
+    worst = residual(problem, times, columns, gap)
+    p = multipliers(jacobian(columns, problem.rows), trial)
     system = np.empty((n + n_rows, n + n_rows))
     rhs = np.empty(n + n_rows)
     stalled = 0  # steps in a row that led nowhere: degenerate words have no end of them
     for _ in range(iterations):
         if stalled == STALLED:
             break
-        matrix = jacobian(columns, rows)
+        matrix = jacobian(columns, problem.rows)
         lagrangian_hessian(columns, p[0], p[1], hessian)
         slope = 0.0
         complementarity = 0.0
@@ -182,12 +170,10 @@ def interior_point(
         for _attempt in range(10):
             for i in range(n):
                 trial[i] = times[i] + share * step[i]
-            worst = residual(twists, trial, goal, rows, targets, columns, trial_gap)
+            worst = residual(problem, trial, columns, trial_gap)
             if merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(before):
                 break
-            inside = _attempt == 0 and correct(
-                twists, goal, rows, targets, trial, trial_gap, columns
-            )
+            inside = _attempt == 0 and correct(problem, trial, trial_gap, columns)
             if inside and merit(rates, trial, barrier, trial_gap, weight) <= before + 1e-12 * abs(
                 before
             ):
@@ -213,16 +199,14 @@ def interior_point(
 
 
 @inner_kernel
-def levenberg_marquardt(
-    twists: Array, goal: Array, rows: Array, targets: Array, times: Array, iterations: int
-) -> float:
+def levenberg_marquardt(problem: TimesProblem, times: Array, iterations: int) -> float:
     """Feasible times near `times`, in place, by projected Levenberg-Marquardt; what is violated."""
     n = times.size
-    n_rows = 3 + targets.size
+    n_rows = 3 + problem.targets.size
     columns = np.empty((n, 3))
     gap = np.empty(n_rows)
     trial = np.empty(n)
-    worst = residual(twists, times, goal, rows, targets, columns, gap)
+    worst = residual(problem, times, columns, gap)
     square = 0.0
     for e in range(n_rows):
         square += gap[e] * gap[e]
@@ -230,8 +214,8 @@ def levenberg_marquardt(
     for _ in range(iterations):
         if worst < 1e-13:
             break
-        residual(twists, times, goal, rows, targets, columns, gap)
-        matrix = jacobian(columns, rows)
+        residual(problem, times, columns, gap)
+        matrix = jacobian(columns, problem.rows)
         system = np.zeros((n_rows + n, n))
         rhs = np.zeros(n_rows + n)
         for i in range(n):
@@ -253,7 +237,7 @@ def levenberg_marquardt(
         # follows.
         for i in range(n):
             trial[i] = max(0.0, times[i] + step[i])
-        after = residual(twists, trial, goal, rows, targets, columns, gap)
+        after = residual(problem, trial, columns, gap)
         square_after = 0.0
         for e in range(n_rows):
             square_after += gap[e] * gap[e]
@@ -270,21 +254,14 @@ def levenberg_marquardt(
 
 @inner_kernel
 def finish(
-    rates: Array,
-    twists: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    times: Array,
-    slack: Array,
-    keep: IntArray,
+    problem: TimesProblem, times: Array, slack: Array, keep: IntArray
 ) -> tuple[float, float, Array]:
     """Set vanishing times to zero and refine the others, in place.
 
     Returns (largest violation, largest stationarity violated, multipliers).
     """
     n = times.size
-    m = targets.size
+    m = problem.targets.size
     count = 0
     for i in range(n):
         # A trim leaves the word where its time is nothing, or small against its slack: then the
@@ -294,32 +271,24 @@ def finish(
         else:
             keep[count] = i
             count += 1
-    some_twists = np.empty((count, 4))
-    some_rates = np.empty(count)
-    some_rows = np.empty((m, count))
+    some = columns_of(problem, keep, count)
     some_times = np.empty(count)
     for k in range(count):
-        assign(some_twists[k], twists[keep[k]])
-        some_rates[k] = rates[keep[k]]
         some_times[k] = times[keep[k]]
-        for r in range(m):
-            some_rows[r, k] = rows[r, keep[k]]
     p = np.zeros(3 + m)
     slope = 0.0
     # More times than conditions: a minimum, refined by Newton. As many or fewer: the conditions
     # alone fix them, and the multipliers are those that fit best.
     if count > 3 + m:
-        p, worst, slope = newton_stationary(
-            some_rates, some_twists, goal, some_rows, targets, some_times, 20
-        )
-    worst = newton_feasible(some_twists, goal, some_rows, targets, some_times, 10)
+        p, worst, slope = newton_stationary(some, some_times, 20)
+    worst = newton_feasible(some, some_times, 10)
     if count <= 3 + m:
         columns = np.empty((count, 3))
-        residual(some_twists, some_times, goal, some_rows, targets, columns, np.empty(3 + m))
-        matrix = jacobian(columns, some_rows)
-        p = multipliers(matrix, some_rates)
+        residual(some, some_times, columns, np.empty(3 + m))
+        matrix = jacobian(columns, some.rows)
+        p = multipliers(matrix, some.rates)
         for k in range(count):
-            value = some_rates[k]
+            value = some.rates[k]
             for e in range(3 + m):
                 value += matrix[e, k] * p[e]
             slope = max(slope, abs(value))
@@ -331,15 +300,7 @@ def finish(
 
 
 @inner_kernel
-def solve_from(
-    rates: Array,
-    twists: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    times: Array,
-    barrier: float,
-) -> tuple[int, Array, float]:
+def solve_from(problem: TimesProblem, times: Array, barrier: float) -> tuple[int, Array, float]:
     """Interior point, then refinement; `times` in place. Returns (status, multipliers, slope)."""
     n = times.size
     start = np.empty(n)
@@ -348,33 +309,27 @@ def solve_from(
         times[i] = max(times[i], 30.0 * barrier)
         start[i] = times[i]
     keep = np.empty(n, dtype=np.int64)
-    _, slack = interior_point(rates, twists, goal, rows, targets, times, barrier, 60)
+    _, slack = interior_point(problem, times, barrier, 60)
     inner = np.empty(n)
     assign(inner, times)
-    worst, slope, p = finish(rates, twists, goal, rows, targets, times, slack, keep)
+    worst, slope, p = finish(problem, times, slack, keep)
     if worst < 1e-10 and slope < 1e-7:
         return 0, p, slope
     for i in range(n):  # the refinement went astray: feasibility alone, from where it began
         times[i] = inner[i] if math.isfinite(inner[i]) else start[i]
-    worst = levenberg_marquardt(twists, goal, rows, targets, times, 60)
+    worst = levenberg_marquardt(problem, times, 60)
     if worst > 1e-10:
         assign(times, start)
-        worst = levenberg_marquardt(twists, goal, rows, targets, times, 100)
+        worst = levenberg_marquardt(problem, times, 100)
     columns = np.empty((n, 3))
-    residual(twists, times, goal, rows, targets, columns, np.empty(3 + targets.size))
-    p = multipliers(jacobian(columns, rows), rates)
+    residual(problem, times, columns, np.empty(3 + problem.targets.size))
+    p = multipliers(jacobian(columns, problem.rows), problem.rates)
     return (1 if worst < 1e-10 else 2), p, np.inf
 
 
 @kernel
 def solve_times(
-    rates: Array,
-    twists: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    starts: Array,
-    best_times: Array,
+    problem: TimesProblem, starts: Array, best_times: Array
 ) -> tuple[int, float, Array, float]:
     """Best of several starts (k, n), into `best_times`; returns (status, cost, multipliers, slope).
 
@@ -384,21 +339,19 @@ def solve_times(
     times = np.empty(n)
     best_cost = np.inf
     best_status = 2
-    best_p = np.zeros(3 + targets.size)
+    best_p = np.zeros(3 + problem.targets.size)
     best_slope = np.inf
     for k in range(starts.shape[0]):
         assign(times, starts[k])
         scale = 0.0
         for i in range(n):
-            scale = max(scale, abs(rates[i]))
-        status, p, slope = solve_from(
-            rates, twists, goal, rows, targets, times, 1e-2 * max(scale, 1e-3)
-        )
+            scale = max(scale, abs(problem.rates[i]))
+        status, p, slope = solve_from(problem, times, 1e-2 * max(scale, 1e-3))
         if status == 2:
             continue
         cost = 0.0
         for i in range(n):
-            cost += rates[i] * times[i]
+            cost += problem.rates[i] * times[i]
         if status < best_status or (status == best_status and cost < best_cost):
             best_status, best_cost, best_slope = status, cost, slope
             best_p = p

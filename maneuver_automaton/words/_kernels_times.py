@@ -1,20 +1,47 @@
 """End of a word, its derivatives, and the Newton iterations on its coasting times.
 
-A word is given by rows: `twists` (n, 4) of (v_x, v_y, turn rate, v_z), and `goal` (4,) relative to
-the start. No kernel knows a displacement: trims after a maneuver come in as conjugated twists, and
-the goal as seen from before all maneuvers (see `switching_times.conjugated`). Linear conditions
-``rows @ times = targets`` carry altitude and fixed time. Times are in seconds.
+No kernel knows a displacement: trims after a maneuver come in as conjugated twists, and the goal as
+seen from before all maneuvers (see `closing.conjugated`). Times are in seconds.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
+
+
+class TimesProblem(NamedTuple):
+    """Minimise ``rates @ times`` such that the word ends at `goal` and ``rows @ times = targets``.
+
+    Its columns are the trims of a word, or all trims of a library that words are made of.
+    """
+
+    twists: Array  # (n, 4) v_x, v_y, turn rate, v_z
+    rates: Array  # (n,) cost per second
+    rows: Array  # (m, n) of the linear conditions: altitude, fixed time
+    goal: Array  # (4,) relative to the start
+    targets: Array  # (m,)
+
+
+@inner_kernel
+def columns_of(problem: TimesProblem, word: IntArray, n: int) -> TimesProblem:
+    """The problem of the first `n` trims of a word of a library."""
+    m = problem.targets.size
+    twists = np.empty((n, 4))
+    rates = np.empty(n)
+    rows = np.empty((m, n))
+    for i in range(n):
+        assign(twists[i], problem.twists[word[i]])
+        rates[i] = problem.rates[word[i]]
+        for r in range(m):
+            rows[r, i] = problem.rows[r, word[i]]
+    return TimesProblem(twists, rates, rows, problem.goal, problem.targets)
 
 
 @inner_kernel
@@ -128,27 +155,19 @@ def least_squares(matrix: Array, rhs: Array, relative_tolerance: float) -> tuple
 
 
 @inner_kernel
-def residual(
-    twists: Array,
-    times: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    columns: Array,
-    out: Array,
-) -> float:
+def residual(problem: TimesProblem, times: Array, columns: Array, out: Array) -> float:
     """Fill `out` (3 + m,) with end minus goal and the linear conditions; returns its largest entry.
 
     The heading is compared modulo a full turn.
     """
-    x, y, heading = end_and_columns(twists, times, columns)
-    out[0] = x - goal[0]
-    out[1] = y - goal[1]
-    out[2] = nearest_turn(heading - goal[2])
-    for r in range(targets.size):
-        value = -targets[r]
+    x, y, heading = end_and_columns(problem.twists, times, columns)
+    out[0] = x - problem.goal[0]
+    out[1] = y - problem.goal[1]
+    out[2] = nearest_turn(heading - problem.goal[2])
+    for r in range(problem.targets.size):
+        value = -problem.targets[r]
         for i in range(times.size):
-            value += rows[r, i] * times[i]
+            value += problem.rows[r, i] * times[i]
         out[3 + r] = value
     worst = 0.0
     for e in range(out.size):
@@ -185,13 +204,7 @@ def multipliers(matrix: Array, rates: Array) -> Array:
 
 @inner_kernel
 def newton_stationary(
-    rates: Array,
-    twists: Array,
-    goal: Array,
-    rows: Array,
-    targets: Array,
-    times: Array,
-    iterations: int,
+    problem: TimesProblem, times: Array, iterations: int
 ) -> tuple[Array, float, float]:
     """Newton on ``rates + J^T p = 0, conditions = 0`` without bounds, from `times`, in place.
 
@@ -199,21 +212,21 @@ def newton_stationary(
     stationarity violated.
     """
     n = times.size
-    n_rows = 3 + targets.size
+    n_rows = 3 + problem.targets.size
     columns = np.empty((n, 3))
     gap = np.empty(n_rows)
     hessian = np.empty((n, n))
-    worst = residual(twists, times, goal, rows, targets, columns, gap)
-    p = multipliers(jacobian(columns, rows), rates)
+    worst = residual(problem, times, columns, gap)
+    p = multipliers(jacobian(columns, problem.rows), problem.rates)
     slope = np.inf
     for _ in range(iterations):
-        matrix = jacobian(columns, rows)
+        matrix = jacobian(columns, problem.rows)
         lagrangian_hessian(columns, p[0], p[1], hessian)
         system = np.zeros((n + n_rows, n + n_rows))
         rhs = np.empty(n + n_rows)
         slope = 0.0
         for i in range(n):
-            value = rates[i]
+            value = problem.rates[i]
             for e in range(n_rows):
                 value += matrix[e, i] * p[e]
                 system[i, n + e] = matrix[e, i]
@@ -238,34 +251,32 @@ def newton_stationary(
             times[i] += shrink * step[i]
         for e in range(n_rows):
             p[e] += shrink * step[n + e]
-        worst = residual(twists, times, goal, rows, targets, columns, gap)
+        worst = residual(problem, times, columns, gap)
         if length < 1e-15:
             break
     return p, worst, slope
 
 
 @inner_kernel
-def newton_feasible(
-    twists: Array, goal: Array, rows: Array, targets: Array, times: Array, iterations: int
-) -> float:
+def newton_feasible(problem: TimesProblem, times: Array, iterations: int) -> float:
     """Gauss-Newton on the conditions alone, from `times`, in place; the largest one violated."""
     n = times.size
     columns = np.empty((n, 3))
-    gap = np.empty(3 + targets.size)
+    gap = np.empty(3 + problem.targets.size)
     best = np.empty(n)
     # The last steps are below rounding, and a worse one may follow a better: the best is kept.
     assign(best, times)
-    worst = residual(twists, times, goal, rows, targets, columns, gap)
+    worst = residual(problem, times, columns, gap)
     least = worst
     for _ in range(iterations):
         if worst < 1e-15:
             break
         for e in range(gap.size):
             gap[e] = -gap[e]
-        step, _rank = least_squares(jacobian(columns, rows), gap, 1e-11)
+        step, _rank = least_squares(jacobian(columns, problem.rows), gap, 1e-11)
         for i in range(n):
             times[i] += step[i]
-        worst = residual(twists, times, goal, rows, targets, columns, gap)
+        worst = residual(problem, times, columns, gap)
         if worst < least:
             least = worst
             assign(best, times)
@@ -276,20 +287,18 @@ def newton_feasible(
 
 
 @inner_kernel
-def curvature(
-    rates: Array, twists: Array, goal: Array, rows: Array, targets: Array, times: Array, p: Array
-) -> float:
+def curvature(problem: TimesProblem, times: Array, p: Array) -> float:
     """Smallest pivot of the Lagrangian's Hessian on the null space of the conditions.
 
     Positive: no small feasible change of the times is cheaper. `inf` where nothing can change.
     """
     n = times.size
     columns = np.empty((n, 3))
-    gap = np.empty(3 + targets.size)
-    residual(twists, times, goal, rows, targets, columns, gap)
+    gap = np.empty(3 + problem.targets.size)
+    residual(problem, times, columns, gap)
     hessian = np.empty((n, n))
     lagrangian_hessian(columns, p[0], p[1], hessian)
-    basis = null_space(jacobian(columns, rows))
+    basis = null_space(jacobian(columns, problem.rows))
     d = basis.shape[1]
     if d == 0:
         return np.inf

@@ -29,11 +29,37 @@ TOLERANCE = 1e-10  # of the steering function, relative
 MET = 1e-9  # [m, rad] by which a word with fewer times than the goal has coordinates may miss it
 
 
-class LibraryArrays(NamedTuple):
-    """Arrays for kernels of m trims in C classes; row m is the turn in place of a free heading.
+class TransitionArrays(NamedTuple):
+    """The transitions between C classes of trims; of one class, the identity."""
 
-    Where there are several classes, `displacement`, `cost`, `time` and `length` are indexed by the
-    classes of two trims. A kinematic vehicle has one, and its transition is the identity.
+    displacement: Array  # (C, C, 4)
+    cost: Array  # (C, C) inf where there is none
+    time: Array  # (C, C) [s] it lasts
+    length: Array  # (C, C) [m] between its ends, in the plane
+
+
+class WordTable(NamedTuple):
+    """The words that are tried where two poses are to be connected."""
+
+    words: IntArray  # (K, 3) trims in order, NO_TRIM for none; those of few trims first
+    n_few: int  # how many these are
+    free_words: IntArray  # (F, 3) that end with the turn of a free heading
+    climbs: IntArray  # (c,) trims that only climb or sink, then such that drive straight with it
+    n_upright: int  # how many only climb or sink
+
+
+class Rounding(NamedTuple):
+    """What counts as nothing."""
+
+    shortest: float  # [s] coasting times below it
+    tolerance: float  # of the steering function, relative
+    met: float  # [m, rad] by which a goal may be missed
+
+
+class LibraryArrays(NamedTuple):
+    """A library for kernels: m trims in C classes; row m is the turn in place of a free heading.
+
+    A vehicle that switches trims at will has one class, and its transition is the identity.
     """
 
     twists: Array  # (m + 1, 4) planar trims do not climb
@@ -42,23 +68,14 @@ class LibraryArrays(NamedTuple):
     longest: Array  # (m + 1,) [s] that a trim may last
     gears: IntArray  # (m + 1,) sign of the forward speed
     class_of: IntArray  # (m + 1,)
-    displacement: Array  # (C, C, 4) of the transition between two classes
-    cost: Array  # (C, C) of that transition, inf where there is none
-    time: Array  # (C, C) [s] it lasts
-    length: Array  # (C, C) [m] between its ends, in the plane
     per_metre: Array  # (m + 1,) least cost per metre in the plane, inf for none
-    words: IntArray  # (K, 3) trims in order, NO_TRIM for none; those of few trims first
-    n_few: int  # how many these are
-    free_words: IntArray  # (F, 3) that end with the turn of a free heading
-    climbs: IntArray  # (c,) trims that only climb or sink, then such that drive straight with it
-    n_upright: int  # how many only climb or sink
     n_trims: int  # m
+    transitions: TransitionArrays
+    tried: WordTable
     switch: float  # price of a switch of trims
     direction_change: float  # price of a change between forward and reverse
     min_coast: float  # [s] that a trim lasts at least
-    shortest: float  # [s] below which a time is none
-    tolerance: float  # of the steering function, relative
-    met: float  # [m, rad]
+    rounding: Rounding
 
 
 class Scratch(NamedTuple):
@@ -126,8 +143,8 @@ class Library:
 
 def scratch_of(arrays: LibraryArrays) -> Scratch:
     """Room for the candidates of one steering call: two for each word, with each climb."""
-    most = max(len(arrays.words), len(arrays.free_words), 1)
-    n = 2 * most * (1 + len(arrays.climbs))
+    tried = arrays.tried
+    n = 2 * max(len(tried.words), len(tried.free_words), 1) * (1 + len(tried.climbs))
     return Scratch(
         costs=np.empty(n),
         durations=np.empty(n),
@@ -169,7 +186,7 @@ def library_of(
     --------
     >>> from maneuver_automaton.models import Unicycle
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> library_of(robot).arrays.words.tolist()[:4]
+    >>> library_of(robot).arrays.tried.words.tolist()[:4]
     [[-1, -1, -1], [0, -1, -1], [1, -1, -1], [0, 1, -1]]
     """
     m = len(automaton)
@@ -194,7 +211,7 @@ def library_of(
         trims=np.arange(m),
         transitions=transitions,
         maneuver_costs=prices,
-        arrays=arrays._replace(words=words, n_few=n_few),
+        arrays=arrays._replace(tried=arrays.tried._replace(words=words, n_few=n_few)),
     )
 
 
@@ -230,23 +247,25 @@ def library_arrays(
         longest=np.append(np.full(m, np.inf) if longest is None else longest, np.inf),
         gears=np.append(np.sign(rows[:m, 0]), 0).astype(np.int64),
         class_of=np.append(transitions.class_of[numbers], 0).astype(np.int64),
-        displacement=displacement,
-        cost=transitions.cost,
-        time=transitions.time,
-        length=np.hypot(displacement[..., 0], displacement[..., 1]),
         per_metre=per_metre,
-        words=np.zeros((0, 3), dtype=np.int64),
-        n_few=0,
-        free_words=np.zeros((0, 3), dtype=np.int64),
-        climbs=np.concatenate([upright, sloping]).astype(np.int64),
-        n_upright=len(upright),
         n_trims=m,
+        transitions=TransitionArrays(
+            displacement=displacement,
+            cost=transitions.cost,
+            time=transitions.time,
+            length=np.hypot(displacement[..., 0], displacement[..., 1]),
+        ),
+        tried=WordTable(
+            words=np.zeros((0, 3), dtype=np.int64),
+            n_few=0,
+            free_words=np.zeros((0, 3), dtype=np.int64),
+            climbs=np.concatenate([upright, sloping]).astype(np.int64),
+            n_upright=len(upright),
+        ),
         switch=0.0,
         direction_change=0.0,
         min_coast=0.0,
-        shortest=SHORTEST,
-        tolerance=TOLERANCE,
-        met=MET,
+        rounding=Rounding(SHORTEST, TOLERANCE, MET),
     )
 
 

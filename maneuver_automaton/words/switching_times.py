@@ -18,8 +18,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.words.closing import MET
-from maneuver_automaton.words.conjugation import conjugated, conjugated_turn, goal_before
+from maneuver_automaton.words import _kernels_solve as kernels
+from maneuver_automaton.words._kernels_times import TimesProblem
+from maneuver_automaton.words.closing import MET, conjugated, conjugated_turn, goal_before
 
 RESTARTS = 12  # further starts where the first one fails
 TURNS = (0.5, 2.0 * math.pi - 0.5)  # [rad] of a free heading that iterations start with
@@ -251,8 +252,6 @@ def _solved(
     restarts: int,
 ) -> SwitchingTimes:
     """The best times of a word without displacements; `weights` say what counts in `total`."""
-    from maneuver_automaton.words import _kernels_solve as kernels
-
     n = len(twists)
     words, end = np.zeros((n, 4)), np.zeros(4)
     words[:, : twists.shape[1]] = twists
@@ -266,11 +265,13 @@ def _solved(
         targets.append(total)
     times = np.zeros(n)
     status, cost, multipliers, _slope = kernels.solve_times(
-        np.ascontiguousarray(rates),
-        words,
-        end,
-        np.array(rows).reshape(len(rows), n),
-        np.array(targets, dtype=np.float64),
+        TimesProblem(
+            twists=words,
+            rates=np.ascontiguousarray(rates),
+            rows=np.array(rows).reshape(len(rows), n),
+            goal=end,
+            targets=np.array(targets, dtype=np.float64),
+        ),
         _starts(n, total, guesses, restarts),
         times,
     )

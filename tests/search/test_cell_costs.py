@@ -30,7 +30,8 @@ def bound(problem, word, triple, q, low, high):
 def kernel_problem(twists, rates, goal):
     one = parking()
     problem, _ = next(WordScan(one, search_setup(one, one.goals[0]), 3, 0).modes()).kernel_problem
-    return problem._replace(twists=twists, rates=rates, goal=goal)
+    library = problem.library._replace(twists=twists, rates=rates, goal=goal)
+    return problem._replace(library=library)
 
 
 def bounded(twists, times, rates, q, before, after):

@@ -31,6 +31,7 @@ from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.result import InsertionTask, TimedWord, plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.shortening import shortened
+from maneuver_automaton.words._kernels_times import TimesProblem
 from tests import reference
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are
@@ -153,13 +154,6 @@ def test_agrees_with_exhaustive_search(cost, horizon, least_equal):
     assert equal >= least_equal  # an upper bound elsewhere: insertion proves no global optimum
 
 
-@compiled_only
-def test_agrees_with_exhaustive_search_over_five_trims():
-    five = parking(max_trims=5)
-    exhaustive = search_words(five, five.goals[0]).solutions[0]
-    assert best(five).cost == pytest.approx(exhaustive.cost, abs=1e-9)
-
-
 # Certificates.
 
 
@@ -208,8 +202,8 @@ def test_a_library_is_priced_as_each_of_its_trims_alone(seed):
 
     def priced(order, n):
         numbers = np.argsort(order)[word]
-        twists, costs = np.array(values[order]), np.array(rates[order])
-        return price_word(twists, costs, rows, n, numbers, times, 0, len(word), prices)
+        library = TimesProblem(values[order], rates[order], rows, np.zeros(4), np.zeros(1))
+        return price_word(library, n, numbers, times, 0, len(word), prices)
 
     every = np.arange(len(values))
     alone = [priced(np.append(j, np.delete(every, j)), 1) for j in every]

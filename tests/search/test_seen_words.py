@@ -15,7 +15,7 @@ from maneuver_automaton.search.result import TimedWord, plan_of
 from maneuver_automaton.search.setup import search_setup
 from maneuver_automaton.search.word_scan import WordScan
 from maneuver_automaton.search.word_setup import word_setup
-from maneuver_automaton.words.conjugation import conjugated, conjugated_turn, goal_before
+from maneuver_automaton.words.closing import conjugated, conjugated_turn, goal_before
 from tests.inertia import unicycle_automaton
 from tests.search.cases import parking
 
@@ -63,12 +63,14 @@ def test_a_word_is_seen_as_its_conjugation(word, free):
     own = setup.library.arrays.twists[trims, :3]
     twists, product = conjugated(np.vstack([np.zeros(3), own]), steps)
     assert rows.tolist() == list(range(len(rows)))
-    np.testing.assert_allclose(seen.twists[: len(word), :3], twists[1:], atol=1e-12)
+    np.testing.assert_allclose(seen.library.twists[: len(word), :3], twists[1:], atol=1e-12)
     if free:
-        np.testing.assert_allclose(seen.twists[-1, :3], conjugated_turn(product), atol=1e-12)
+        np.testing.assert_allclose(
+            seen.library.twists[-1, :3], conjugated_turn(product), atol=1e-12
+        )
     before = goal_before(goal.pose, product)
-    np.testing.assert_allclose(seen.goal[:2], before[:2], atol=1e-12)
-    assert np.cos(seen.goal[2] - before[2]) == pytest.approx(1.0, abs=1e-12)
+    np.testing.assert_allclose(seen.library.goal[:2], before[:2], atol=1e-12)
+    assert np.cos(seen.library.goal[2] - before[2]) == pytest.approx(1.0, abs=1e-12)
     assert seen.fixed[:2].tolist() == pytest.approx(setup.fixed(trims))
 
 

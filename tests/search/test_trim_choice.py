@@ -126,7 +126,7 @@ def test_a_choice_says_what_words_are_made_of():
         GRID, COSTS[0], fixed_time=False, waits=False, min_coast=0.0, choice=choice
     )
     assert priced.library.trims.tolist() == [0, 20, 40, 1680]
-    assert set(np.unique(priced.library.arrays.words)) == {0, 2, 3}
+    assert set(np.unique(priced.library.arrays.tried.words)) == {0, 2, 3}
     assert priced.library.arrays.n_trims == 4
 
 

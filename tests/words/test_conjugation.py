@@ -12,8 +12,7 @@ from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.groups import SE2, SE2xR, group_of
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.words import TimesStatus, solve_switching_times
-from maneuver_automaton.words.closing import closed_at
-from maneuver_automaton.words.conjugation import conjugated
+from maneuver_automaton.words.closing import closed_at, conjugated
 
 
 def joined(twists, displacements, times, start=None):

@@ -17,7 +17,7 @@ from maneuver_automaton.words._kernels_times import (
     least_squares,
     null_space,
 )
-from maneuver_automaton.words.conjugation import conjugated
+from maneuver_automaton.words.closing import conjugated
 from tests import reference
 from tests.quickly import draws
 

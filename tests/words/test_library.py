@@ -166,10 +166,10 @@ def test_chains_of_maneuvers_are_transitions():
     )  # fmt: skip
     library = library_of(Automaton(model_of_kinds(), trims, maneuvers))
     assert library.chain(0, 2) == ((0, 1), (1, 2))
-    assert library.arrays.cost[0, 2] == 2.0
+    assert library.arrays.transitions.cost[0, 2] == 2.0
     first, second = (SE2(maneuvers[k].displacement) for k in (0, 1))
     assert np.allclose(library.displacements([0, 2])[0, :3], (first @ second).pose, atol=1e-15)
-    assert np.isfinite(library.arrays.cost).all()
+    assert np.isfinite(library.arrays.transitions.cost).all()
     costly = library_of(
         Automaton(model_of_kinds(), trims, maneuvers), maneuver_costs=[9.0, 9.0, 1.0, 1.0]
     )
@@ -201,7 +201,7 @@ def test_wrong_prices_are_refused():
 def test_a_large_library_is_represented_by_trims_that_differ():
     grid = [[v, 0.0, w] for v in np.linspace(-1, 1, 7) for w in np.linspace(-1, 1, 7)]
     library = library_of(linked(grid), most_trims=12)
-    used = np.unique(library.arrays.words)
+    used = np.unique(library.arrays.tried.words)
     assert used.size == 13  # and the one that stands for none
     chosen = library.arrays.twists[used[used >= 0]]
     for twist in ([1, 0, 1, 0], [1, 0, -1, 0], [1, 0, 0, 0], [-1, 0, 0, 0], [0, 0, 1, 0]):

@@ -1,4 +1,4 @@
-"""Three coasting times in closed form, and four with a climb."""
+"""Three coasting times in closed form."""
 
 from __future__ import annotations
 
@@ -10,15 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.words import steer
 from maneuver_automaton.words._kernels_steering import steer_batch
 from tests import reference
-from tests.quickly import draws, quick_are
+from tests.quickly import draws
 
 LEFT, RIGHT, AHEAD, BACK = [1.0, 0, 1.0], [1.0, 0, -1.0], [1.0, 0, 0], [-1.0, 0, 0]
 SPIN, SPIN_BACK = [0.0, 0, 1.0], [0.0, 0, -1.0]
-UP, RISE = [0.0, 0, 0, 0.5], [1.0, 0, 0, 0.5]
 TURN = 2.0 * np.pi
 SIZEABLE = st.sampled_from([-1.0, 0.0, 1.0]) | st.floats(0.1, 2.0) | st.floats(-2.0, -0.1)
 
@@ -235,76 +234,11 @@ def test_scaling_lengths_scales_straights_and_keeps_angles(size):
 # With a climb.
 
 
-def climbing(rng, *, fourth):
-    """Four trims whose times are known; the last one vertical, straight, or a turn."""
-    twists = rng.uniform(0.2, 2.0, (4, 4)) * rng.choice([-1.0, 1.0], (4, 4))
-    twists[int(rng.integers(3)), 2] = 0.0
-    if fourth == "vertical":
-        twists[3, :3] = 0.0
-    elif fourth == "straight":
-        twists[3, 2] = 0.0
-    displacements = rng.uniform(-1.0, 1.0, (3, 4)) * rng.integers(2)
-    with np.errstate(divide="ignore"):
-        longest = np.minimum(TURN / np.abs(twists[:, 2]), 3.0)
-    times = rng.uniform(0.05, 0.95, 4) * longest
-    return twists, displacements, times, reference.word_end(twists, times, displacements)
-
-
-@pytest.mark.parametrize("fourth", quick_are(["vertical"], ["vertical", "straight", "turn"]))
-def test_planted_climbs_are_found(fourth):
-    rng = np.random.default_rng(10)
-    for _ in range(25):
-        twists, displacements, times, goal = climbing(rng, fourth=fourth)
-        found = steer(twists, goal, displacements=displacements)
-        assert np.abs(found - times).max(axis=1).min() < 1e-6
-        for solution in found:
-            assert solution.min() >= 0.0
-            end = reference.word_end(twists, solution, displacements)
-            assert np.abs(reference.off_goal(end, goal)).max() < 1e-9
-
-
-def test_a_moved_climb_has_the_same_times():
-    rng = np.random.default_rng(11)
-    twists, displacements, _, goal = climbing(rng, fourth="turn")
-    for _ in range(5):
-        by = SE2xR(rng.uniform(-20, 20, 4))
-        moved = (by.inverse() @ (by @ SE2xR(goal))).pose
-        here, there = (steer(twists, end, displacements=displacements) for end in (goal, moved))
-        assert there == pytest.approx(here, abs=1e-9)
-
-
-def test_climbs_by_hand():
-    spin, ahead = [*SPIN, 0.0], [*AHEAD, 0.0]
-    lift = steer([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, 2.0])
-    assert lift == pytest.approx(np.array([[np.pi / 4, np.sqrt(2), np.pi / 4, 4.0]]))
-    # two metres up take four seconds of the rising straight, at the end
-    rise = steer([spin, ahead, spin, RISE], [6.0, 0.0, 0.0, 2.0])
-    assert np.array([0.0, 2.0, 0.0, 4.0]) == pytest.approx(rise[0], abs=1e-9)
-    # one turn of a helix
-    helix = steer([spin, ahead, spin, [1.0, 0, 1.0, 1.0]], [0, 0, 0, 3.0])
-    assert helix[:, 3] == pytest.approx([3.0])
-    down = steer([spin, ahead, spin, UP], [1.0, 1.0, np.pi / 2, -2.0])
-    assert down.shape == (0, 4)
-
-
-def test_longest_limits_the_fourth_time():
-    trims = [[*SPIN, 0.0], [*AHEAD, 0.0], [*SPIN, 0.0], RISE]
-    assert steer(trims, [6.0, 0, 0, 2.0], longest=3.0).shape == (0, 4)
-    assert len(steer(trims, [6.0, 0, 0, 2.0], longest=5.0)) > 0
-
-
-def test_what_leaves_the_altitude_open_gives_none():
-    flat = [[*LEFT, 0.0], [*AHEAD, 0.0], [*RIGHT, 0.0], [1.0, 0, 0.5, 0.0]]
-    assert steer(flat, [4.0, 2.0, 0, 0]).shape == (0, 4)
-    assert steer(flat, [4.0, 2.0, 0, 1.0]).shape == (0, 4)
-    assert steer([*flat[:3], [0, 0, 0, 0]], [4.0, 2.0, 0, 0]).shape == (0, 4)
-
-
 @pytest.mark.parametrize(
     ("twists", "goal", "options", "message"),
     [
-        ([LEFT, AHEAD], [1, 0, 0], {}, r"twists: got shape \(2, 3\), need \(3, 3\) or \(4, 4\)"),
-        ([[1, 0]] * 3, [1, 0, 0], {}, r"twists: got shape \(3, 2\), need 3 or 4 components last"),
+        ([LEFT, AHEAD], [1, 0, 0], {}, r"twists: got shape \(2, 3\), need \(3, 3\)"),
+        ([[1, 0]] * 3, [1, 0, 0], {}, r"twists: got shape \(3, 2\), need 3 components last"),
         ([LEFT, AHEAD, [np.nan] * 3], [1, 0, 0], {}, "twists: got nan, need finite numbers"),
         ([LEFT] * 3, [[1, 0, 0]], {}, r"goal: got shape \(1, 3\), need \(3,\)"),
         ([LEFT] * 3, [1, 0, 0, 0], {}, r"goal: got shape \(4,\), need 3 components last"),
@@ -324,26 +258,5 @@ def test_what_leaves_the_altitude_open_gives_none():
     ],
 )
 def test_wrong_input(twists, goal, options, message):
-    with pytest.raises(ValueError, match=message):
-        steer(twists, goal, **options)
-
-
-@pytest.mark.parametrize(
-    ("twists", "goal", "options", "message"),
-    [
-        ([RISE] * 3, [1, 0, 0, 0], {}, r"twists: got shape \(3, 4\), need \(3, 3\) or \(4, 4\)"),
-        ([RISE] * 4, [1, 0, 0], {}, r"goal: got shape \(3,\), need 4 components last"),
-        (
-            [RISE] * 4,
-            [1, 0, 0, 0],
-            {"displacements": [RISE]},
-            r"displacements: got shape \(1, 4\), need \(3, 4\)",
-        ),
-        ([RISE] * 4, [1, 0, 0, 0], {"longest": -1.0}, "longest: got -1.0, need a positive number"),
-        ([RISE] * 4, [1, 0, 0, 0], {"nodes": 0}, "nodes: got 0, need at least 1"),
-        ([RISE] * 4, [1, 0, 0, 0], {"tolerance": -1}, "tolerance: got -1, need a positive number"),
-    ],
-)
-def test_wrong_climbing_input(twists, goal, options, message):
     with pytest.raises(ValueError, match=message):
         steer(twists, goal, **options)

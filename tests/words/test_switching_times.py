@@ -11,7 +11,7 @@ from maneuver_automaton.words import (
     solve_switching_times,
 )
 from maneuver_automaton.words._kernels_solve import correct
-from maneuver_automaton.words._kernels_times import residual
+from maneuver_automaton.words._kernels_times import TimesProblem, residual
 from tests import reference
 from tests.quickly import quick_are
 
@@ -204,9 +204,10 @@ def test_beside_a_cusp_of_the_feasible_times_optimal_means_optimal():
 
 def ends_off(twists, times, goal):
     columns, gap = np.zeros((len(times), 3)), np.zeros(3)
-    rows = np.zeros((0, len(times)))
-    worst = residual(twists, times, goal, rows, np.zeros(0), columns, gap)
-    return worst, (goal, rows, np.zeros(0)), gap, columns
+    problem = TimesProblem(
+        twists, np.ones(len(times)), np.zeros((0, len(times))), goal, np.zeros(0)
+    )
+    return residual(problem, times, columns, gap), problem, gap, columns
 
 
 def test_a_step_along_curved_conditions_is_corrected():
@@ -215,8 +216,8 @@ def test_a_step_along_curved_conditions_is_corrected():
     goal = np.append(reference.plain_end(twists[:, :3], times), 0.0)
     for off in (1e-1, 1e-2, 1e-3):
         near = times + off * np.array([1.0, -0.5, 0.3, 0.2])
-        before, conditions, gap, columns = ends_off(twists, near, goal)
-        assert correct(twists, *conditions, near, gap, columns)
+        before, problem, gap, columns = ends_off(twists, near, goal)
+        assert correct(problem, near, gap, columns)
         after, _, there, _ = ends_off(twists, near, goal)
         assert after < before * before
         assert there == pytest.approx(gap, abs=1e-15)
@@ -225,8 +226,8 @@ def test_a_step_along_curved_conditions_is_corrected():
 
 def test_a_correction_that_takes_half_of_a_time_is_none():
     twists, times = np.array([[1.0, 0, 0, 0]]), np.array([2.0])
-    _, conditions, gap, columns = ends_off(twists, times, np.array([0.9, 0.0, 0.0, 0.0]))
-    assert not correct(twists, *conditions, times, gap, columns)
+    _, problem, gap, columns = ends_off(twists, times, np.array([0.9, 0.0, 0.0, 0.0]))
+    assert not correct(problem, times, gap, columns)
     assert times.tolist() == [2.0]
 
 
