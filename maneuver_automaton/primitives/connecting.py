@@ -111,7 +111,7 @@ class Inputs:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Connection:
+class TrimConnection:
     """A maneuver from trim to trim, or the reason why there is none."""
 
     source: str
@@ -134,7 +134,7 @@ def connect(
     settings: TransferSettings | None = None,
     program: TransferProgram | None = None,
     control_limits: Array | None = None,
-) -> Connection:
+) -> TrimConnection:
     """The maneuver of least cost from one trim to another, wherever it ends.
 
     The inputs are constant in equal intervals. The solver's answer is driven again to rounding,
@@ -185,7 +185,7 @@ def connect(
             "vehicle switches between them at will; need two trims of different reduced state"
         )
     if outside:
-        return Connection(source=source.name, target=target.name, maneuver=None, reason=outside)
+        return TrimConnection(source=source.name, target=target.name, maneuver=None, reason=outside)
     limits = model.control_limits if control_limits is None else control_limits
     reasons: list[str] = []
     solve_s = 0.0
@@ -211,9 +211,11 @@ def connect(
 
 def _checked(
     model: Model, source: Trim, target: Trim, *, transfer: Transfer, limits: Array
-) -> Connection:
+) -> TrimConnection:
     """The transfer as a maneuver if it holds, else the reason."""
-    nothing = Connection(source=source.name, target=target.name, maneuver=None, cost=transfer.cost)
+    nothing = TrimConnection(
+        source=source.name, target=target.name, maneuver=None, cost=transfer.cost
+    )
     if transfer.status is not SolveStatus.SOLVED:
         return replace(nothing, reason=f"the solver ended with {transfer.reason}")
     inputs = _closed_in_short(

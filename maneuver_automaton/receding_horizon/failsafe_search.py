@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.between import trims_between
+from maneuver_automaton.automaton.validation import trims_between
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.planning.tracking import stands_free
 from maneuver_automaton.primitives import Maneuver, Trim
