@@ -96,8 +96,10 @@ def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
         if not library.is_kinematic and known is None:
             entry["body_velocity"] = primitive.body_velocity.tolist()
             entry["reduced_state"] = primitive.reduced_state.tolist()
-        elif library.is_kinematic and known is not None and _is_disturbed(primitive, known):
-            entry["body_velocity"] = primitive.body_velocity.tolist()
+        elif library.is_kinematic and known is not None:
+            same = np.array_equal(primitive.control, known.control)
+            if same and not np.array_equal(primitive.body_velocity, known.body_velocity):
+                entry["body_velocity"] = primitive.body_velocity.tolist()  # it is disturbed
         return entry
     entry = {
         "kind": "maneuver",
@@ -109,12 +111,6 @@ def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
     if primitive.course is not None and _in_library(entry, library) is None:
         entry["course"] = samples_entry(primitive.course)
     return entry
-
-
-def _is_disturbed(trim: Trim, known: Trim) -> bool:
-    """Whether a trim has another body velocity than that of the library at the same control."""
-    same = np.array_equal(trim.control, known.control)
-    return same and not np.array_equal(trim.body_velocity, known.body_velocity)
 
 
 def _passed(primitives: Sequence[Primitive], library: Automaton) -> dict[str, Trim]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +15,6 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 
 
 def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> IntArray:
@@ -49,7 +46,7 @@ def part_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Auto
 
 
 @kept_by_first
-def _graphs(automaton: Automaton) -> tuple[csr_array, csr_array]:
+def _graphs(automaton: Automaton) -> tuple[Any, Any]:
     """Which classes of trims maneuvers link, along them and against them.
 
     Trims of one class switch at will.
@@ -77,7 +74,7 @@ def _part(automaton: Automaton, kept: tuple[int, ...]) -> Automaton:
     return Automaton(automaton.model, trims, maneuvers, name=automaton.name)
 
 
-def _reached(graph: csr_array, nodes: list[int]) -> NDArray[np.bool_]:
+def _reached(graph: Any, nodes: list[int]) -> NDArray[np.bool_]:
     from scipy.sparse.csgraph import breadth_first_order
 
     found: NDArray[np.bool_] = np.zeros(graph.shape[0], dtype=np.bool_)
@@ -85,9 +82,6 @@ def _reached(graph: csr_array, nodes: list[int]) -> NDArray[np.bool_]:
         found[breadth_first_order(graph, node, return_predecessors=False)] = True
     return found
 
-
-if TYPE_CHECKING:
-    import networkx
 
 PARALLEL = 1e-9  # below this share of its size, a difference of twists or centers is none
 
@@ -163,7 +157,7 @@ def _reach(
         return (automaton.trim_names,), (), ()
     import networkx
 
-    graph: networkx.DiGraph[int] = networkx.DiGraph()
+    graph = networkx.DiGraph()
     graph.add_nodes_from(range(n_classes))
     ends = {
         (int(classes[automaton.index_of(m.source)]), int(classes[automaton.index_of(m.target)]))
@@ -172,17 +166,13 @@ def _reach(
     graph.add_edges_from((source, target) for source, target in ends if source != target)
     groups = [set(group) for group in networkx.strongly_connected_components(graph)]
     members = [_names_in(automaton, group) for group in groups]
-    final = {c for group in groups if not _leaves(graph, group) for c in group}
+    final = {c for group in groups if not set(networkx.node_boundary(graph, group)) for c in group}
     alone = {c for c in graph if graph.degree(c) == 0}
     return (
         tuple(sorted(members, key=len, reverse=True)),
         _names_in(automaton, (final - alone) if len(groups) > 1 else set()),
         _names_in(automaton, alone),
     )
-
-
-def _leaves(graph: networkx.DiGraph[int], group: set[int]) -> bool:
-    return any(target not in group for node in group for target in graph.successors(node))
 
 
 def _names_in(automaton: Automaton, classes: set[int]) -> tuple[str, ...]:
@@ -250,7 +240,6 @@ def _has_one_center(automaton: Automaton, trims: IntArray, maneuvers: Sequence[M
 
     The trims reach each other, so one turning trim tells where the point is for all the others.
     """
-    classes = automaton.trim_classes
     classes = automaton.trim_classes
     twists = automaton.body_velocities[trims]
     turning = int(np.argmax(np.abs(twists[:, 2])))

@@ -476,13 +476,15 @@ def polish(
         if trust > near and far > near and apart.lacks(missed):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
             continue
-        if not all(map(_covers, held, held_near(program, found, MISSED * reach))):
+        needs = held_near(program, found, MISSED * reach)
+        if not all(np.isin(need, have).all() for have, need in zip(held, needs, strict=True)):
             # it is in a zone where it was not, or for longer
             wider = held_near(program, found, HELD * reach)
             point, held = found, list(map(np.union1d, held, wider))
             solver, begin = None, Begin.NEARBY
             continue
-        if _comes_and_goes(program, point, found):
+        here, there = (program.pieces(one).interval for one in (point, found))
+        if not np.array_equal(here, there):  # what moves is there in other intervals now
             point, apart = found, parted(program, found, pairs_near(program, found, near))
             solver, begin = None, Begin.NEARBY
             continue
@@ -502,19 +504,6 @@ def polish(
         if apart is not moved:
             solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
     return _polished(best, total, max(budget.elapsed - began, needed))
-
-
-def _covers(held: IntArray, needed: IntArray) -> bool:
-    """Whether intervals hold all those that are needed."""
-    return bool(np.isin(needed, held).all())
-
-
-def _comes_and_goes(program: PolishProgram, before: Point, after: Point) -> bool:
-    """Whether something is there in other intervals of one motion than of another one."""
-    if not program.scene.movers:
-        return False
-    here, there = (program.pieces(one).interval for one in (before, after))
-    return not np.array_equal(here, there)
 
 
 def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:

@@ -218,14 +218,15 @@ def _checked(
     )
     if transfer.status is not SolveStatus.SOLVED:
         return replace(nothing, reason=f"the solver ended with {transfer.reason}")
-    inputs = _closed_in_short(
-        model,
-        source.reduced_state,
-        target.reduced_state,
-        inputs=Inputs(control=transfer.control, interval=transfer.duration / len(transfer.control)),
-        limits=limits,
-    )
-    course = inputs.drive(model, source.reduced_state)
+    start, end, count = source.reduced_state, target.reduced_state, len(transfer.control)
+    raw = Inputs(control=transfer.control, interval=transfer.duration / count)
+    # Of few digits but in the last third, so that files are half as long.
+    short = Inputs(control=raw.control.round(DIGITS), interval=round(raw.interval, DIGITS))
+    inputs = closed(model, start, end, inputs=short, limits=limits, last=max(1, count // 3))
+    course = inputs.drive(model, start)
+    if not np.abs(course.reduced_state[-1] - end).max() <= CLOSED / 100.0:
+        inputs = closed(model, start, end, inputs=raw, limits=limits)
+        course = inputs.drive(model, start)
     miss = float(np.abs(course.reduced_state[-1] - target.reduced_state).max())
     if not miss <= CLOSED:
         return replace(nothing, reason=f"it could not be closed: {miss:.2g} is left")
@@ -247,22 +248,6 @@ def _checked(
             nothing, defect=defect, reason=f"driven again it ends {defect:.2g} off its target"
         )
     return replace(nothing, maneuver=maneuver, inputs=inputs, defect=defect)
-
-
-def _closed_in_short(
-    model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Array
-) -> Inputs:
-    """Closed inputs of few digits but in the last third, so that files are half as long."""
-    last = max(1, len(inputs.control) // 3)
-    short = Inputs(control=inputs.control.round(DIGITS), interval=round(inputs.interval, DIGITS))
-    found = closed(model, start, end, inputs=short, limits=limits, last=last)
-    if _miss(model, start, end, found) <= CLOSED / 100.0:
-        return found
-    return closed(model, start, end, inputs=inputs, limits=limits)
-
-
-def _miss(model: Model, start: Array, end: Array, inputs: Inputs) -> float:
-    return float(np.abs(inputs.drive(model, start).reduced_state[-1] - end).max())
 
 
 def closed(

@@ -130,7 +130,9 @@ def _changes(limits: Array) -> list[_Exchange]:
         for order in _exchanges(n, swaps):
             for signs in itertools.product((1.0, -1.0), repeat=n):
                 undone = all(signs[k] == signs[other] for k, other in enumerate(order))
-                if undone and _same_limits(limits, order, np.array(signs)):
+                image = np.sort(limits[list(order)] * np.array(signs)[:, None], axis=1)
+                same = np.isclose(image, limits, rtol=AGREES, atol=0.0).all()
+                if undone and same:
                     found.append(_Exchange(order, np.array(signs), swaps))
                 if len(found) >= MOST_CANDIDATES:
                     return found
@@ -159,12 +161,6 @@ def _candidates(
     for total in range(max(by_size[0]) + max(by_size[1]) + 1):
         for size in range(total + 1):
             yield from itertools.product(by_size[0].get(total - size, ()), by_size[1].get(size, ()))
-
-
-def _same_limits(limits: Array, order: tuple[int, ...], signs: Array) -> bool:
-    """Whether limits (n, 2) are those of the images too, but for rounding."""
-    image = np.sort(limits[list(order)] * signs[:, None], axis=1)
-    return bool(np.isclose(image, limits, rtol=AGREES, atol=0.0).all())
 
 
 def _matrix(change: _Exchange) -> Array:

@@ -119,18 +119,15 @@ class PolishTask:
     def scene(self) -> PolishScene:
         """Body, obstacles and bounds seen from the start."""
         pieces = pieces_seen_from(list(self.obstacles), self.start[:3])
+        most = lateral_limit(self.model)  # a limit of the vehicle that is none of one state alone
+        everywhere = [Guard(lateral=most)] if math.isfinite(most) else []
         return PolishScene(
             parts=self.parts,
             pieces=tuple((corners, by + self.margin) for corners, by in pieces),
             movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
-            guards=(*self._everywhere(), *map(self._seen, self.guards)),
+            guards=(*everywhere, *map(self._seen, self.guards)),
         )
-
-    def _everywhere(self) -> list[Guard]:
-        """The limit of the vehicle itself that is none of one state alone."""
-        most = lateral_limit(self.model)
-        return [Guard(lateral=most)] if math.isfinite(most) else []
 
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
         """A guard with its solids seen from the start."""
