@@ -16,7 +16,7 @@ import shapely
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.fleet import FleetLog, FleetProblem, FleetStep

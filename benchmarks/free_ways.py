@@ -26,7 +26,7 @@ import numpy as np
 import shapely
 
 from maneuver_automaton import Automaton, Box, Disc, Obstacle, OccupancyMap, Plan, Polygon, Problem
-from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.bounds import separation
 from maneuver_automaton.collision import Motion, Shape, as_footprint
 from maneuver_automaton.groups import SE2

@@ -31,7 +31,7 @@ sys.path.append(str(ROOT))
 
 from benchmarks.tables import show, spread  # noqa: E402
 from maneuver_automaton.automaton import Plan  # noqa: E402
-from maneuver_automaton.automaton.carried import carried  # noqa: E402
+from maneuver_automaton.automaton.cutting import carried  # noqa: E402
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Shape  # noqa: E402
 from maneuver_automaton.problem import Problem, SearchSettings  # noqa: E402
 from maneuver_automaton.receding_horizon import ClosedLoop, simulate  # noqa: E402

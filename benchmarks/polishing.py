@@ -42,7 +42,7 @@ from maneuver_automaton.refinement.gear_sequences import (
     unicycle_library,
 )
 from maneuver_automaton.refinement.guesses import (
-    Pace,
+    PathLimits,
     car_guess,
     pace_of_car,
     pace_of_unicycle,
@@ -82,7 +82,7 @@ class Vehicle(NamedTuple):
 
     model: Model
     libraries: Sequence[Any]
-    pace: Pace
+    pace: PathLimits
     guess: Any
     parts: tuple[BodyPart, ...]
 

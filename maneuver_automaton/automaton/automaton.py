@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,9 +27,6 @@ from maneuver_automaton.primitives import Maneuver, Trim, trims_of
 from maneuver_automaton.primitives.closed_form import Pairs, has_limited_rates, quickest_maneuvers
 from maneuver_automaton.primitives.symmetry import maneuver_in_world, trim_in_world
 from maneuver_automaton.primitives.turning import turns_between
-
-if TYPE_CHECKING:
-    import networkx
 
 FITS = 1e-9  # between a course's ends and the reduced states of its trims, over their size or 1
 
@@ -69,8 +66,11 @@ class Automaton(Drawn):
             raise InvalidAutomaton("automaton: got no trim, need at least one")
         _check_names(self.trim_names)
         object.__setattr__(self, "model", in_world(self.model))
-        if isinstance(self.model, OnlyTranslated):
-            self._see_from_body(self.model)
+        if isinstance(self.model, OnlyTranslated):  # what is along the world's axes gets headings
+            trims = tuple(trim_in_world(self.model, trim) for trim in self.trims)
+            maneuvers = tuple(maneuver_in_world(self.model, one) for one in self.maneuvers)
+            object.__setattr__(self, "trims", trims)
+            object.__setattr__(self, "maneuvers", maneuvers)
         dof, n_controls = self.model.group.dof, len(self.model.control_names)
         n_states = len(self.model.reduced_names)
         for trim in self.trims:
@@ -118,13 +118,6 @@ class Automaton(Drawn):
                     f"{float(lateral_acceleration(twists).max()):.4g} m/s^2, need at most the "
                     f"vehicle's max_lateral_acceleration {lateral_limit(self.model):g} m/s^2"
                 )
-
-    def _see_from_body(self, model: OnlyTranslated) -> None:
-        """Trims and maneuvers that are stated along the world's axes get headings."""
-        trims = tuple(trim_in_world(model, trim) for trim in self.trims)
-        maneuvers = tuple(maneuver_in_world(model, one) for one in self.maneuvers)
-        object.__setattr__(self, "trims", trims)
-        object.__setattr__(self, "maneuvers", maneuvers)
 
     @classmethod
     def of_controls(cls, model: Model, controls: Mapping[str, ArrayLike]) -> Automaton:
@@ -353,14 +346,15 @@ class Automaton(Drawn):
         limited = any(trim.max_duration < np.inf for trim in self.trims)
         return not (self.trim_classes.any() or self.maneuvers or limited)
 
-    def graph(self) -> networkx.MultiDiGraph[str]:
-        """The automaton as a graph: trims as nodes, all maneuvers, identity ones too, as edges.
+    def graph(self) -> Any:
+        """The automaton as a ``networkx.MultiDiGraph``: trims as nodes, all maneuvers as edges.
 
-        A class of m trims has m (m - 1) identity maneuvers: ask for it only where that is small.
+        Identity maneuvers too, of which a class of m trims has m (m - 1): ask for it only where
+        that is small.
         """
         import networkx
 
-        graph: networkx.MultiDiGraph[str] = networkx.MultiDiGraph(name=self.name)
+        graph = networkx.MultiDiGraph(name=self.name)
         for trim in self.trims:
             graph.add_node(trim.name, trim=trim)
         for a, b in product(range(len(self)), repeat=2):

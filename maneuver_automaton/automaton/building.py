@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.automaton.automaton import Automaton
@@ -42,7 +41,7 @@ from maneuver_automaton.primitives.connecting import (
     connect,
     maneuver_defect,
 )
-from maneuver_automaton.primitives.symmetry import Mirror, mirror_of
+from maneuver_automaton.primitives.symmetry import mirror_of
 
 SIDEWAYS = 1  # place of the lateral speed in a twist
 Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches
@@ -141,7 +140,12 @@ def build_library(
             )
     wanted = tuple(all_pairs(nodes, keep_sign=keep_sign) if pairs is None else dict.fromkeys(pairs))
     for source, target in wanted:
-        _check_pair(nodes, source, target)
+        a, b = nodes.index_of(source), nodes.index_of(target)
+        if nodes.trim_classes[a] == nodes.trim_classes[b]:
+            raise ValueError(
+                f"pair ({source!r}, {target!r}): has one reduced state, so the vehicle switches at "
+                "will; need trims of different reduced state"
+            )
     images = _images(nodes, wanted) if mirror else {}
     to_solve = [pair for pair in wanted if pair not in images]
     recipe = _Recipe(
@@ -265,7 +269,11 @@ def _solved(recipe: _Recipe, pair: Pair) -> Entry:
     """One maneuver, as a line of the journal."""
     nodes, key = recipe.nodes, recipe.key_of(pair)
     source, target = nodes[pair[0]], nodes[pair[1]]
-    limits = _signed_limits(nodes.model, source, target, recipe.keep_sign)
+    limits = nodes.model.control_limits.copy()
+    for name in recipe.keep_sign:  # on one side of zero, where both trims are
+        k = nodes.model.control_names.index(name)
+        if source.control[k] * target.control[k] > 0.0:
+            limits[k, int(source.control[k] < 0.0)] = 0.0
     found = connect(nodes.model, source, target, program=_program(recipe), control_limits=limits)
     if found.maneuver is None or found.inputs is None:
         none = np.zeros((0, len(nodes.model.control_names)))
@@ -278,16 +286,6 @@ def _solved(recipe: _Recipe, pair: Pair) -> Entry:
     )
 
 
-def _signed_limits(model: Model, source: Trim, target: Trim, keep_sign: Sequence[str]) -> Array:
-    """Limits (n_u, 2) of the controls, some of them on one side of zero."""
-    limits = model.control_limits.copy()
-    for name in keep_sign:
-        k = model.control_names.index(name)
-        if source.control[k] * target.control[k] > 0.0:
-            limits[k, int(source.control[k] < 0.0)] = 0.0
-    return limits
-
-
 @contextlib.contextmanager
 def _lines(journal: Path | None) -> Iterator[Callable[[Entry], None]]:
     """Function that writes an entry to the journal, or does nothing where there is none."""
@@ -298,21 +296,13 @@ def _lines(journal: Path | None) -> Iterator[Callable[[Entry], None]]:
         yield functools.partial(append, stream)
 
 
-def _check_pair(nodes: Automaton, source: str, target: str) -> None:
-    a, b = nodes.index_of(source), nodes.index_of(target)
-    if nodes.trim_classes[a] == nodes.trim_classes[b]:
-        raise ValueError(
-            f"pair ({source!r}, {target!r}): has one reduced state, so the vehicle switches at "
-            "will; need trims of different reduced state"
-        )
-
-
 def _images(nodes: Automaton, pairs: Sequence[Pair]) -> dict[Pair, Pair]:
     """Pairs that are the mirror image of an earlier one, and which; none without symmetry."""
     mirror = mirror_of(nodes.model)
     if mirror is None:
         return {}
-    other = _other_side(nodes, mirror)
+    both = itertools.product(nodes.trims, repeat=2)
+    other = {trim.name: image.name for trim, image in both if mirror.takes(trim, image)}
     images: dict[Pair, Pair] = {}
     known: set[Pair] = set()
     for source, target in pairs:
@@ -322,12 +312,6 @@ def _images(nodes: Automaton, pairs: Sequence[Pair]) -> dict[Pair, Pair]:
             if there in known and there != (source, target) and there not in images:
                 images[source, target] = there
     return images
-
-
-def _other_side(nodes: Automaton, mirror: Mirror) -> dict[str, str]:
-    """Names of the trims that have an image among the trims, and of the image."""
-    pairs = itertools.product(nodes.trims, repeat=2)
-    return {trim.name: image.name for trim, image in pairs if mirror.takes(trim, image)}
 
 
 def _assembled(

@@ -172,14 +172,12 @@ def _driven_together(
         courses = drive_all(model, np.array(starts), control=control, durations=durations)
     except ValueError as error:
         raise InvalidLibrary(f"maneuvers: {error}") from error
-    return [_timed(course, until) for course, (until, _) in zip(courses, inputs, strict=True)]
-
-
-def _timed(course: Trajectory, until: Array) -> Trajectory:
-    """The course, its changes of control at the very times stated."""
-    time = course.time.copy()
-    time[np.abs(time[:, None] - until).argmin(axis=0)] = until
-    return replace(course, time=time)
+    timed = []
+    for course, (until, _) in zip(courses, inputs, strict=True):
+        time = course.time.copy()  # changes of control are at the very times stated
+        time[np.abs(time[:, None] - until).argmin(axis=0)] = until
+        timed.append(replace(course, time=time))
+    return timed
 
 
 def inputs_of(course: Trajectory) -> Inputs:

@@ -198,18 +198,15 @@ def _automaton_of(document: Any, own: Model | None) -> Automaton:
     inputs = [one for _, one in stated]
     name = text_of("name", document.get("name", ""))
     automaton = Automaton(model, trims, tuple(maneuver for maneuver, _ in stated), name=name)
-    _check_hash(document.get("hash"), _hash(_content(automaton, inputs)))
+    stated_hash, actual = document.get("hash"), _hash(_content(automaton, inputs))
+    if stated_hash is not None and stated_hash != actual:
+        raise InvalidLibrary(
+            f"hash: got {stated_hash!r}, but the content has {actual!r}: the file was changed "
+            'after it was written; to accept it as it is, delete the line "hash"'
+        )
     _check_limits(automaton)
     _check_trims(automaton)
     return replace(automaton, maneuvers=driven(automaton, inputs))
-
-
-def _check_hash(stated: Any, actual: str) -> None:
-    if stated is not None and stated != actual:
-        raise InvalidLibrary(
-            f"hash: got {stated!r}, but the content has {actual!r}: the file was changed after it "
-            'was written; to accept it as it is, delete the line "hash"'
-        )
 
 
 def _check_limits(automaton: Automaton) -> None:

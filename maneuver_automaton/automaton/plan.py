@@ -15,15 +15,13 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
+from maneuver_automaton.automaton.plan_arrays import PlanArrays, plan_arrays
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import SE2, LieGroup, group_of
 from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.primitives.driving import along
-
-if TYPE_CHECKING:
-    from maneuver_automaton.automaton.plan_arrays import PlanArrays
 
 Primitive: TypeAlias = Trim | Maneuver
 
@@ -336,8 +334,14 @@ class Plan(Played):
         times = np.asarray(time, dtype=np.float64)
         if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
-        if not (times.ndim or any(self.maneuvers)):
-            return self._coasted_until(float(times))
+        if not (times.ndim or any(self.maneuvers)):  # one time, of trims alone: plain numbers
+            time, durations = float(times), self.durations.tolist()
+            begins = [self.start_time + since for since in accumulate(durations[:-1], initial=0.0)]
+            k = bisect_right(begins, time, lo=1) - 1
+            lasting = [*durations[:k], min(max(time - begins[k], 0.0), durations[k])]
+            return end_of_coasting(
+                self.start, [trim.body_velocity for trim in self.trims[: k + 1]], lasting
+            )
         index = self._index_at(times)
         begin = group_of(self.start.size)(self.switching_poses[index])
         since = np.clip(times - self.switching_times[index], 0.0, self.primitive_durations[index])
@@ -346,15 +350,6 @@ class Plan(Played):
             if isinstance(primitive, Maneuver) and (here := index == k).any():
                 steps[here] = _within(primitive, since[here])
         return (begin @ type(begin)(steps)).pose
-
-    def _coasted_until(self, time: float) -> Array:
-        """Pose (dof,) at one time [s], of trims alone."""
-        durations: list[float] = self.durations.tolist()
-        begins = [self.start_time + since for since in accumulate(durations[:-1], initial=0.0)]
-        index = bisect_right(begins, time, lo=1) - 1
-        lasting = [*durations[:index], min(max(time - begins[index], 0.0), durations[index])]
-        twists = [trim.body_velocity for trim in self.trims[: index + 1]]
-        return end_of_coasting(self.start, twists, lasting)
 
     def control_at(self, time: ArrayLike) -> Array:
         """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of what begins."""
@@ -435,8 +430,6 @@ class Plan(Played):
         >>> rows.time.tolist(), rows.pose[:, 0].tolist(), rows.primitive.tolist()
         ([0.0, 1.0, 2.0], [0.0, 1.0, 2.0], ['ahead', 'ahead', 'ahead'])
         """
-        from maneuver_automaton.automaton.plan_arrays import plan_arrays
-
         return plan_arrays(self, step=step, model=model)
 
     def to_frame(self, *, step: float | None = None, model: Model | None = None) -> Any:

@@ -1,21 +1,87 @@
-"""What an automaton can and cannot do: dead ends, duplicates, whether every pose is in reach."""
+"""What an automaton can and cannot do: what is in reach, dead ends, duplicates, every pose."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver
 
-if TYPE_CHECKING:
-    import networkx
+
+def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> IntArray:
+    """Indices, rising, of the trims reached from `start` that lead to one of `goals`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
+    ...                      max_acceleration=1.0, max_steering_rate=0.5)
+    >>> library = Automaton.of_model(car, {"speed": [0.0, 1.0], "steering": [0.0]})
+    >>> trims_between(library, 0, [1]).tolist()
+    [0, 1]
+    """
+    classes, (graph, against) = automaton.trim_classes, _graphs(automaton)
+    ahead = _reached(graph, [int(classes[start])])
+    back = _reached(against, sorted({int(classes[goal]) for goal in goals}))
+    return np.flatnonzero((ahead & back)[classes])
+
+
+def part_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Automaton:
+    """The trims of `trims_between` and the maneuvers among them; the same automaton if that is all.
+
+    Start and goals stay, also where no maneuvers lead from one to the other.
+    """
+    goals = sorted(set(goals))
+    kept = {start, *goals, *trims_between(automaton, start, goals).tolist()}
+    return automaton if len(kept) == len(automaton) else _part(automaton, tuple(sorted(kept)))
+
+
+@kept_by_first
+def _graphs(automaton: Automaton) -> tuple[Any, Any]:
+    """Which classes of trims maneuvers link, along them and against them.
+
+    Trims of one class switch at will.
+    """
+    from scipy.sparse import csr_array
+
+    classes = automaton.trim_classes
+    n = int(classes.max()) + 1
+    ends = [
+        (classes[automaton.index_of(one.source)], classes[automaton.index_of(one.target)])
+        for one in automaton.maneuvers
+    ]
+    sources, targets = np.array(ends, dtype=np.int64).reshape(-1, 2).T
+    graph = csr_array((np.ones(len(ends), dtype=np.int8), (sources, targets)), shape=(n, n))
+    return graph, graph.T.tocsr()
+
+
+@kept_by_first
+def _part(automaton: Automaton, kept: tuple[int, ...]) -> Automaton:
+    trims = tuple(automaton.trims[k] for k in kept)
+    names = {trim.name for trim in trims}
+    maneuvers = tuple(
+        one for one in automaton.maneuvers if one.source in names and one.target in names
+    )
+    return Automaton(automaton.model, trims, maneuvers, name=automaton.name)
+
+
+def _reached(graph: Any, nodes: list[int]) -> NDArray[np.bool_]:
+    from scipy.sparse.csgraph import breadth_first_order
+
+    found: NDArray[np.bool_] = np.zeros(graph.shape[0], dtype=np.bool_)
+    for node in nodes:
+        found[breadth_first_order(graph, node, return_predecessors=False)] = True
+    return found
+
 
 PARALLEL = 1e-9  # below this share of its size, a difference of twists or centers is none
 
@@ -91,7 +157,7 @@ def _reach(
         return (automaton.trim_names,), (), ()
     import networkx
 
-    graph: networkx.DiGraph[int] = networkx.DiGraph()
+    graph = networkx.DiGraph()
     graph.add_nodes_from(range(n_classes))
     ends = {
         (int(classes[automaton.index_of(m.source)]), int(classes[automaton.index_of(m.target)]))
@@ -100,17 +166,13 @@ def _reach(
     graph.add_edges_from((source, target) for source, target in ends if source != target)
     groups = [set(group) for group in networkx.strongly_connected_components(graph)]
     members = [_names_in(automaton, group) for group in groups]
-    final = {c for group in groups if not _leaves(graph, group) for c in group}
+    final = {c for group in groups if not set(networkx.node_boundary(graph, group)) for c in group}
     alone = {c for c in graph if graph.degree(c) == 0}
     return (
         tuple(sorted(members, key=len, reverse=True)),
         _names_in(automaton, (final - alone) if len(groups) > 1 else set()),
         _names_in(automaton, alone),
     )
-
-
-def _leaves(graph: networkx.DiGraph[int], group: set[int]) -> bool:
-    return any(target not in group for node in group for target in graph.successors(node))
 
 
 def _names_in(automaton: Automaton, classes: set[int]) -> tuple[str, ...]:
@@ -178,7 +240,6 @@ def _has_one_center(automaton: Automaton, trims: IntArray, maneuvers: Sequence[M
 
     The trims reach each other, so one turning trim tells where the point is for all the others.
     """
-    classes = automaton.trim_classes
     classes = automaton.trim_classes
     twists = automaton.body_velocities[trims]
     turning = int(np.argmax(np.abs(twists[:, 2])))

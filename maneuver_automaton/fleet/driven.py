@@ -21,8 +21,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.automaton import same_state
-from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.automaton.cutting import begin_state, end_state
+from maneuver_automaton.automaton.cutting import begin_state, carried, end_state
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Disc, Shape

@@ -13,8 +13,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.automaton.cutting import NOTHING
+from maneuver_automaton.automaton.cutting import NOTHING, carried
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import free_times
 from maneuver_automaton.collision.motion import Motion

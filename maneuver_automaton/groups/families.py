@@ -1,4 +1,4 @@
-"""Groups made to measure: translations of any dimension, and direct products of groups."""
+"""Groups made of others: translations, direct products, and planar poses with a height."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton.groups.lie_group import LieGroup
+from maneuver_automaton.groups.se2 import SE2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,3 +216,57 @@ def _concatenated(first: Array, second: Array) -> Array:
     batch = np.broadcast_shapes(first.shape[:-1], second.shape[:-1])
     parts = (np.broadcast_to(part, (*batch, part.shape[-1])) for part in (first, second))
     return np.concatenate([*parts], axis=-1)
+
+
+class SE2xR(Product):
+    """A batch of poses with height: `pose` is (..., 4), x [m], y [m], heading [rad], z [m].
+
+    Planar motions are those with z = 0. The heading is not wrapped.
+
+    Source: Frazzoli, Dahleh, Feron (2005), Sec. II: translations, and rotations about the vertical.
+
+    Examples
+    --------
+    >>> climbing_turn = SE2xR.exp([np.pi, 0.0, np.pi, 0.5])
+    >>> climbing_turn.pose.round(3).tolist()
+    [0.0, 2.0, 3.142, 0.5]
+    >>> (climbing_turn @ SE2xR([1.0, 0.0, 0.0, 0.5])).pose.round(3).tolist()
+    [-1.0, 2.0, 3.142, 1.0]
+    """
+
+    __slots__ = ()
+    first_group = SE2
+    second_group = translations(1)
+    dof = 4
+    space = 3
+    coordinates: ClassVar[tuple[str, ...]] = ("x", "y", "heading", "z")
+
+    @property
+    def planar(self) -> SE2:
+        """The planar poses, without their height."""
+        return SE2(self.pose[..., :3])
+
+    def log(self, *, position_tolerance: float = 1e-9) -> Array:
+        """Constant body twist (..., 4) that leads from the identity here in 1 s; see `SE2.log`."""
+        planar = self.planar.log(position_tolerance=position_tolerance)
+        return np.concatenate([planar, self.pose[..., 3:]], axis=-1)
+
+
+def group_of(dof: int) -> type[LieGroup]:
+    """Group whose poses have `dof` components: SE2 for 3, SE2xR for 4.
+
+    Raises
+    ------
+    ValueError
+        For any other number.
+
+    Examples
+    --------
+    >>> group_of(4).__name__
+    'SE2xR'
+    """
+    if dof == 3:
+        return SE2
+    if dof == 4:
+        return SE2xR
+    raise ValueError(f"dof: got {dof}, need 3 (x, y, heading) or 4 (x, y, heading, z)")

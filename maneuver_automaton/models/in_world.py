@@ -124,7 +124,8 @@ class InWorld:
         """Components of the twist, seen from the body."""
         z, cos, sin = self._stated(z)
         v_x, v_y, *climb = self.stated.velocity(z, u)
-        return [cos * v_x + sin * v_y, cos * v_y - sin * v_x, self._turn_rate(z, u), *climb]
+        turn = 0.0 if self._place is None else self.stated.dynamics(z, u)[self._place]
+        return [cos * v_x + sin * v_y, cos * v_y - sin * v_x, turn, *climb]
 
     def dynamics(self, z: Components, u: Components, /) -> Components:
         """Rates of the reduced state; cosine and sine turn with the heading."""
@@ -160,9 +161,6 @@ class InWorld:
     def part_poses(self, reduced_state: Array) -> Array:
         """Planar poses (..., n, 3) of what it carries, seen from the vehicle."""
         return self.stated.part_poses(self._stated_rows(reduced_state)[0])
-
-    def _turn_rate(self, z: Components, u: Components) -> Any:
-        return 0.0 if self._place is None else self.stated.dynamics(z, u)[self._place]
 
     def _stated(self, z: Components) -> tuple[Components, Any, Any]:
         """The stated reduced state by components, and cosine and sine of the heading."""

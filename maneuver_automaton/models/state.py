@@ -156,10 +156,11 @@ def rollout(
         raise ValueError(f"rollout: times must be increasing, got {times}")
     if times.size == 1:
         return start[None].copy()
-    control_at = control if callable(control) else _constant(control)
+    constant = np.zeros(0) if callable(control) else as_array("control", control)
 
     def rates(time: float, state: Array) -> Array:
-        return as_array("f(x, u)", f(state, as_array("control", control_at(time))))
+        u = as_array("control", control(time)) if callable(control) else constant
+        return as_array("f(x, u)", f(state, u))
 
     if not np.isfinite(rates(times[0], start)).all():
         raise ValueError(f"rollout: the model's rates at {start} are not finite")
@@ -171,8 +172,3 @@ def rollout(
             f"{solution.message}"
         )
     return np.asarray(solution.y.T, dtype=np.float64)
-
-
-def _constant(control: ArrayLike) -> Callable[[float], Array]:
-    value = as_array("control", control)
-    return lambda _: value

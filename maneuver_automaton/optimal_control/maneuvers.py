@@ -263,7 +263,10 @@ def solve_transfer(
     inputs = resampled(controls, written.grid.n_controls)
     path = resampled(np.array([start, end]), written.grid.n_nodes)
     if swing:
-        inputs = _swung(inputs, controls_within, swing)
+        room = np.where(np.isfinite(controls_within), controls_within, np.array([-1.0, 1.0]))
+        low, high = room.T[:, None] - inputs
+        first = np.arange(len(inputs))[:, None] < len(inputs) / 2.0
+        inputs = inputs + abs(swing) * np.where(first == (swing > 0.0), high, low)
         path = _led_to(model, path, inputs, guess_s)
     guess = np.concatenate([path.ravel(), inputs.ravel(), [guess_s]])
     began = time.perf_counter()
@@ -313,15 +316,6 @@ def duration_guess(model: Model, start: Array, end: Array) -> float:
     change = np.abs(end - start)
     seconds = change / np.where(fastest > 0.0, fastest, np.inf)
     return max(LEAST_GUESS_S, 1.5 * float(seconds.max(initial=0.0)))
-
-
-def _swung(inputs: Array, limits: Array, swing: float) -> Array:
-    """Inputs (n, n_u) that go a share of the way to one limit, then to the other."""
-    room = np.where(np.isfinite(limits), limits, np.array([-1.0, 1.0]))
-    low, high = room.T[:, None] - inputs
-    first = np.arange(len(inputs))[:, None] < len(inputs) / 2.0
-    towards = np.where(first == (swing > 0.0), high, low)
-    return np.asarray(inputs + abs(swing) * towards)
 
 
 def _led_to(model: Model, path: Array, inputs: Array, duration: float) -> Array:

@@ -24,12 +24,12 @@ from maneuver_automaton.optimal_control.problem import (
 )
 from maneuver_automaton.optimal_control.scene import (
     BodyPart,
-    Ends,
     Guard,
-    Pieces,
+    MotionEnds,
+    ObstaclePieces,
     Point,
+    PolishScene,
     PolishSettings,
-    Scene,
 )
 from maneuver_automaton.optimal_control.transcription import bounds_of, transcribe
 
@@ -41,7 +41,7 @@ class Paths(NamedTuple):
     y: Any  # (4 m, n - 1)
 
 
-class Frames(NamedTuple):
+class NodeMotion(NamedTuple):
     """Where the vehicle is and how it moves, in symbols: at one node of each interval."""
 
     pose: Any  # (dof, n - 1)
@@ -51,7 +51,7 @@ class Frames(NamedTuple):
 
 
 def paths(
-    casadi: Any, parts: Sequence[BodyPart], begin: Frames, end: Frames, *, step: Any
+    casadi: Any, parts: Sequence[BodyPart], begin: NodeMotion, end: NodeMotion, *, step: Any
 ) -> list[Paths]:
     """Control points of every solid's corners in every interval, in symbols.
 
@@ -62,7 +62,7 @@ def paths(
     ----------
     casadi : module
     parts : sequence of BodyPart
-    begin, end : Frames
+    begin, end : NodeMotion
         At the begin and at the end of each interval, with the control of the interval.
     step : (1, n - 1) symbols
         Duration of each interval [s].
@@ -79,7 +79,7 @@ def paths(
     return found
 
 
-def _corners(casadi: Any, part: BodyPart, corners: Array, at: Frames) -> tuple[Any, ...]:
+def _corners(casadi: Any, part: BodyPart, corners: Array, at: NodeMotion) -> tuple[Any, ...]:
     """Places x, y and velocities (m, n - 1) of the corners of a part."""
     count = at.pose.shape[1]
     ones = casadi.SX.ones(1, count)
@@ -118,11 +118,11 @@ STILL = 1e-9  # [m^2/s^2] that keeps the speed of a vehicle that drifts smooth a
 CURVED = 20.0  # times the tightening for reduced states that do not run straight
 
 
-class Program(NamedTuple):
+class PolishProgram(NamedTuple):
     """The problem in blocks, but for the lines."""
 
     casadi: Any
-    scene: Scene
+    scene: PolishScene
     settings: PolishSettings
     problem: OptimalControlProblem
     dof: int
@@ -150,7 +150,7 @@ class Program(NamedTuple):
         control = np.hstack([point.control, pace]) if self.paced else point.control
         return point.state, control, duration
 
-    def pieces(self, point: Point) -> Pieces:
+    def pieces(self, point: Point) -> ObstaclePieces:
         """Pieces of the obstacles while the motion of a point is driven."""
         return self.scene.during(point.durations)
 
@@ -164,7 +164,7 @@ class Program(NamedTuple):
         return list(zip(found[0::2], found[1::2], strict=True))
 
 
-class Interval(NamedTuple):
+class IntervalKinds(NamedTuple):
     """Kinds of blocks that intervals are made of."""
 
     stage: Kind  # states at both nodes, control, duration; given the share of the duration
@@ -177,13 +177,13 @@ class Interval(NamedTuple):
 
 def program_of(
     model: Model,
-    ends: Ends,
-    scene: Scene,
+    ends: MotionEnds,
+    scene: PolishScene,
     settings: PolishSettings,
     stage_cost: RunningCost | None,
     gears: Array | None,
     point: Point,
-) -> Program:
+) -> PolishProgram:
     """The program of a vehicle, its ends and its scene, on as many intervals as the point has.
 
     With `gears`, the sign of the speed ahead in every interval, time has a pace of its own in every
@@ -196,7 +196,7 @@ def program_of(
         problem = _paced(problem, float(point.durations.sum()))
     weights = settings.effort, settings.change, settings.tightening
     kinds = _kinds(model, *weights, stage_cost, paced)  # type: ignore[arg-type]  # values all
-    return Program(
+    return PolishProgram(
         casadi=casadi,
         scene=scene,
         settings=settings,
@@ -220,7 +220,7 @@ def _every(problem: OptimalControlProblem, count: int) -> IntArray:
     return np.vstack([states[:, :-1], states[:, 1:], controls, duration])
 
 
-def guard_blocks(program: Program, held: Sequence[IntArray]) -> list[Blocks]:
+def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Blocks]:
     """What keeps the limits of each guard of the scene in the intervals where it is `held`."""
     every, weight = _every(program.problem, program.n_intervals), program.settings.tightening
     blocks = []
@@ -282,9 +282,9 @@ def _over(casadi: Any, model: Model, guard: Guard, z: Any, u: Any) -> list[Any]:
 def _blocks(
     problem: OptimalControlProblem,
     model: Model,
-    scene: Scene,
+    scene: PolishScene,
     settings: PolishSettings,
-    kinds: Interval,
+    kinds: IntervalKinds,
     gears: Array | None,
     count: int,
 ) -> list[Blocks]:
@@ -318,12 +318,12 @@ def _kinds(
     tightening: float,
     stage_cost: RunningCost | None,
     paced: bool,
-) -> Interval:
+) -> IntervalKinds:
     """One interval of a vehicle, differentiated; the same for all scenes and all its lengths."""
     casadi = load_casadi()
     settings = PolishSettings(effort=effort, change=change, tightening=tightening)
     free = (None,) * (model.group.dof + len(model.reduced_names))
-    problem = _problem(model, Ends(free, free), settings, stage_cost)
+    problem = _problem(model, MotionEnds(free, free), settings, stage_cost)
     own = problem.n_controls
     if paced:
         problem = _paced(problem, 1.0)
@@ -346,7 +346,7 @@ def _kinds(
     wall, place, sign = casadi.SX.sym("w", 3), casadi.SX.sym("p", 2), casadi.SX.sym("sign")
     beyond = [wall[0] * swing.x[k] + wall[1] * swing.y[k] - wall[2] for k in (2, 3)]
     paces = casadi.SX.sym("paces", 2)
-    return Interval(
+    return IntervalKinds(
         stage=kind_of(casadi, every, share, price=price, zero=defects,
                       below=casadi.vertcat(casadi.SX(0, 1), *below)),
         change=kind_of(casadi, casadi.vertcat(before, after), nothing, price=change * changed),
@@ -359,7 +359,7 @@ def _kinds(
     )  # fmt: skip
 
 
-def _path(casadi: Any, model: Model, scene: Scene) -> Any:
+def _path(casadi: Any, model: Model, scene: PolishScene) -> Any:
     """Control points of every solid of the body in one interval, as a function."""
     n_x = model.group.dof + len(model.reduced_names)
     first, last = casadi.SX.sym("a", n_x), casadi.SX.sym("b", n_x)
@@ -373,7 +373,7 @@ def _path(casadi: Any, model: Model, scene: Scene) -> Any:
 
 
 def _between(
-    model: Model, begin: Frames, end: Frames, *, step: Any, settings: PolishSettings
+    model: Model, begin: NodeMotion, end: NodeMotion, *, step: Any, settings: PolishSettings
 ) -> list[Any]:
     """What keeps reduced states inside their limits between nodes, where they do not run straight.
 
@@ -412,7 +412,7 @@ def _curved(model: Model) -> list[int]:
 
 
 def _problem(
-    model: Model, ends: Ends, settings: PolishSettings, stage_cost: RunningCost | None
+    model: Model, ends: MotionEnds, settings: PolishSettings, stage_cost: RunningCost | None
 ) -> OptimalControlProblem:
     """Least time, a little effort, and what else is asked for."""
     dof = model.group.dof
@@ -456,12 +456,12 @@ def _paced(problem: OptimalControlProblem, duration: float) -> OptimalControlPro
     )
 
 
-def _frames(casadi: Any, model: Model, state: Any, control: Any) -> Frames:
+def _frames(casadi: Any, model: Model, state: Any, control: Any) -> NodeMotion:
     dof = model.group.dof
     z, u = casadi.vertsplit(state[dof:, :]), casadi.vertsplit(control)
     ones = casadi.SX.ones(1, state.shape[1])
     rates = [casadi.SX(rate) * ones for rate in model.dynamics(z, u)]
-    return Frames(
+    return NodeMotion(
         pose=state[:dof, :],
         twist=[casadi.SX(v) * ones for v in model.velocity(z, u)],
         reduced=state[dof:, :],

@@ -26,16 +26,20 @@ from maneuver_automaton.optimal_control.ipopt import (
     numpy_on_symbols,
     watcher_of,
 )
-from maneuver_automaton.optimal_control.polish_program import Program, guard_blocks, program_of
+from maneuver_automaton.optimal_control.polish_program import (
+    PolishProgram,
+    guard_blocks,
+    program_of,
+)
 from maneuver_automaton.optimal_control.problem import Grid, Guess, RunningCost, resampled
 from maneuver_automaton.optimal_control.scene import (
-    Answer,
-    Ends,
+    MotionEnds,
     PartPose,
     Point,
     Polished,
+    PolishScene,
     PolishSettings,
-    Scene,
+    SolverAnswer,
 )
 from maneuver_automaton.optimal_control.separation import Parting, held_near, pairs_near, parted
 from maneuver_automaton.optimal_control.transcription import unpacked
@@ -90,7 +94,7 @@ class Solver(NamedTuple):
 
 
 def solver_of(
-    program: Program,
+    program: PolishProgram,
     point: Point,
     parting: Parting,
     held: Sequence[IntArray],
@@ -103,7 +107,7 @@ def solver_of(
 
     Parameters
     ----------
-    program : Program
+    program : PolishProgram
     point : Point
         Near which obstacles are where the motion of it meets them.
     parting : Parting
@@ -144,7 +148,7 @@ def solver_of(
     return Solver(function, watcher, bounds, built.limits, corners, fixed)
 
 
-class Places(NamedTuple):
+class CornerPlaces(NamedTuple):
     """Where the parameters of corners begin, among those of all corners."""
 
     body: IntArray  # of each solid
@@ -152,7 +156,7 @@ class Places(NamedTuple):
     shift: IntArray  # how its corners shift; negative where it stands still
 
 
-def _corners(program: Program, point: Point, parting: Parting) -> tuple[Array, Places]:
+def _corners(program: PolishProgram, point: Point, parting: Parting) -> tuple[Array, CornerPlaces]:
     """Parameters of corners of both sides, and where those of each solid begin.
 
     Of the pieces only those that are in pairs: a map may have thousands. A corner that shifts is
@@ -172,14 +176,14 @@ def _corners(program: Program, point: Point, parting: Parting) -> tuple[Array, P
     every = np.vstack([np.zeros((0, OF_CORNER)), *rows]).ravel()
     shift_at = np.full(len(used), -1)
     shift_at[moving] = every.size + OF_SHIFT * shifts.shape[1] * np.arange(len(shifts))
-    places = Places(begins[: len(body)], begins[len(body) :][owner], shift_at[owner])
+    places = CornerPlaces(begins[: len(body)], begins[len(body) :][owner], shift_at[owner])
     return np.concatenate([every, shifts.ravel()]), places
 
 
 def _line_blocks(
-    program: Program,
+    program: PolishProgram,
     parting: Parting,
-    places: Places,
+    places: CornerPlaces,
     fixed: bool,
     elastic: bool,
 ) -> list[Blocks]:
@@ -280,14 +284,14 @@ def _priced(price: float) -> Kind:
 
 def solve_from(
     solver: Solver,
-    program: Program,
+    program: PolishProgram,
     point: Point,
     apart: Parting,
     *,
     begin: Begin,
     known: Multipliers | None,
     trust: float,
-) -> tuple[Point, Parting, Multipliers, Answer]:
+) -> tuple[Point, Parting, Multipliers, SolverAnswer]:
     """The solver's answer from a point and lines, with places within `trust` [m] of the point.
 
     The `known` multipliers count where it begins at what the same solver has found. Where it does
@@ -338,7 +342,7 @@ def solve_from(
         _point_at(program, values[: program.size]),
         apart,
         Multipliers(*(answer[name].full().ravel() for name in ("lam_x", "lam_g"))),
-        Answer(
+        SolverAnswer(
             status=status,
             reason=reason,
             objective=objective,
@@ -349,7 +353,7 @@ def solve_from(
     )
 
 
-def _point_at(program: Program, values: Array) -> Point:
+def _point_at(program: PolishProgram, values: Array) -> Point:
     """Numbers of the variables but those of lines, as states, controls and durations."""
     n = program.n_intervals
     state, control, duration = unpacked(program.problem, Grid(n_nodes=n + 1, rule="rk4"), values)
@@ -383,8 +387,8 @@ TIGHT = 2e-3  # radii of the body: pieces nearer than this are held back by thei
 
 def polish(
     model: Model,
-    ends: Ends,
-    scene: Scene,
+    ends: MotionEnds,
+    scene: PolishScene,
     guess: Guess,
     *,
     stage_cost: RunningCost | None = None,
@@ -400,9 +404,9 @@ def polish(
     ----------
     model : Model
         The vehicle.
-    ends : Ends
+    ends : MotionEnds
         First and last pose and reduced state, in the frame of the scene.
-    scene : Scene
+    scene : PolishScene
         What must not be touched, seen from a frame nearby.
     guess : Guess
         States at equal steps, controls between them, and how long it takes; it sets the number of
@@ -472,13 +476,15 @@ def polish(
         if trust > near and far > near and apart.lacks(missed):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
             continue
-        if not all(map(_covers, held, held_near(program, found, MISSED * reach))):
+        needs = held_near(program, found, MISSED * reach)
+        if not all(np.isin(need, have).all() for have, need in zip(held, needs, strict=True)):
             # it is in a zone where it was not, or for longer
             wider = held_near(program, found, HELD * reach)
             point, held = found, list(map(np.union1d, held, wider))
             solver, begin = None, Begin.NEARBY
             continue
-        if _comes_and_goes(program, point, found):
+        here, there = (program.pieces(one).interval for one in (point, found))
+        if not np.array_equal(here, there):  # what moves is there in other intervals now
             point, apart = found, parted(program, found, pairs_near(program, found, near))
             solver, begin = None, Begin.NEARBY
             continue
@@ -500,20 +506,7 @@ def polish(
     return _polished(best, total, max(budget.elapsed - began, needed))
 
 
-def _covers(held: IntArray, needed: IntArray) -> bool:
-    """Whether intervals hold all those that are needed."""
-    return bool(np.isin(needed, held).all())
-
-
-def _comes_and_goes(program: Program, before: Point, after: Point) -> bool:
-    """Whether something is there in other intervals of one motion than of another one."""
-    if not program.scene.movers:
-        return False
-    here, there = (program.pieces(one).interval for one in (before, after))
-    return not np.array_equal(here, there)
-
-
-def _polished(point: Point, total: Answer, seconds: float) -> Polished:
+def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
     return Polished(
         status=total.status,
         reason=total.reason,
@@ -546,9 +539,9 @@ def _fastest(point: Point) -> float:
     return float((steps / point.durations).max(initial=0.0))
 
 
-def _nothing(reason: str) -> Answer:
+def _nothing(reason: str) -> SolverAnswer:
     """No answer yet."""
-    return Answer(SolveStatus.OUT_OF_BUDGET, reason, math.inf, 0, 0.0, False)
+    return SolverAnswer(SolveStatus.OUT_OF_BUDGET, reason, math.inf, 0, 0.0, False)
 
 
 def _point_of(guess: Guess, count: int) -> Point:

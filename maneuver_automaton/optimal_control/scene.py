@@ -65,7 +65,7 @@ class MovingSolid(NamedTuple):
     there: tuple[float, float]  # [s] since the same, from when until when
 
 
-class Pieces(NamedTuple):
+class ObstaclePieces(NamedTuple):
     """Convex pieces of obstacles, while a motion of some duration is driven."""
 
     solids: list[Solid]
@@ -81,7 +81,7 @@ class Pieces(NamedTuple):
 
 def pieces_during(
     still: Sequence[Solid], movers: Sequence[MovingSolid], durations: Array
-) -> Pieces:
+) -> ObstaclePieces:
     """What stands still, and what moves in each interval of a motion of `durations` (n,) [s].
 
     Corners of what moves are those at the begin of the interval, then those at its end: their hull
@@ -116,7 +116,7 @@ def pieces_during(
         intervals.append(np.where(there, np.arange(len(durations)), NEVER))
         pad = most - rates.shape[1]
         shifts.append(np.pad(rates, ((0, 0), (0, pad), (0, 0))))
-    return Pieces(
+    return ObstaclePieces(
         solids,
         np.concatenate(intervals).astype(np.int64),
         len(still),
@@ -184,7 +184,7 @@ class Guard(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Scene:
+class PolishScene:
     """The body, the obstacles around it, half-planes for the reference point, and limits."""
 
     parts: tuple[BodyPart, ...] = ()
@@ -198,17 +198,17 @@ class Scene:
         """Solids of all parts."""
         return [solid for part in self.parts for solid in part.solids]
 
-    def during(self, durations: Array) -> Pieces:
+    def during(self, durations: Array) -> ObstaclePieces:
         """Pieces of the obstacles while a motion is driven, of which intervals last so long [s]."""
         return _pieces_during(self, durations.tobytes() if self.movers else b"")
 
 
 @functools.lru_cache(maxsize=8)  # a round asks for the same ones several times
-def _pieces_during(scene: Scene, durations: bytes) -> Pieces:
+def _pieces_during(scene: PolishScene, durations: bytes) -> ObstaclePieces:
     return pieces_during(scene.pieces, scene.movers, np.frombuffer(durations))
 
 
-class Ends(NamedTuple):
+class MotionEnds(NamedTuple):
     """First and last pose and reduced state; None leaves a component free."""
 
     start: tuple[float | None, ...]
@@ -256,7 +256,7 @@ class Point(NamedTuple):
     durations: Array  # (n - 1,) [s]
 
 
-class Answer(NamedTuple):
+class SolverAnswer(NamedTuple):
     """How the solver ended, and what it took."""
 
     status: SolveStatus
@@ -266,7 +266,7 @@ class Answer(NamedTuple):
     seconds: float
     is_feasible: bool  # whether the point breaks no condition of the program
 
-    def then(self, later: Answer) -> Answer:
+    def then(self, later: SolverAnswer) -> SolverAnswer:
         """The answer after another solve, and what both took; an earlier point stays."""
         kept = later.is_feasible or not self.is_feasible
         return later._replace(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.optimal_control.polish_program import Program
+from maneuver_automaton.optimal_control.polish_program import PolishProgram
 from maneuver_automaton.optimal_control.scene import Point, Solid
 
 TOUCHING = 1e-6  # [m] nearer solids have no direction between them
@@ -25,14 +25,14 @@ SHARED = 0.1  # share of the distance by which a piece may stand out before the 
 TURNED = np.radians(np.linspace(-70.0, 70.0, 9))  # by which lines may turn
 
 
-class Pairs(NamedTuple):
+class SolidPairs(NamedTuple):
     """Which interval, piece of the body and piece of the obstacles each line parts."""
 
     interval: IntArray  # (n,)
     body: IntArray  # (n,) among all solids of all parts
     piece: IntArray  # (n,)
 
-    def extended(self, other: Pairs) -> Pairs:
+    def extended(self, other: SolidPairs) -> SolidPairs:
         """These and those of the others that are not among them."""
         have = set(zip(*(column.tolist() for column in self), strict=True))
         rows = list(zip(*(column.tolist() for column in other), strict=True))
@@ -40,7 +40,7 @@ class Pairs(NamedTuple):
         columns = (
             np.concatenate([old, column[new]]) for old, column in zip(self, other, strict=True)
         )
-        return Pairs(*columns)
+        return SolidPairs(*columns)
 
 
 class Lines(NamedTuple):
@@ -74,7 +74,7 @@ def near_pairs(
     *,
     within: float,
     during: IntArray | None = None,
-) -> Pairs:
+) -> SolidPairs:
     """Pairs that are nearer than `within` [m], from control points in numbers.
 
     `during` is the interval in which alone each piece counts; -1 for all, -2 for none.
@@ -97,7 +97,7 @@ def near_pairs(
         intervals.append(interval[close])
         bodies.append(np.full(int(close.sum()), k))
         found.append(piece[close])
-    return Pairs(
+    return SolidPairs(
         *(np.concatenate(column).astype(np.int64) for column in (intervals, bodies, found))
     )
 
@@ -106,7 +106,7 @@ def first_lines(
     points: Sequence[tuple[Array, Array]],
     body: Sequence[Solid],
     pieces: Sequence[Solid],
-    pairs: Pairs,
+    pairs: SolidPairs,
 ) -> Lines:
     """Lines between nearest points; where two solids overlap, along their least penetration."""
     import shapely
@@ -139,7 +139,7 @@ class Reach(NamedTuple):
 def reaches(
     points: Sequence[tuple[Array, Array]],
     scene: tuple[Sequence[Solid], Sequence[Solid]],
-    pairs: Pairs,
+    pairs: SolidPairs,
     lines: Lines,
 ) -> Reach:
     """How far both sides come, from control points in numbers."""
@@ -162,13 +162,15 @@ def reaches(
     return Reach(nodes, between, begin)
 
 
-def shared_lines(pieces: Sequence[Solid], pairs: Pairs, lines: Lines, reach: Reach) -> IntArray:
+def shared_lines(
+    pieces: Sequence[Solid], pairs: SolidPairs, lines: Lines, reach: Reach
+) -> IntArray:
     """For each pair the pair whose line parts it: lines of near pieces part those behind them.
 
     Parameters
     ----------
     pieces : sequence of Solid
-    pairs : Pairs
+    pairs : SolidPairs
     lines : Lines
         One for each pair.
     reach : Reach
@@ -181,7 +183,7 @@ def shared_lines(pieces: Sequence[Solid], pairs: Pairs, lines: Lines, reach: Rea
 
     Examples
     --------
-    >>> pairs = Pairs(*np.array([[0, 0], [0, 0], [0, 1]]))
+    >>> pairs = SolidPairs(*np.array([[0, 0], [0, 0], [0, 1]]))
     >>> lines = Lines(np.zeros(2), np.array([[1.0, 0.0], [2.0, 0.0]]))
     >>> walls = [(np.array([[x, -1.0], [x, 1.0]]), 0.0) for x in (2.0, 4.0)]
     >>> reach = Reach(-np.ones(2), -np.ones(2), np.array([1.0, 2.0]))
@@ -243,7 +245,7 @@ class Facing(NamedTuple):
 def facing(
     points: Sequence[tuple[Array, Array]],
     scene: tuple[Sequence[Solid], Sequence[Solid]],
-    pairs: Pairs,
+    pairs: SolidPairs,
     lines: Lines,
     owner: IntArray,
     *,
@@ -332,7 +334,7 @@ STANDS_OUT = 1e-6  # [m] before the piece that a line belongs to
 class Parting(NamedTuple):
     """Pairs, and the lines that part them at a margin: one for each, those of an owner alike."""
 
-    pairs: Pairs  # (n,)
+    pairs: SolidPairs  # (n,)
     owner: IntArray  # (n,) the pair whose line it is
     lines: Lines  # (n,)
     margins: Array  # (n,) [m] kept at the nodes
@@ -343,21 +345,21 @@ class Parting(NamedTuple):
         """The pairs (m,) that have lines of their own."""
         return np.flatnonzero(self.owner == np.arange(len(self.owner)))
 
-    def lacks(self, pairs: Pairs) -> bool:
+    def lacks(self, pairs: SolidPairs) -> bool:
         """Whether some pairs are not among these."""
         return len(self.pairs.extended(pairs).interval) > len(self.owner)
 
-    def depth(self, program: Program, point: Point) -> float:
+    def depth(self, program: PolishProgram, point: Point) -> float:
         """How deep the body is inside obstacles [m]."""
         reach = self._reach(program, point)
         return float((reach.between - reach.piece).max(initial=0.0))
 
-    def is_kept(self, program: Program, point: Point) -> bool:
+    def is_kept(self, program: PolishProgram, point: Point) -> bool:
         """Whether every path keeps half of the margin to its piece."""
         reach = self._reach(program, point)
         return bool((reach.between - reach.piece <= -0.5 * program.settings.clearance).all())
 
-    def with_margins(self, program: Program, point: Point, *, fixed: bool) -> Parting:
+    def with_margins(self, program: PolishProgram, point: Point, *, fixed: bool) -> Parting:
         """With room for what corners swing out between nodes; `fixed` lines touch the pieces."""
         reach, lines = self._reach(program, point), self.lines
         if fixed:
@@ -374,13 +376,13 @@ class Parting(NamedTuple):
         lines = Lines(angle[mine], self.lines.anchor).shifted(offset[mine])
         return self._replace(lines=lines)
 
-    def joined(self, program: Program, point: Point, others: Pairs) -> Parting:
+    def joined(self, program: PolishProgram, point: Point, others: SolidPairs) -> Parting:
         """With the pairs that were not among them, parted by lines of their own."""
         pairs = self.pairs.extended(others)
         count = len(self.owner)
         if len(pairs.interval) == count:
             return self
-        new = parted(program, point, Pairs(*(column[count:] for column in pairs)))
+        new = parted(program, point, SolidPairs(*(column[count:] for column in pairs)))
         both = self._replace(
             pairs=pairs,
             owner=np.concatenate([self.owner, new.owner + count]),
@@ -389,38 +391,38 @@ class Parting(NamedTuple):
         )
         return both._refaced(program, point)
 
-    def split(self, program: Program, point: Point, tight: float) -> Parting:
+    def split(self, program: PolishProgram, point: Point, tight: float) -> Parting:
         """With lines of their own for pieces that hold back the line of another, `tight` [m]."""
         reach = self._reach(program, point)
         before = reach.piece < reach.piece[self.owner] - STANDS_OUT
         which = np.flatnonzero(before & (reach.piece - reach.between < tight))
         if not len(which):
             return self
-        own = _first(program, point, Pairs(*(column[which] for column in self.pairs)))
+        own = _first(program, point, SolidPairs(*(column[which] for column in self.pairs)))
         lines = Lines(self.lines.angle.copy(), self.lines.anchor.copy())
         lines.angle[which], lines.anchor[which] = own
         owner = self.owner.copy()
         owner[which] = which
         return self._replace(owner=owner, lines=lines)._refaced(program, point)
 
-    def faced(self, program: Program, point: Point) -> Parting:
+    def faced(self, program: PolishProgram, point: Point) -> Parting:
         """With the corners too that are foremost now, if some are not looked at."""
         now = self._facing(program, point, np.zeros(1))
         return self if self.facing.holds(now) else self._refaced(program, point)
 
-    def _refaced(self, program: Program, point: Point) -> Parting:
+    def _refaced(self, program: PolishProgram, point: Point) -> Parting:
         now = self._facing(program, point, TURNED)
         return self._replace(facing=now.joined(self.facing))
 
-    def _facing(self, program: Program, point: Point, turned: Array) -> Facing:
+    def _facing(self, program: PolishProgram, point: Point, turned: Array) -> Facing:
         points, both = program.points(point), _both(program, point)
         return facing(points, both, self.pairs, self.lines, self.owner, turned=turned)
 
-    def _reach(self, program: Program, point: Point) -> Reach:
+    def _reach(self, program: PolishProgram, point: Point) -> Reach:
         return reaches(program.points(point), _both(program, point), self.pairs, self.lines)
 
 
-def parted(program: Program, point: Point, pairs: Pairs) -> Parting:
+def parted(program: PolishProgram, point: Point, pairs: SolidPairs) -> Parting:
     """Pairs with first lines at a point, of which pieces behind one another share one."""
     lines = _first(program, point, pairs)
     points, both = program.points(point), _both(program, point)
@@ -431,16 +433,16 @@ def parted(program: Program, point: Point, pairs: Pairs) -> Parting:
     return Parting(pairs, owner, lines, np.zeros(len(owner)), faces)
 
 
-def _first(program: Program, point: Point, pairs: Pairs) -> Lines:
+def _first(program: PolishProgram, point: Point, pairs: SolidPairs) -> Lines:
     return first_lines(program.points(point), *_both(program, point), pairs)
 
 
-def _both(program: Program, point: Point) -> tuple[list[Solid], list[Solid]]:
+def _both(program: PolishProgram, point: Point) -> tuple[list[Solid], list[Solid]]:
     """Solids of the body, and of the obstacles while the motion of a point is driven."""
     return program.scene.body, program.pieces(point).solids
 
 
-def held_near(program: Program, point: Point, within: float) -> list[IntArray]:
+def held_near(program: PolishProgram, point: Point, within: float) -> list[IntArray]:
     """For each guard of the scene the intervals (k,) in which the body comes nearer than so [m]."""
     found = []
     for guard in program.scene.guards:
@@ -452,12 +454,12 @@ def held_near(program: Program, point: Point, within: float) -> list[IntArray]:
     return found
 
 
-def pairs_near(program: Program, point: Point, within: float) -> Pairs:
+def pairs_near(program: PolishProgram, point: Point, within: float) -> SolidPairs:
     """Pairs nearer than `within` [m] at a point; see `near_pairs`."""
     scene, pieces = program.scene, program.pieces(point)
     if not (pieces.solids and scene.parts):
         empty = np.zeros(0, dtype=np.int64)
-        return Pairs(empty, empty, empty)
+        return SolidPairs(empty, empty, empty)
     during = pieces.interval if pieces.move else None
     return near_pairs(
         program.points(point), scene.body, pieces.solids, within=within, during=during

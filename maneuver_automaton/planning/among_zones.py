@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.automaton.cutting import joined
+from maneuver_automaton.automaton.cutting import carried, joined
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle, Zone
 from maneuver_automaton.collision.fcl_checker import origin_near

@@ -17,7 +17,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit import Audit, audit_plan, closest_to, origin_of
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import Box, Obstacle, Zone
 from maneuver_automaton.collision.blocked import too_close

@@ -111,7 +111,7 @@ class Inputs:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Connection:
+class TrimConnection:
     """A maneuver from trim to trim, or the reason why there is none."""
 
     source: str
@@ -134,7 +134,7 @@ def connect(
     settings: TransferSettings | None = None,
     program: TransferProgram | None = None,
     control_limits: Array | None = None,
-) -> Connection:
+) -> TrimConnection:
     """The maneuver of least cost from one trim to another, wherever it ends.
 
     The inputs are constant in equal intervals. The solver's answer is driven again to rounding,
@@ -185,7 +185,7 @@ def connect(
             "vehicle switches between them at will; need two trims of different reduced state"
         )
     if outside:
-        return Connection(source=source.name, target=target.name, maneuver=None, reason=outside)
+        return TrimConnection(source=source.name, target=target.name, maneuver=None, reason=outside)
     limits = model.control_limits if control_limits is None else control_limits
     reasons: list[str] = []
     solve_s = 0.0
@@ -211,19 +211,22 @@ def connect(
 
 def _checked(
     model: Model, source: Trim, target: Trim, *, transfer: Transfer, limits: Array
-) -> Connection:
+) -> TrimConnection:
     """The transfer as a maneuver if it holds, else the reason."""
-    nothing = Connection(source=source.name, target=target.name, maneuver=None, cost=transfer.cost)
+    nothing = TrimConnection(
+        source=source.name, target=target.name, maneuver=None, cost=transfer.cost
+    )
     if transfer.status is not SolveStatus.SOLVED:
         return replace(nothing, reason=f"the solver ended with {transfer.reason}")
-    inputs = _closed_in_short(
-        model,
-        source.reduced_state,
-        target.reduced_state,
-        inputs=Inputs(control=transfer.control, interval=transfer.duration / len(transfer.control)),
-        limits=limits,
-    )
-    course = inputs.drive(model, source.reduced_state)
+    start, end, count = source.reduced_state, target.reduced_state, len(transfer.control)
+    raw = Inputs(control=transfer.control, interval=transfer.duration / count)
+    # Of few digits but in the last third, so that files are half as long.
+    short = Inputs(control=raw.control.round(DIGITS), interval=round(raw.interval, DIGITS))
+    inputs = closed(model, start, end, inputs=short, limits=limits, last=max(1, count // 3))
+    course = inputs.drive(model, start)
+    if not np.abs(course.reduced_state[-1] - end).max() <= CLOSED / 100.0:
+        inputs = closed(model, start, end, inputs=raw, limits=limits)
+        course = inputs.drive(model, start)
     miss = float(np.abs(course.reduced_state[-1] - target.reduced_state).max())
     if not miss <= CLOSED:
         return replace(nothing, reason=f"it could not be closed: {miss:.2g} is left")
@@ -245,22 +248,6 @@ def _checked(
             nothing, defect=defect, reason=f"driven again it ends {defect:.2g} off its target"
         )
     return replace(nothing, maneuver=maneuver, inputs=inputs, defect=defect)
-
-
-def _closed_in_short(
-    model: Model, start: Array, end: Array, *, inputs: Inputs, limits: Array
-) -> Inputs:
-    """Closed inputs of few digits but in the last third, so that files are half as long."""
-    last = max(1, len(inputs.control) // 3)
-    short = Inputs(control=inputs.control.round(DIGITS), interval=round(inputs.interval, DIGITS))
-    found = closed(model, start, end, inputs=short, limits=limits, last=last)
-    if _miss(model, start, end, found) <= CLOSED / 100.0:
-        return found
-    return closed(model, start, end, inputs=inputs, limits=limits)
-
-
-def _miss(model: Model, start: Array, end: Array, inputs: Inputs) -> float:
-    return float(np.abs(inputs.drive(model, start).reduced_state[-1] - end).max())
 
 
 def closed(

@@ -357,7 +357,8 @@ def _sampled(
         control=elements.control[at],
         model=model,
     )
-    last = elements.control[np.arange(len(spans)), _last_place(elements.step)]
+    last_place = elements.step.shape[1] - 1 - np.argmax(elements.step[:, ::-1] > 0.0, axis=1)
+    last = elements.control[np.arange(len(spans)), last_place]  # of each ride, that lasts
     stops = np.searchsorted(rows[of], np.arange(len(spans)), side="right")
     return tuple(
         Trajectory(
@@ -384,11 +385,6 @@ def _gained(elements: Elements, at: tuple[IntArray, IntArray], share: Array) -> 
         same = order[begin:end]
         gained[same] = row @ series[at[0][same], at[1][same]]
     return gained
-
-
-def _last_place(step: Array) -> IntArray:
-    """Last element (m,) of each ride that lasts; any if none does."""
-    return np.asarray(step.shape[1] - 1 - np.argmax(step[:, ::-1] > 0.0, axis=1))
 
 
 def _n_samples(ride: Ride, elements: Elements, max_step_m: float, max_step_rad: float) -> IntArray:

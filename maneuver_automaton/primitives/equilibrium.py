@@ -187,7 +187,10 @@ def _trim_at(
     if excess.any():
         return MissingTrim(name=name, reason=_beyond(balance, everything, excess))
     if not solved:
-        return MissingTrim(name=name, reason=_unbalanced(balance, found))
+        missed = np.abs(balance.missed(found))
+        worst = int(np.argmax(missed))
+        what = f"{balance.equations[worst]} stays off by {missed[worst]:.4g}"
+        return MissingTrim(name=name, reason=f"no steady motion: {what}")
     inside = np.clip(everything, *balance.limits.T) + 0.0
     state, control = np.split(inside, [len(model.reduced_names)])
     twist = _as_asked(model.body_velocity(state, control), balance)
@@ -301,9 +304,3 @@ def _beyond(balance: _Balance, everything: Array, excess: Array) -> str:
         for k in np.flatnonzero(excess)
     ]
     return "; ".join(parts)
-
-
-def _unbalanced(balance: _Balance, unknown: Array) -> str:
-    missed = np.abs(balance.missed(unknown))
-    worst = int(np.argmax(missed))
-    return f"no steady motion: {balance.equations[worst]} stays off by {missed[worst]:.4g}"

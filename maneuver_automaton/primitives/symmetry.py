@@ -108,7 +108,7 @@ def mirror_of(model: Model, *, seed: int = 0) -> Mirror | None:
     return None
 
 
-class _Change(NamedTuple):
+class _Exchange(NamedTuple):
     """Signs and exchanges of the components of a vector, which undo themselves."""
 
     order: tuple[int, ...]
@@ -122,16 +122,18 @@ class _Change(NamedTuple):
         return kept + 2 * self.swaps
 
 
-def _changes(limits: Array) -> list[_Change]:
+def _changes(limits: Array) -> list[_Exchange]:
     """All changes that leave limits (n, 2) as they are, those with the fewest exchanges first."""
     n = len(limits)
-    found: list[_Change] = []
+    found: list[_Exchange] = []
     for swaps in range(min(MOST_SWAPS, n // 2) + 1):
         for order in _exchanges(n, swaps):
             for signs in itertools.product((1.0, -1.0), repeat=n):
                 undone = all(signs[k] == signs[other] for k, other in enumerate(order))
-                if undone and _same_limits(limits, order, np.array(signs)):
-                    found.append(_Change(order, np.array(signs), swaps))
+                image = np.sort(limits[list(order)] * np.array(signs)[:, None], axis=1)
+                same = np.isclose(image, limits, rtol=AGREES, atol=0.0).all()
+                if undone and same:
+                    found.append(_Exchange(order, np.array(signs), swaps))
                 if len(found) >= MOST_CANDIDATES:
                     return found
     return found
@@ -149,10 +151,10 @@ def _exchanges(n: int, swaps: int) -> Iterator[tuple[int, ...]]:
 
 
 def _candidates(
-    states: list[_Change], controls: list[_Change]
-) -> Iterator[tuple[_Change, _Change]]:
+    states: list[_Exchange], controls: list[_Exchange]
+) -> Iterator[tuple[_Exchange, _Exchange]]:
     """Pairs of changes, by how much they change together."""
-    by_size: tuple[dict[int, list[_Change]], ...] = ({}, {})
+    by_size: tuple[dict[int, list[_Exchange]], ...] = ({}, {})
     for table, changes in zip(by_size, (states, controls), strict=True):
         for change in changes:
             table.setdefault(change.size, []).append(change)
@@ -161,13 +163,7 @@ def _candidates(
             yield from itertools.product(by_size[0].get(total - size, ()), by_size[1].get(size, ()))
 
 
-def _same_limits(limits: Array, order: tuple[int, ...], signs: Array) -> bool:
-    """Whether limits (n, 2) are those of the images too, but for rounding."""
-    image = np.sort(limits[list(order)] * signs[:, None], axis=1)
-    return bool(np.isclose(image, limits, rtol=AGREES, atol=0.0).all())
-
-
-def _matrix(change: _Change) -> Array:
+def _matrix(change: _Exchange) -> Array:
     """The change as a matrix (n, n)."""
     return np.asarray(change.signs[:, None] * np.eye(len(change.order))[list(change.order)] + 0.0)
 

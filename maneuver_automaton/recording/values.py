@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.automaton.plan_arrays import PlanArrays, arrays_at, joined, step_times
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape
 from maneuver_automaton.collision.zones import Zone

@@ -46,14 +46,14 @@ Estimate = Callable[[Plan], float]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Drive:
+class TimedDrive:
     """A kinematic plan, and its motion from stop to stop."""
 
     plan: Plan
     estimate: float  # [s]
     strokes: Array  # (m,) signed lengths of its strokes [m]; turns on the spot are no stroke
 
-    def resembles(self, other: Drive) -> bool:
+    def resembles(self, other: TimedDrive) -> bool:
         """Whether it has the same gears, for about as long each."""
         if self.strokes.shape != other.strokes.shape:
             return False
@@ -104,7 +104,7 @@ def gear_sequences(
     *,
     budget: Budget,
     keep: int = 6,
-) -> Iterator[Drive]:
+) -> Iterator[TimedDrive]:
     """Kinematic plans that differ: a promising one soon, then those that take the least time.
 
     Parameters
@@ -123,11 +123,11 @@ def gear_sequences(
 
     Yields
     ------
-    Drive
+    TimedDrive
         The best of the first prices before the others are tried; then the others, by estimate.
     """
-    found: list[Drive] = []
-    first: Drive | None = None
+    found: list[TimedDrive] = []
+    first: TimedDrive | None = None
     for turning, switching in PRICES:
         for library in libraries:
             if budget.is_over:
@@ -136,7 +136,7 @@ def gear_sequences(
             cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
             variant = replace(problem, automaton=library, cost=cost)
             for plan in _plans(variant, budget):
-                drive = Drive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
+                drive = TimedDrive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
                 alike = [other for other in found if drive.resembles(other)]
                 if not any(drive.estimate >= other.estimate for other in alike):
                     found = [other for other in found if other not in alike] + [drive]

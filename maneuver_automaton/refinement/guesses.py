@@ -31,7 +31,7 @@ Step = Callable[[float], int]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Pace:
+class PathLimits:
     """Limits of a motion along a path; infinite where there is no limit."""
 
     speed: float  # [m/s]
@@ -59,7 +59,7 @@ class Timed(NamedTuple):
         return float(self.time[-1])
 
 
-def timed(plan: Plan, pace: Pace) -> Timed:
+def timed(plan: Plan, pace: PathLimits) -> Timed:
     """A plan of steady motions in the plane, driven within limits of speed and acceleration.
 
     It stops where the sign of the speed changes, and between driving and turning on the spot. Where
@@ -88,18 +88,14 @@ def timed(plan: Plan, pace: Pace) -> Timed:
     mean = 0.5 * (np.sqrt(squared[:-1]) + np.sqrt(squared[1:]))
     passed = width / mean
     steering = _steering(twists, pace.wheelbase)
-    waits = _waits(steering, stroke_of, _sums(stroke_of[owner], passed), pace.steering_rate)
+    waits = _waits(steering, stroke_of, np.bincount(stroke_of[owner], passed), pace.steering_rate)
     return _assembled(
         plan, begins[owner] + share * durations[owner], passed, squared, twists[owner],
         steering[owner], stroke_of[owner], waits,
     )  # fmt: skip
 
 
-def _sums(owner: IntArray, values: Array) -> Array:
-    return np.asarray(np.bincount(owner, values), dtype=np.float64)
-
-
-def _limits(twists: Array, pace: Pace) -> tuple[Array, Array]:
+def _limits(twists: Array, pace: PathLimits) -> tuple[Array, Array]:
     """How much faster than planned each trim may be driven, and how fast this may grow [1/s]."""
     speed, turn = np.abs(twists[:, 0]), np.abs(twists[:, 2])
     most = np.where(twists[:, 0] < 0.0, pace.reverse_speed, pace.speed)
@@ -248,10 +244,10 @@ def course_guess(course: Trajectory, *, intervals: Step) -> Guess:
     return Guess(state=state, control=course.control[which], duration=float(time[-1]))
 
 
-def pace_of_car(model: SecondOrderCar) -> Pace:
+def pace_of_car(model: SecondOrderCar) -> PathLimits:
     """Limits of a second-order car along a path."""
     low, high = model.reduced_limits[0]
-    return Pace(
+    return PathLimits(
         speed=high,
         reverse_speed=-low,
         acceleration=model.max_acceleration,
@@ -261,10 +257,10 @@ def pace_of_car(model: SecondOrderCar) -> Pace:
     )
 
 
-def pace_of_unicycle(model: SecondOrderUnicycle) -> Pace:
+def pace_of_unicycle(model: SecondOrderUnicycle) -> PathLimits:
     """Limits of a second-order unicycle along a path."""
     low, high = model.reduced_limits[0]
-    return Pace(
+    return PathLimits(
         speed=high,
         reverse_speed=-low,
         acceleration=model.max_acceleration,
@@ -273,10 +269,10 @@ def pace_of_unicycle(model: SecondOrderUnicycle) -> Pace:
     )
 
 
-def pace_of_trailer(model: CarWithTrailer) -> Pace:
+def pace_of_trailer(model: CarWithTrailer) -> PathLimits:
     """Limits of a car with a trailer along a path."""
     low, high = model.control_limits[0]
-    return Pace(
+    return PathLimits(
         speed=high,
         reverse_speed=-low,
         acceleration=math.inf,
@@ -315,7 +311,7 @@ class PathGuesses(NamedTuple):
     """Guesses along plans of kinematic vehicles."""
 
     libraries: Sequence[Automaton]  # of vehicles that turn as tightly as can be, and less
-    pace: Pace  # along their paths
+    pace: PathLimits  # along their paths
     guess: Callable[[Plan, Array, Array, Step], Guess]
     """From a plan, the first and last reduced state (n_z,), and how many intervals it gets."""
 

@@ -27,12 +27,12 @@ from maneuver_automaton.optimal_control.scene import (
     LEAST_DURATION,
     MOST_DURATION,
     BodyPart,
-    Ends,
     Guard,
+    MotionEnds,
     MovingSolid,
     Polished,
+    PolishScene,
     PolishSettings,
-    Scene,
 )
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.problem import Bounds
@@ -116,21 +116,18 @@ class PolishTask:
             )
 
     @property
-    def scene(self) -> Scene:
+    def scene(self) -> PolishScene:
         """Body, obstacles and bounds seen from the start."""
         pieces = pieces_seen_from(list(self.obstacles), self.start[:3])
-        return Scene(
+        most = lateral_limit(self.model)  # a limit of the vehicle that is none of one state alone
+        everywhere = [Guard(lateral=most)] if math.isfinite(most) else []
+        return PolishScene(
             parts=self.parts,
             pieces=tuple((corners, by + self.margin) for corners, by in pieces),
             movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
-            guards=(*self._everywhere(), *map(self._seen, self.guards)),
+            guards=(*everywhere, *map(self._seen, self.guards)),
         )
-
-    def _everywhere(self) -> list[Guard]:
-        """The limit of the vehicle itself that is none of one state alone."""
-        most = lateral_limit(self.model)
-        return [Guard(lateral=most)] if math.isfinite(most) else []
 
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
         """A guard with its solids seen from the start."""
@@ -159,7 +156,7 @@ class PolishTask:
                 walls += [(a, b, high), (-a, -b, -low)]
         return walls
 
-    def ends(self, heading: float) -> Ends:
+    def ends(self, heading: float) -> MotionEnds:
         """First and last state seen from the start; the heading nearest to one that is near [rad].
 
         Places are counted from the start before they are turned, so that no digit is lost.
@@ -179,7 +176,9 @@ class PolishTask:
         if len(self.goal) > 3 and self.goal[3] is None:
             end[3] = None
         still = (0.0,) * self.start.size
-        return Ends((*still, *self.start_state.tolist()), (*end, *self.goal_state), self.durations)
+        return MotionEnds(
+            (*still, *self.start_state.tolist()), (*end, *self.goal_state), self.durations
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -277,7 +276,7 @@ class _Polishing:
     """The state of one run."""
 
     task: PolishTask
-    scene: Scene
+    scene: PolishScene
     guesses: Iterable[Guess]
     stage_cost: RunningCost | None
     settings: PolishSettings

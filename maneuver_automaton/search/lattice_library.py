@@ -9,7 +9,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.between import part_between
+from maneuver_automaton.automaton.validation import part_between
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.costs import StageCost

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.between import part_between, trims_between
+from maneuver_automaton.automaton.validation import part_between, trims_between
 from maneuver_automaton.models import LatticeBody
 from maneuver_automaton.primitives import Maneuver, Trim
 

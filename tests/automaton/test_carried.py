@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.carried import carried
-from maneuver_automaton.automaton.cutting import tail_of, with_samples_at
+from maneuver_automaton.automaton.cutting import carried, tail_of, with_samples_at
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.optimal_control.scene import ALWAYS, NEVER, MovingSolid, pieces_during
-from maneuver_automaton.optimal_control.separation import Pairs, near_pairs
+from maneuver_automaton.optimal_control.separation import SolidPairs, near_pairs
 
 BOX = np.array([[1.0, 0.5], [-1.0, 0.5], [-1.0, -0.5], [1.0, -0.5]])
 STILL = (BOX + 9.0, 0.0)
@@ -70,4 +70,4 @@ def test_pairs_of_its_interval_alone():
     assert sorted(zip(*(column.tolist() for column in pairs), strict=True)) == sorted(
         [(0, 0, 0), (1, 0, 0), (2, 0, 0), (1, 0, 1)]
     )
-    assert isinstance(pairs, Pairs)
+    assert isinstance(pairs, SolidPairs)

@@ -12,11 +12,16 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.polishing import intervals_for, polish
-from maneuver_automaton.optimal_control.scene import BodyPart, Ends, PolishSettings, Scene
+from maneuver_automaton.optimal_control.scene import (
+    BodyPart,
+    MotionEnds,
+    PolishScene,
+    PolishSettings,
+)
 from maneuver_automaton.optimal_control.separation import (
     Facing,
     Lines,
-    Pairs,
+    SolidPairs,
     first_lines,
     near_pairs,
     reaches,
@@ -52,8 +57,8 @@ def guess(n: int = 40, *, aside: float = 0.0, length: float = 4.0, duration: flo
     return Guess(state=state, control=np.zeros((n, 2)), duration=duration)
 
 
-def at_rest(x: float, y: float = 0.0, heading: float | None = 0.0) -> Ends:
-    return Ends((0.0,) * 5, (x, y, heading, 0.0, 0.0))
+def at_rest(x: float, y: float = 0.0, heading: float | None = 0.0) -> MotionEnds:
+    return MotionEnds((0.0,) * 5, (x, y, heading, 0.0, 0.0))
 
 
 def test_a_line_lies_midway_between_nearest_points() -> None:
@@ -78,14 +83,14 @@ def test_rounding_counts_on_both_sides() -> None:
     body = [(SQUARE, 0.25)]
     assert len(near_pairs(standing(0.0), body, disc, within=0.74).interval) == 0
     assert len(near_pairs(standing(0.0), body, disc, within=0.76).interval) == 1
-    pairs = Pairs(*(np.zeros(1, dtype=np.int64) for _ in range(3)))
+    pairs = SolidPairs(*(np.zeros(1, dtype=np.int64) for _ in range(3)))
     reach = reaches(standing(0.0), (body, disc), pairs, Lines(np.zeros(1), np.zeros((1, 2))))
     assert (reach.nodes, reach.piece) == (pytest.approx([0.75]), pytest.approx([1.5]))
 
 
 def test_pairs_are_joined_once() -> None:
-    one = Pairs(*(np.array(column) for column in ([0, 1], [0, 0], [2, 2])))
-    other = Pairs(*(np.array(column) for column in ([1, 2], [0, 0], [2, 2])))
+    one = SolidPairs(*(np.array(column) for column in ([0, 1], [0, 0], [2, 2])))
+    other = SolidPairs(*(np.array(column) for column in ([1, 2], [0, 0], [2, 2])))
     assert one.extended(other).interval.tolist() == [0, 1, 2]
 
 
@@ -95,7 +100,7 @@ def test_the_number_of_intervals_follows_the_duration_between_its_limits() -> No
 
 
 def test_without_obstacles_full_ahead_and_full_back() -> None:
-    free = polish(ROBOT, at_rest(0.5), Scene(), guess(length=0.5, duration=2.0))
+    free = polish(ROBOT, at_rest(0.5), PolishScene(), guess(length=0.5, duration=2.0))
     assert free.status is SolveStatus.SOLVED
     assert free.duration == pytest.approx(2.0 * np.sqrt(0.5), abs=2e-3)  # the effort costs a bit
 
@@ -103,7 +108,7 @@ def test_without_obstacles_full_ahead_and_full_back() -> None:
 @pytest.mark.parametrize("fixed", [False, True])
 def test_a_box_is_passed_without_touching_it_between_nodes(fixed: bool) -> None:
     box = SQUARE * [1.0, 0.6] + [2.0, 0.0]
-    scene = Scene(parts=(BODY,), pieces=((box, 0.0),))
+    scene = PolishScene(parts=(BODY,), pieces=((box, 0.0),))
     found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), fixed_planes=fixed)
     assert found.status is SolveStatus.SOLVED
     assert touched(found.state, found.control, found.durations, box) > 0.0
@@ -112,7 +117,7 @@ def test_a_box_is_passed_without_touching_it_between_nodes(fixed: bool) -> None:
 
 
 def test_a_disc_is_passed_as_it_is() -> None:
-    scene = Scene(parts=(BODY,), pieces=((np.array([[2.0, 0.0]]), 0.3),))
+    scene = PolishScene(parts=(BODY,), pieces=((np.array([[2.0, 0.0]]), 0.3),))
     found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8))
     assert found.status is SolveStatus.SOLVED
     around = shapely.Point(2.0, 0.0).buffer(0.3, quad_segs=64)
@@ -123,7 +128,7 @@ def test_a_disc_is_passed_as_it_is() -> None:
 
 
 def test_a_guess_inside_is_led_out() -> None:
-    scene = Scene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.1], 0.0),))
+    scene = PolishScene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.1], 0.0),))
     refused = polish(ROBOT, at_rest(4.0), scene, guess(), fixed_planes=True)
     assert refused.reason == "the guess is too deep inside obstacles for fixed planes"
     out = polish(ROBOT, at_rest(4.0), scene, guess(), elastic=True)
@@ -134,7 +139,7 @@ def test_a_guess_inside_is_led_out() -> None:
 
 def test_a_point_is_a_body_too() -> None:
     point = BodyPart(solids=((np.zeros((1, 2)), 0.0),))
-    scene = Scene(parts=(point,), pieces=((moved(2.0, 0.1), 0.0),))
+    scene = PolishScene(parts=(point,), pieces=((moved(2.0, 0.1), 0.0),))
     out = polish(ROBOT, at_rest(4.0), scene, guess(), elastic=True)
     found = polish(ROBOT, at_rest(4.0), scene, out.as_guess)
     assert found.status is SolveStatus.SOLVED
@@ -145,7 +150,9 @@ def test_a_point_is_a_body_too() -> None:
 
 def test_walls_hold_between_nodes_too() -> None:
     walls = ((0.0, 1.0, 0.3), (0.0, -1.0, 0.05))  # -0.05 <= y <= 0.3
-    found = polish(ROBOT, at_rest(1.0, 0.2), Scene(walls=walls), guess(length=1.0, duration=4.0))
+    found = polish(
+        ROBOT, at_rest(1.0, 0.2), PolishScene(walls=walls), guess(length=1.0, duration=4.0)
+    )
     assert found.status is SolveStatus.SOLVED
     poses = simulated(found.state, found.control, found.durations)
     assert poses[:, 1].min() >= -0.05
@@ -153,7 +160,7 @@ def test_walls_hold_between_nodes_too() -> None:
 
 
 def test_a_free_heading_is_free() -> None:
-    found = polish(ROBOT, at_rest(2.0, 1.0, None), Scene(), guess(length=2.0, aside=0.3))
+    found = polish(ROBOT, at_rest(2.0, 1.0, None), PolishScene(), guess(length=2.0, aside=0.3))
     assert found.status is SolveStatus.SOLVED
     assert found.state[-1, :2] == pytest.approx([2.0, 1.0])
     assert abs(found.state[-1, 2]) > 0.1
@@ -162,7 +169,7 @@ def test_a_free_heading_is_free() -> None:
 def test_with_fixed_gears_each_stretch_takes_its_own_time() -> None:
     there_and_back = guess(length=1.0, duration=6.0)
     gears = np.where(np.arange(40) < 10, 1.0, -1.0)
-    found = polish(ROBOT, at_rest(-1.0), Scene(), there_and_back, gears=gears)
+    found = polish(ROBOT, at_rest(-1.0), PolishScene(), there_and_back, gears=gears)
     assert found.status is SolveStatus.SOLVED
     assert (found.state[:11, 3] >= -1e-6).all()
     assert (found.state[10:, 3] <= 1e-6).all()
@@ -182,9 +189,9 @@ def test_a_trailer_is_part_of_the_body() -> None:
     share = np.linspace(0.0, 1.0, 61)
     state = np.stack([3 * share, 0.1 * np.sin(np.pi * share), 0 * share, 0 * share], axis=1)
     first = Guess(state=state, control=np.tile([0.5, 0.0], (60, 1)), duration=6.0)
-    ends = Ends((0.0,) * 4, (3.0, 0.0, 0.0, 0.0))
-    found = polish(truck, ends, Scene(parts=(car, trailer), pieces=((box, 0.0),)), first)
-    alone = polish(truck, ends, Scene(parts=(car,), pieces=((box, 0.0),)), first)
+    ends = MotionEnds((0.0,) * 4, (3.0, 0.0, 0.0, 0.0))
+    found = polish(truck, ends, PolishScene(parts=(car, trailer), pieces=((box, 0.0),)), first)
+    alone = polish(truck, ends, PolishScene(parts=(car,), pieces=((box, 0.0),)), first)
     assert (found.status, alone.status) == (SolveStatus.SOLVED, SolveStatus.SOLVED)
     clearance = min(part_clearance(row, box) for row in found.state)
     assert clearance >= 0.0
@@ -237,7 +244,7 @@ def touched(
 
 def test_a_solve_ends_between_two_iterations_once_the_time_is_over() -> None:
     """A clock that ticks at every look: the solver has some iterations, and asks at each."""
-    scene = Scene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
+    scene = PolishScene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
     ticks = itertools.count(0.0)
     budget = Budget(began=0.0, deadline=20.0, clock=lambda: next(ticks))
     found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), budget=budget)
@@ -248,7 +255,7 @@ def test_a_solve_ends_between_two_iterations_once_the_time_is_over() -> None:
 
 def test_a_solve_that_is_cut_short_hands_on_its_best_iterate() -> None:
     """It breaks no condition of the program, and is near the end of the whole solve."""
-    scene = Scene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
+    scene = PolishScene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
     whole = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8))
     few = PolishSettings(max_iterations=whole.iterations - 1)
     cut = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), settings=few)
@@ -281,7 +288,7 @@ def test_pieces_of_more_corners_join_those_of_fewer(known: int) -> None:
 
 def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:
     budget = Budget(began=0.0, deadline=1e-3, clock=lambda: 0.0)
-    found = polish(ROBOT, at_rest(4.0), Scene(), guess(), budget=budget)
+    found = polish(ROBOT, at_rest(4.0), PolishScene(), guess(), budget=budget)
     assert found.status is SolveStatus.OUT_OF_BUDGET
     assert found.reason.startswith("no time was left: to build the program would take")
     assert found.build_s > 1e-3

@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus

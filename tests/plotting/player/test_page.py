@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2, group_of
