@@ -13,8 +13,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.analysis.coverage import poses_in_ball
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.design.choice import Choice, best_choices
-from maneuver_automaton.design.mixing import mixing_factors
+from maneuver_automaton.design.choice import Choice, best_choices, mixing_factors
 from maneuver_automaton.design.proof import SEED, WordsProof, proven_factor
 from maneuver_automaton.design.reeds_shepp import MOST_TRIMS
 from maneuver_automaton.groups import SE2
