@@ -8,6 +8,8 @@ from maneuver_automaton.analysis.coverage import planned as planned
 from maneuver_automaton.analysis.coverage import settings_for as settings_for
 from maneuver_automaton.analysis.coverage import straight_line as straight_line
 from maneuver_automaton.analysis.coverage import stretch_factor as stretch_factor
+from maneuver_automaton.analysis.examine import Region as Region
+from maneuver_automaton.analysis.examine import SymmetryReport as SymmetryReport
 from maneuver_automaton.analysis.feasible import FeasibleSet as FeasibleSet
 from maneuver_automaton.analysis.feasible import feasible_set as feasible_set
 from maneuver_automaton.analysis.feasible import least_times as least_times
@@ -15,23 +17,13 @@ from maneuver_automaton.analysis.growth import GrowthBound as GrowthBound
 from maneuver_automaton.analysis.growth import growth_bound as growth_bound
 from maneuver_automaton.analysis.growth import growth_of_values as growth_of_values
 from maneuver_automaton.analysis.growth import ring_poses as ring_poses
-from maneuver_automaton.analysis.invariance import (
-    check_boundary_condition as check_boundary_condition,
-)
-from maneuver_automaton.analysis.invariance import check_constraint as check_constraint
-from maneuver_automaton.analysis.invariance import check_stage_cost as check_stage_cost
+from maneuver_automaton.analysis.growth import unit_cost as unit_cost
 from maneuver_automaton.analysis.library_conditions import LibraryReport as LibraryReport
 from maneuver_automaton.analysis.library_conditions import check_library as check_library
 from maneuver_automaton.analysis.library_conditions import turn_move_turn as turn_move_turn
-from maneuver_automaton.analysis.motion_primitives import Equivalence as Equivalence
-from maneuver_automaton.analysis.motion_primitives import (
-    same_motion_primitive as same_motion_primitive,
-)
 from maneuver_automaton.analysis.reach import Reached as Reached
 from maneuver_automaton.analysis.reach import ReachSettings as ReachSettings
 from maneuver_automaton.analysis.reach import reached as reached
-from maneuver_automaton.analysis.region import Region as Region
-from maneuver_automaton.analysis.report import SymmetryReport as SymmetryReport
 from maneuver_automaton.analysis.shift import ControlProblem as ControlProblem
 from maneuver_automaton.analysis.shift import QuadraticCost as QuadraticCost
 from maneuver_automaton.analysis.shift import (
@@ -45,15 +37,27 @@ from maneuver_automaton.analysis.stability import ClosedLoopCheck as ClosedLoopC
 from maneuver_automaton.analysis.stability import certified_horizon as certified_horizon
 from maneuver_automaton.analysis.stability import certified_intervals as certified_intervals
 from maneuver_automaton.analysis.stability import check_closed_loop as check_closed_loop
-from maneuver_automaton.analysis.suboptimality import continuous_index as continuous_index
-from maneuver_automaton.analysis.suboptimality import discrete_index as discrete_index
+from maneuver_automaton.analysis.stability import continuous_index as continuous_index
+from maneuver_automaton.analysis.stability import discrete_index as discrete_index
+from maneuver_automaton.analysis.symmetry import Equivalence as Equivalence
+from maneuver_automaton.analysis.symmetry import (
+    check_boundary_condition as check_boundary_condition,
+)
+from maneuver_automaton.analysis.symmetry import check_constraint as check_constraint
 from maneuver_automaton.analysis.symmetry import check_flow as check_flow
+from maneuver_automaton.analysis.symmetry import check_stage_cost as check_stage_cost
 from maneuver_automaton.analysis.symmetry import check_vector_field as check_vector_field
+from maneuver_automaton.analysis.symmetry import (
+    same_motion_primitive as same_motion_primitive,
+)
 from maneuver_automaton.analysis.turnpike import Turnpike as Turnpike
 from maneuver_automaton.analysis.turnpike import TurnpikeCase as TurnpikeCase
 from maneuver_automaton.analysis.turnpike import turnpike as turnpike
 from maneuver_automaton.analysis.unit_cost import unit_cost as unit_cost
 from maneuver_automaton.refinement.retiming import EffortReport as EffortReport
+from maneuver_automaton.refinement.effort import EffortReport as EffortReport
+from maneuver_automaton.refinement.effort import effort_report as effort_report
+from maneuver_automaton.refinement.effort import effort_threshold as effort_threshold
 from maneuver_automaton.refinement.retiming import Retiming as Retiming
 from maneuver_automaton.refinement.retiming import effort_report as effort_report
 from maneuver_automaton.refinement.retiming import effort_threshold as effort_threshold

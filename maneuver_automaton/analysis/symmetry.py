@@ -1,15 +1,23 @@
-"""Symmetry of the dynamics under a group: of the vector field, and of the flow."""
+"""Symmetry under a group: of the dynamics, and of cost, constraints and boundary conditions."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton.analysis._examine import Question, examine
-from maneuver_automaton.analysis.region import Region
-from maneuver_automaton.analysis.report import SymmetryReport, unit_of
+from maneuver_automaton.analysis.examine import (
+    NOWHERE,
+    Question,
+    Region,
+    SymmetryReport,
+    examine,
+    unit_of,
+    values_of,
+)
 from maneuver_automaton.groups import LieGroup
 from maneuver_automaton.models import (
     Model,
@@ -199,3 +207,236 @@ def _cause_in(region: Region) -> Callable[[tuple[str, ...], tuple[int, ...]], st
         return "it depends on the height, as with thinner air"
 
     return cause
+
+
+StateControlFunction = Callable[[Array, Array], ArrayLike]
+"""``l(x, u)`` or ``g(x, u)`` of one state (n_x,) and one control (n_u,): one or more numbers."""
+
+BoundaryFunction = Callable[[Array, Array], ArrayLike]
+"""``r(x_0, x_T)`` of the first and the last state (n_x,): one or more numbers."""
+
+
+def check_stage_cost(
+    stage_cost: StateControlFunction,
+    *,
+    region: Region,
+    rng: np.random.Generator | None = None,
+    samples: int = 100,
+    tolerance: float = 1e-9,
+) -> SymmetryReport:
+    """Whether a stage cost ``l(x, u)`` has the same value at a moved state.
+
+    Source: the paper, Def. 7.
+
+    Parameters
+    ----------
+    stage_cost : callable
+        ``l(x, u)`` of one state (n_x,), pose first, and one control (n_u,).
+    region : Region
+        Group, and where states and controls are drawn.
+    rng : Generator, optional
+        Source of the samples; always the same ones if None.
+    samples : int
+        Random states for each coordinate of the group.
+    tolerance : float
+        Greatest change admitted, relative to the value there (at least 1) [-].
+
+    Returns
+    -------
+    SymmetryReport
+        Where the worst change happens, and which motions leave the cost alone.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> region = Region.of(SE2, n_controls=2)
+    >>> check_stage_cost(lambda x, u: u @ u, region=region).holds
+    True
+    >>> check_stage_cost(lambda x, u: x[0] ** 2 + x[1] ** 2, region=region).intact
+    ('rotation',)
+    """
+    return _check("stage cost", stage_cost, region, rng, samples, tolerance)
+
+
+def check_constraint(
+    constraint: StateControlFunction,
+    *,
+    region: Region,
+    rng: np.random.Generator | None = None,
+    samples: int = 100,
+    tolerance: float = 1e-9,
+) -> SymmetryReport:
+    """Whether a constraint ``g(x, u) <= 0``, of one or more rows, has the same value when moved.
+
+    Source: the paper, Def. 7. Parameters and result are those of `check_stage_cost`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> region = Region.of(SE2, n_controls=2)
+    >>> report = check_constraint(lambda x, u: [u[0] - 1.0, x[1] - 3.0], region=region)
+    >>> report.components
+    ('constraint 2',)
+    """
+    return _check("constraint", constraint, region, rng, samples, tolerance)
+
+
+def check_boundary_condition(
+    boundary_condition: BoundaryFunction,
+    *,
+    region: Region,
+    rng: np.random.Generator | None = None,
+    samples: int = 100,
+    tolerance: float = 1e-9,
+) -> SymmetryReport:
+    """Whether a boundary condition ``r(x_0, x_T) = 0`` stays the same when both ends are moved.
+
+    A fixed start or goal never does; `shifted_problem` moves it along.
+
+    Source: the paper, Def. 7. Parameters are those of `check_stage_cost`; the state of the report
+    is the pair of ends (2, n_x).
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> region = Region.of(SE2, n_controls=2)
+    >>> def distance(first, last):
+    ...     return np.hypot(*(last - first)[:2]) - 3.0
+    >>> check_boundary_condition(distance, region=region).holds
+    True
+    """
+
+    def defect(by: LieGroup, state: Array, control: Array) -> tuple[Array, float]:
+        here = values_of("r(x_0, x_T)", boundary_condition(state[0], state[1]))
+        first, last = moved_state(by, state)
+        change = values_of("r(x_0, x_T)", boundary_condition(first, last)) - here
+        return change, float(np.abs(here).max(initial=0.0))
+
+    return examine(
+        _cost_question("boundary condition"),
+        defect,
+        region=region,
+        draw=lambda rng: (np.array([region.state(rng), region.state(rng)]), NOWHERE),
+        rng=rng,
+        samples=samples,
+        tolerance=tolerance,
+    )
+
+
+def _check(
+    what: str,
+    function: StateControlFunction,
+    region: Region,
+    rng: np.random.Generator | None,
+    samples: int,
+    tolerance: float,
+) -> SymmetryReport:
+    def defect(by: LieGroup, state: Array, control: Array) -> tuple[Array, float]:
+        here = values_of(what, function(state, control))
+        change = values_of(what, function(moved_state(by, state), control)) - here
+        return change, float(np.abs(here).max(initial=0.0))
+
+    return examine(
+        _cost_question(what),
+        defect,
+        region=region,
+        draw=lambda rng: (region.state(rng), region.control(rng)),
+        rng=rng,
+        samples=samples,
+        tolerance=tolerance,
+    )
+
+
+def _cost_question(what: str) -> Question:
+    def cause(broken: tuple[str, ...], violated: tuple[int, ...]) -> str:
+        place = any(motion.startswith(("translation", "climb")) for motion in broken)
+        depends = "the place" if place else "a direction of the world"
+        return f"it depends on {depends}: shift its references along with the problem"
+
+    return Question(
+        what=what,
+        names=lambda i: "value" if what == "stage cost" else f"{what} {i + 1}",
+        units=lambda i: "",
+        cause=cause,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Equivalence:
+    """How two motions are related: ``a == group_element b``, up to `worst_deviation`."""
+
+    equivalent: bool
+    group_element: LieGroup  # moves the first pose of b onto the first pose of a
+    worst_deviation: float  # greatest difference of a coordinate [m, rad, the model's units]
+    worst_time: float  # when it occurs [s]
+    component: str  # coordinate in which it occurs; reduced states are z1, z2, ...
+
+
+def same_motion_primitive(
+    trajectory_a: ArrayLike,
+    trajectory_b: ArrayLike,
+    *,
+    times: ArrayLike,
+    group: type[LieGroup],
+    tolerance: float = 1e-9,
+) -> Equivalence:
+    """Whether one group element moves all of motion b onto motion a.
+
+    The element is that which joins the first poses. Headings are compared as they are, so a motion
+    with a full turn more is another motion; reduced states have to agree unmoved.
+
+    Source: the paper, Def. 4.
+
+    Parameters
+    ----------
+    trajectory_a, trajectory_b : (n, n_x) arrays
+        States at the same instants: pose, then reduced state.
+    times : (n,) array
+        These instants [s], counted from the start of each motion.
+    group : type[LieGroup]
+        Group that moves the poses.
+    tolerance : float
+        Greatest difference of a coordinate admitted [m, rad, the model's units].
+
+    Returns
+    -------
+    Equivalence
+        The group element, and how well it fits.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit together.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.groups import SE2
+    >>> times = np.linspace(0.0, 2.0, 5)
+    >>> coast = SE2.exp(times[:, None] * [1.0, 0.0, 0.5])
+    >>> a = (SE2([0.0, 1.0, 0.0]) @ coast).pose
+    >>> b = (SE2([4.0, 0.0, np.pi]) @ coast).pose
+    >>> same = same_motion_primitive(a, b, times=times, group=SE2)
+    >>> same.equivalent, same.group_element.pose.round(3).tolist()
+    (True, [4.0, 1.0, -3.142])
+    """
+    a, b = as_array("trajectory_a", trajectory_a), as_array("trajectory_b", trajectory_b)
+    times = as_array("times", times)
+    if a.ndim != 2 or a.shape[1] < group.dof or a.shape != b.shape or len(times) != len(a):
+        raise ValueError(
+            f"same_motion_primitive: got shapes {a.shape}, {b.shape} and {times.shape} for "
+            f"trajectory_a, trajectory_b and times, need (n, n_x) twice, with n_x at least "
+            f"{group.dof}, and (n,)"
+        )
+    if not len(times):
+        raise ValueError("same_motion_primitive: got no samples, need at least 1")
+    element = group(a[0, : group.dof]) @ group(b[0, : group.dof]).inverse()
+    deviation = np.abs(moved_state(element, b) - a)
+    row, column = np.unravel_index(int(np.argmax(deviation)), deviation.shape)
+    names = (*group.coordinates, *(f"z{i + 1}" for i in range(a.shape[1] - group.dof)))
+    return Equivalence(
+        equivalent=bool(deviation[row, column] <= tolerance),
+        group_element=element,
+        worst_deviation=float(deviation[row, column]),
+        worst_time=float(times[row]),
+        component=names[column],
+    )

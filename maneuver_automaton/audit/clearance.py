@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from maneuver_automaton.audit._kernels_still import Found, Sides, Ways, nearest_still
 from maneuver_automaton.audit.frames import Spans
+from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.pairs import StillEdges, bounded, moving_pairs, on_arcs, overlapped
 from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of, time_of
-from maneuver_automaton.audit.surroundings import Surroundings
 
 CONTACT = 1e-9  # [m] what is closer touches: places are rounded
 SHARP = (1e-3, 0.01)  # [m], and of the distance: by how much less may be reported

@@ -15,15 +15,18 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
 from maneuver_automaton.audit.drive import Drive, driven
 from maneuver_automaton.audit.frames import Frames, Spans
-from maneuver_automaton.audit.outlines import body_outline, directions, point_apart, points_of
-from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
-from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
-from maneuver_automaton.audit.surroundings import (
+from maneuver_automaton.audit.outlines import (
     Surroundings,
+    body_outline,
+    directions,
     origin_of,
+    point_apart,
+    points_of,
     surroundings_around,
     surroundings_of,
 )
+from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
+from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of
 from maneuver_automaton.collision.zones import Zone

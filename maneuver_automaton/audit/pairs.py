@@ -15,6 +15,7 @@ from maneuver_automaton.audit.frames import Spans
 from maneuver_automaton.audit.outlines import (
     Outline,
     Points,
+    Surroundings,
     crossed,
     directions,
     point_apart,
@@ -28,7 +29,6 @@ from maneuver_automaton.audit.passages import (
     bounds_of,
     places_of,
 )
-from maneuver_automaton.audit.surroundings import Surroundings
 
 T = TypeVar("T")
 

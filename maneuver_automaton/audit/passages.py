@@ -21,13 +21,13 @@ from maneuver_automaton.audit.frames import Frames, Spans
 from maneuver_automaton.audit.outlines import (
     BodyOutline,
     Points,
+    Surroundings,
     crossed,
     directions,
     point_apart,
     points_of,
     squared,
 )
-from maneuver_automaton.audit.surroundings import Surroundings
 
 AT_ONCE = 512  # pairs: with more, arrays no longer stay where they are quickly read
 ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off

@@ -147,11 +147,7 @@ def raised(
     """
     cells, families = program.cells, program.motions.families
     base, layer = _filled(program)
-    weights = _weights(cells, families).astype(np.float32)
-    table = np.zeros((families.side.size, 4, weights.shape[1]), dtype=np.float32)
-    table[:, 0:2, :-1] = weights[:, :-1].transpose(0, 2, 1)
-    table[:, 2:4, :-1] = weights[:, 1:].transpose(0, 2, 1)
-    rates = (families.turn_rate / cells.turn).astype(np.float32)
+    table, rates = _directions(cells, families, 4)
     single = np.ascontiguousarray(value, dtype=np.float32)
     single = single.copy() if single is value else single
     room = np.empty_like(single)
@@ -197,17 +193,23 @@ def _weights(cells: Cells, families: Families) -> Array:
     return np.asarray(ahead * scale[:, None, None])
 
 
-def _rows(program: Program) -> Rows:
-    cells, families = program.cells, program.motions.families
-    weights = _weights(cells, families)
-    table = np.zeros((families.side.size, 7, weights.shape[1]), dtype=np.float32)
+def _directions(cells: Cells, families: Families, rows: int) -> tuple[Single, Single]:
+    """The directions at both layers of each cell (F, rows, K + 1), what follows 0; turn rates."""
+    weights = _weights(cells, families).astype(np.float32)
+    table = np.zeros((families.side.size, rows, weights.shape[1]), dtype=np.float32)
     table[:, 0:2, :-1] = weights[:, :-1].transpose(0, 2, 1)
     table[:, 2:4, :-1] = weights[:, 1:].transpose(0, 2, 1)
+    return table, (families.turn_rate / cells.turn).astype(np.float32)
+
+
+def _rows(program: Program) -> Rows:
+    cells, families = program.cells, program.motions.families
+    table, rates = _directions(cells, families, 7)
     steps = 1.0 / np.maximum(program.weight * program.rate, 1e-30)
     table[:, 4:7, :-1] = steps[:, :, :-1]
     return Rows(
         table=table.reshape(-1),
-        turn=(families.turn_rate / cells.turn).astype(np.float32),
+        turn=rates,
         side=families.side,
         gear=families.gear,
     )

@@ -233,7 +233,7 @@ def design(
     path = target(out, "library.json")
     if file.suffix == ".json":
         return _disperse(file, path, instead=instead, quiet=quiet)
-    from maneuver_automaton.scenario.build_file import design_of_file
+    from maneuver_automaton.design.library_design import design_of_file
 
     make_folder(path.parent)
     with waiting("choosing trims, and proving their factor", quiet=quiet):

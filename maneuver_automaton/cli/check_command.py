@@ -12,7 +12,7 @@ import numpy as np
 from maneuver_automaton import analysis, planning
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.analysis import SymmetryReport
-from maneuver_automaton.analysis.report import listed
+from maneuver_automaton.analysis.examine import listed
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.cli.automaton_command import few, report_lines

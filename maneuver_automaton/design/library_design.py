@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +15,15 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.analysis.coverage import poses_in_ball
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.design.choice import Choice, best_choices
-from maneuver_automaton.design.mixing import mixing_factors
+from maneuver_automaton.design.choice import Choice, best_choices, mixing_factors
 from maneuver_automaton.design.proof import SEED, WordsProof, proven_factor
 from maneuver_automaton.design.reeds_shepp import MOST_TRIMS
+from maneuver_automaton.formats.text_source import read_text
+from maneuver_automaton.formats.yaml_source import parse
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.scenario.build_file import build_file_of_text
+from maneuver_automaton.scenario.parts import at
+from maneuver_automaton.scenario.scenario import cost_of
 
 SAME = 1e-9  # relative: twists per cost that differ by less are one
 SAMPLES = 1000  # goals at which the factor of short words is looked at first
@@ -325,3 +331,58 @@ def _check(
 def _check_positive(name: str, value: float, unit: str) -> None:
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"design: {name} must be positive, got {value} {unit}")
+
+
+def design_of_file(
+    path: Path | str, *, instead: Mapping[str, float] | None = None
+) -> DesignedLibrary:
+    """The library that a design file asks for: a build file with the key `design`.
+
+    Values of `within`, `most`, `max_trims` and `radius_m` in `instead` hold instead of those
+    stated.
+
+    Raises
+    ------
+    InvalidScenario
+        If the file cannot be read or used: one line with file, line, field, the value met, and
+        what would be right.
+    """
+    return design_of_text(read_text(Path(path)), name=str(path), instead=instead)
+
+
+def design_of_text(
+    text: str, *, name: str, instead: Mapping[str, float] | None = None
+) -> DesignedLibrary:
+    """The library that the text of a design file asks for; see `design_of_file`.
+
+    Examples
+    --------
+    >>> designed = design_of_text(
+    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, "
+    ...     "trims: {speed: [-1, 1], turn_rate: [-1, -0.5, 0, 0.5, 1]}, design: {within: 1.2}}",
+    ...     name="robots.yaml")
+    >>> len(designed.automaton), designed.factor
+    (6, 1.0)
+    """
+    asked = build_file_of_text(text, name=name)
+    document = parse(text, name=name, what="a design file")
+    if asked.design is None:
+        raise document.error(
+            (), "misses the key design: how the trims are chosen, such as {within: 1.05}"
+        )
+    part = asked.design.model_copy(update=dict(instead or {}))
+    with at(document, ("trims",)):
+        candidates = Automaton(asked.model, asked.trims, name=asked.name)
+    cost = cost_of(document, part.cost, candidates, within=("design",))
+    with at(document, ("design",)):
+        return design_library(
+            candidates,
+            cost=cost,
+            within=part.within,
+            most=part.most,
+            max_trims=part.max_trims,
+            radius=part.radius_m,
+            tasks=part.tasks,
+            least=part.least_m,
+            tolerance=part.tolerance,
+        )

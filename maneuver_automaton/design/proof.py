@@ -43,6 +43,11 @@ class WordsProof:
     def __post_init__(self) -> None:
         freeze(self, "worst", last=3)
 
+    def factors(self, goals: Array) -> Array:
+        """The factors (n,) at goals (n, 3); NaN where the shortest path is not long enough."""
+        sizes = {"turning_radius": self.turning_radius, "least": self.least}
+        return factors_at(goals, max_trims=self.max_trims, **sizes)
+
 
 def word_lengths(goals: ArrayLike, *, radius: float, max_trims: int) -> Array:
     """Length (...,) of the shortest word of six trims to poses (..., 3) that is looked at [m].

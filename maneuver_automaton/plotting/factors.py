@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +12,6 @@ from matplotlib.collections import QuadMesh
 from matplotlib.patches import Circle
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.design import WordsProof
-from maneuver_automaton.design.proof import factors_at
 from maneuver_automaton.plotting.colors import GREY, INK
 from maneuver_automaton.plotting.ends import draw_goal, draw_headings
 from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
@@ -23,7 +22,40 @@ PLACES, HEADINGS = 51, 37  # from the start to the edge of the disc, and around
 ARROW = 0.08  # of the radius
 
 
-def draw_factor(ax: Axes, proof: WordsProof) -> QuadMesh:
+class FactorsOfWords(Protocol):
+    """What is proven of the words of a designed library, `DesignedLibrary.words`."""
+
+    @property
+    def max_trims(self) -> int:
+        """Trims that a word has at most."""
+        ...
+
+    @property
+    def radius(self) -> float:
+        """Of the disc of goals [m]."""
+        ...
+
+    @property
+    def factor(self) -> float:
+        """No goal has a greater one."""
+        ...
+
+    @property
+    def sampled(self) -> float:
+        """Some goal has it."""
+        ...
+
+    @property
+    def worst(self) -> Array:
+        """The goal that has it (3,) [m, m, rad]."""
+        ...
+
+    def factors(self, goals: Array) -> Array:
+        """The factors (n,) at goals (n, 3); NaN where none counts."""
+        ...
+
+
+def draw_factor(ax: Axes, proof: FactorsOfWords) -> QuadMesh:
     """Draw the factor over the goals of a `proof`: at each place that of the worst heading.
 
     The start is in the middle and looks to the right; the worst goal that was met is marked.
@@ -32,7 +64,7 @@ def draw_factor(ax: Axes, proof: WordsProof) -> QuadMesh:
     ----------
     ax : Axes
         Where to draw; its scale is made equal in x and y.
-    proof : WordsProof
+    proof : FactorsOfWords
         What was proven, `DesignedLibrary.words`.
 
     Returns
@@ -73,7 +105,7 @@ def draw_factor(ax: Axes, proof: WordsProof) -> QuadMesh:
     return places
 
 
-def save_factor_figure(proof: WordsProof, path: str | Path) -> None:
+def save_factor_figure(proof: FactorsOfWords, path: str | Path) -> None:
     """Write a picture of the factor over the goals of a `proof`; see `draw_factor`.
 
     Raises
@@ -96,7 +128,7 @@ def save_factor_figure(proof: WordsProof, path: str | Path) -> None:
     write_figure(figure, path)
 
 
-def _worst_factors(proof: WordsProof, half: Array) -> Array:
+def _worst_factors(proof: FactorsOfWords, half: Array) -> Array:
     """Greatest factor (2 n - 1, 2 n - 1) over all headings at each place; NaN where none counts.
 
     A quarter of the places is looked at: `half` (n,) are its sides, from zero on. Mirrored, or
@@ -107,13 +139,7 @@ def _worst_factors(proof: WordsProof, half: Array) -> Array:
     most = np.full(int(inside.sum()), np.nan)
     for heading in np.linspace(-math.pi, math.pi, HEADINGS):
         goals = np.column_stack([x[inside], y[inside], np.full(len(most), heading)])
-        factors = factors_at(
-            goals,
-            turning_radius=proof.turning_radius,
-            max_trims=proof.max_trims,
-            least=proof.least,
-        )
-        most = np.fmax(most, factors)
+        most = np.fmax(most, proof.factors(goals))
     quarter = np.full(x.shape, np.nan)
     quarter[inside] = most
     upper = np.concatenate([quarter[:, :0:-1], quarter], axis=1)

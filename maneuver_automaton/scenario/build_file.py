@@ -24,7 +24,6 @@ from maneuver_automaton.automaton.building import (
 )
 from maneuver_automaton.automaton.library import model_of as model_of_entry
 from maneuver_automaton.automaton.library import save_library
-from maneuver_automaton.design import DesignedLibrary, design_library
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
 from maneuver_automaton.models import Model
@@ -49,7 +48,6 @@ from maneuver_automaton.scenario.parts import (
     need,
     optional,
 )
-from maneuver_automaton.scenario.scenario import cost_of
 from maneuver_automaton.scenario.schema import CostPart
 from maneuver_automaton.scenario.vehicles import VehiclePart, model_of
 
@@ -328,58 +326,3 @@ def _check_maneuvers(document: Document, asked: BuildFile) -> None:
                 f"the {asked.model.name} has no control {control!r}, need some of "
                 f"{', '.join(asked.model.control_names)}",
             )
-
-
-def design_of_file(
-    path: Path | str, *, instead: Mapping[str, float] | None = None
-) -> DesignedLibrary:
-    """The library that a design file asks for: a build file with the key `design`.
-
-    Values of `within`, `most`, `max_trims` and `radius_m` in `instead` hold instead of those
-    stated.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read or used: one line with file, line, field, the value met, and
-        what would be right.
-    """
-    return design_of_text(read_text(Path(path)), name=str(path), instead=instead)
-
-
-def design_of_text(
-    text: str, *, name: str, instead: Mapping[str, float] | None = None
-) -> DesignedLibrary:
-    """The library that the text of a design file asks for; see `design_of_file`.
-
-    Examples
-    --------
-    >>> designed = design_of_text(
-    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, "
-    ...     "trims: {speed: [-1, 1], turn_rate: [-1, -0.5, 0, 0.5, 1]}, design: {within: 1.2}}",
-    ...     name="robots.yaml")
-    >>> len(designed.automaton), designed.factor
-    (6, 1.0)
-    """
-    asked = build_file_of_text(text, name=name)
-    document = parse(text, name=name, what="a design file")
-    if asked.design is None:
-        raise document.error(
-            (), "misses the key design: how the trims are chosen, such as {within: 1.05}"
-        )
-    part = asked.design.model_copy(update=dict(instead or {}))
-    with at(document, ("trims",)):
-        candidates = Automaton(asked.model, asked.trims, name=asked.name)
-    cost = cost_of(document, part.cost, candidates, within=("design",))
-    with at(document, ("design",)):
-        return design_library(
-            candidates,
-            cost=cost,
-            within=part.within,
-            most=part.most,
-            max_trims=part.max_trims,
-            radius=part.radius_m,
-            tasks=part.tasks,
-            least=part.least_m,
-            tolerance=part.tolerance,
-        )

@@ -17,8 +17,9 @@ from maneuver_automaton.analysis.stability import (
     certified_horizon,
     certified_intervals,
     check_closed_loop,
+    continuous_index,
+    discrete_index,
 )
-from maneuver_automaton.analysis.suboptimality import continuous_index, discrete_index
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.models import Unicycle

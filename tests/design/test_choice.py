@@ -11,8 +11,7 @@ from scipy.optimize import linprog
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.design.choice import best_choices
-from maneuver_automaton.design.mixing import mixing_costs, mixing_factors
+from maneuver_automaton.design.choice import best_choices, mixing_costs, mixing_factors
 from maneuver_automaton.models import Omnidirectional, Unicycle
 
 

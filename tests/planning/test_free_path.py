@@ -11,7 +11,7 @@ import shapely
 from benchmarks.unreachable import FAMILIES
 from maneuver_automaton import Automaton, Box, Car, plan
 from maneuver_automaton.bounds import Connection, widest_path
-from maneuver_automaton.bounds.connectivity import connectivity
+from maneuver_automaton.bounds.separation import connectivity
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import SearchSettings
