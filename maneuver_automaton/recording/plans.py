@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning import PlanResult
-from maneuver_automaton.recording.values import Fact, Mover, Recording, Search, bodies_of, world_of
+from maneuver_automaton.recording.values import Fact, Mover, Recording, Search, mover_of, world_of
 
 
 def recorded(result: Plan | PlanResult) -> Recording | None:
@@ -24,18 +24,8 @@ def recorded(result: Plan | PlanResult) -> Recording | None:
 
 
 def _answer(result: PlanResult) -> Recording:
-    problem, plan = result.problem, result.plan
-    stands = Plan(problem.start, (), durations=[], start_time=problem.start_time)
-    mover = Mover(
-        pieces=(stands if plan is None else plan,),
-        model=problem.automaton.model,
-        bodies=bodies_of(problem),
-        problem=problem,
-        has_plan=plan is not None,
-        reached=plan is not None,
-        reason=result.reason,
-        cost=result.cost,
-    )
+    problem, bound, narrow = result.problem, result.bound, result.narrowest
+    mover = mover_of(problem, result.plan, reason=result.reason, cost=result.cost)
     return Recording(
         kind="plan",
         title="Plan",
@@ -49,7 +39,17 @@ def _answer(result: PlanResult) -> Recording:
             replace(mover, pieces=(one.plan,), end=None, cost=one.cost)
             for one in result.alternatives
         ),
-        search=_search(result),
+        search=Search(
+            improvements=result.improvements,
+            bounds=() if bound is None else bound.history,
+            cost=result.cost,
+            bound=result.lower_bound,
+            kind="" if bound is None else bound.kind,
+            nodes=result.nodes,
+            reached=result.reached,
+            narrowest=None if narrow is None else np.array(narrow.place),
+            missing_m=0.0 if narrow is None else narrow.missing,
+        ),
     )
 
 
@@ -110,19 +110,4 @@ def _facts(result: PlanResult) -> list[Fact]:
         bound=None if result.gap is None else result.lower_bound,
         clearance=result.clearance_m,
         error=None if error is None else (error.position_m, error.heading_rad),
-    )
-
-
-def _search(result: PlanResult) -> Search:
-    bound, narrowest = result.bound, result.narrowest
-    return Search(
-        improvements=result.improvements,
-        bounds=() if bound is None else bound.history,
-        cost=result.cost,
-        bound=result.lower_bound,
-        kind="" if bound is None else bound.kind,
-        nodes=result.nodes,
-        reached=result.reached,
-        narrowest=None if narrowest is None else np.array(narrowest.place),
-        missing_m=0.0 if narrowest is None else narrowest.missing,
     )
