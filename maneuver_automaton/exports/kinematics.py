@@ -57,11 +57,8 @@ def kinematics(rows: PlanArrays, samples: PlanArrays, model: Model | None) -> di
         felt = accelerations(rows.twist, rates)
         inertia = bool(model.reduced_names) and _has_inertia(model, rows)
     columns["curvature_1_m"] = _curvature(rows, rates, model)
-    names = (rows.reduced_names, rows.reduced_state), (rows.control_names, rows.control)
-    for known, block in names:
-        if "steering" in known:
-            columns["steering_rad"] = block[:, known.index("steering")]
-            break
+    if (steering := component(rows, "steering")) is not None:
+        columns["steering_rad"] = steering
     if model is None:
         return columns
     if inertia:
@@ -70,6 +67,17 @@ def kinematics(rows: PlanArrays, samples: PlanArrays, model: Model | None) -> di
     if inertia:
         columns["jerk_m_s3"], columns["lateral_jerk_m_s3"] = _jerk(model, rows).T
     return columns
+
+
+def component(rows: PlanArrays, name: str) -> Array | None:
+    """A component (n,) of the reduced state or the control; None if the model has none."""
+    for names, values in (
+        (rows.reduced_names, rows.reduced_state),
+        (rows.control_names, rows.control),
+    ):
+        if name in names:
+            return np.asarray(values[:, names.index(name)])
+    return None
 
 
 def _arc_length(times: Array, samples: PlanArrays, model: Model | None) -> Array:

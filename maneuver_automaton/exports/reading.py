@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.closed_loop_json import load_closed_loop, read_closed_loop_document
+from maneuver_automaton.formats.documents import told_of
 from maneuver_automaton.formats.fleet_json import load_fleet
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.formats.plan_json import (
@@ -25,7 +26,7 @@ from maneuver_automaton.formats.plan_json import (
 )
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, Recording, recording_of
-from maneuver_automaton.recording.values import bodies_of, world_of
+from maneuver_automaton.recording.values import mover_of, world_of
 from maneuver_automaton.roads import (
     RoadFleetResult,
     RoadPlanner,
@@ -180,15 +181,12 @@ def _answer(
 
 def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -> Plan | None:
     """The plan of one vehicle, or what it drove; None if it has none."""
-    plan: Plan | None
-    try:
+    plan: Plan | None = None
+    with told_of(path):
         if "steps" in document:
             plan = _road_drive(document, road)
-        else:
-            plan = plan_of_document(document) if document["status"] == "found" else None
-    except (ValueError, KeyError, TypeError, IndexError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{path}: {said}") from error
+        elif document["status"] == "found":
+            plan = plan_of_document(document)
     if plan is not None:
         _check_start(path, plan, road.vehicle.rear_of(road.scene.start.middle))
     return plan
@@ -213,10 +211,7 @@ def _planned(path: Path, scenario: Scenario) -> Recording:
             f"{path}: automaton_hash: this plan was made with another library than that of --with"
         )
     _check_start(path, plan, problem.start)
-    mover = Mover(
-        pieces=(plan,), model=problem.automaton.model, bodies=bodies_of(problem), problem=problem,
-        cost=document.get("cost"),
-    )  # fmt: skip
+    mover = mover_of(problem, plan, cost=document.get("cost"))
     return Recording(kind="plan", title=scenario.name, movers=(mover,), world=world_of(problem))
 
 

@@ -85,7 +85,10 @@ def save_rerun(value: Any, path: Path | str, *, step: float = STEP) -> None:
             names = (mover.name,) if several else ()
             _log_motion(log, shown_of(mover), table, names)
             _log_goals(log, mover, names)
-            _log_curves(log, table, names)
+            columns = table.columns()  # a pose shows in space, the rest over time
+            for name in list(columns)[1 + table.pose.shape[1] : -1]:
+                at = log.entity("curves", *names, name)
+                log.curve(at, table.time, columns[name], name)
         _log_surroundings(log, recording)
         stream.flush()
         stream.disconnect()
@@ -210,13 +213,6 @@ def _log_moving(
     log.at_time(f"{at}/body", low, log.outlines(rings, MOVING))
     if last < end:
         log.at_time(f"{at}/body", last, log.rerun.Clear(recursive=False))
-
-
-def _log_curves(log: _Log, rows: PlanArrays, names: tuple[str, ...]) -> None:
-    """Speeds, reduced state and control over time; a pose shows in space."""
-    columns = rows.columns()
-    for name in list(columns)[1 + rows.pose.shape[1] : -1]:
-        log.curve(log.entity("curves", *names, name), rows.time, columns[name], name)
 
 
 def _blueprint(views: Any) -> Any:

@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.kinematics import accelerations, twist_rates
+from maneuver_automaton.exports.kinematics import accelerations, component, twist_rates
 from maneuver_automaton.exports.recorded import drivers, exported
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
@@ -135,11 +135,17 @@ def _messages(
     headers = [{"stamp": one, "frame_id": frame} for one in stamps]
     parts = [(prefix + name, poses) for name, poses in _carried(mover, rows)]
     frames = [(body_frame, rows.pose), *parts]
-    places = zip(headers, _poses(rows.pose), strict=True)
+    places = zip(headers, _transforms(rows.pose), strict=True)
     messages: dict[str, Any] = {
         "path": {
             "header": headers[0],
-            "poses": [{"header": header, "pose": pose} for header, pose in places],
+            "poses": [
+                {
+                    "header": header,
+                    "pose": {"position": at["translation"], "orientation": at["rotation"]},
+                }
+                for header, at in places
+            ],
         },
         "trajectory": _trajectory(frames, rows, since, headers[0], mover.model),
         "cmd_vel": [
@@ -147,7 +153,7 @@ def _messages(
             for one, twist in zip(stamps, _twists(rows.twist), strict=True)
         ],
     }
-    steering = _column(rows, "steering")
+    steering = component(rows, "steering")
     if steering is not None:
         messages["ackermann_cmd"] = _ackermann(rows, steering, stamps, body_frame)
     return messages | {"tf": _frames(frames, headers)}
@@ -213,7 +219,7 @@ def _ackermann(
 ) -> list[Message]:
     """Speed and steering angle; a rate of zero asks for the change at once."""
     nothing = np.zeros(len(rows.time))
-    rate, acceleration = (_column(rows, name) for name in ("steering_rate", "acceleration"))
+    rate, acceleration = (component(rows, name) for name in ("steering_rate", "acceleration"))
     fields = {
         "steering_angle": steering,
         "steering_angle_velocity": nothing if rate is None else rate,
@@ -228,17 +234,6 @@ def _ackermann(
         }
         for k, stamp in enumerate(stamps)
     ]
-
-
-def _column(rows: PlanArrays, name: str) -> Array | None:
-    """A component (n,) of the reduced state or the control; None if the model has none."""
-    for names, values in (
-        (rows.reduced_names, rows.reduced_state),
-        (rows.control_names, rows.control),
-    ):
-        if name in names:
-            return np.asarray(values[:, names.index(name)])
-    return None
 
 
 def _carried(mover: Mover, rows: PlanArrays) -> list[tuple[str, Array]]:
@@ -268,13 +263,6 @@ def _rates(time: Array, pose: Array) -> Array:
     if len(time) < 2:
         return np.zeros_like(pose)
     return np.asarray(np.gradient(pose, time, axis=0))
-
-
-def _poses(pose: Array) -> list[Message]:
-    return [
-        {"position": one["translation"], "orientation": one["rotation"]}
-        for one in _transforms(pose)
-    ]
 
 
 def _transforms(pose: Array) -> list[Message]:
@@ -355,36 +343,26 @@ def save_ros2_bag(
         value, step=step, stamp=stamp, frame=frame, body_frame=body_frame, model=model
     )
     folder = Path(path)
-    _check_free(folder)
+    if folder.exists() and not folder.is_dir():
+        raise FileExistsError(17, "is a file, need a folder for a bag", str(folder))
+    if folder.exists() and any(
+        one.name != METADATA and one.suffix not in STORED for one in folder.iterdir()
+    ):
+        raise FileExistsError(17, "is a folder with other files, need a new one", str(folder))
     beside = folder.parent / f"{PART}{uuid.uuid4().hex}"
     beside.mkdir(parents=True)
     try:
         _write(messages, beside / folder.name)
-        _replace(folder, by=beside / folder.name, old=beside / "old")
+        if there := folder.exists():
+            folder.rename(beside / "old")
+        try:
+            (beside / folder.name).rename(folder)
+        except OSError:
+            if there:  # the old one stays
+                (beside / "old").rename(folder)
+            raise
     finally:
         shutil.rmtree(beside, ignore_errors=True)
-
-
-def _check_free(folder: Path) -> None:
-    if not folder.exists():
-        return
-    if not folder.is_dir():
-        raise FileExistsError(17, "is a file, need a folder for a bag", str(folder))
-    if any(one.name != METADATA and one.suffix not in STORED for one in folder.iterdir()):
-        raise FileExistsError(17, "is a folder with other files, need a new one", str(folder))
-
-
-def _replace(folder: Path, *, by: Path, old: Path) -> None:
-    """Put a folder in the place of another; where that fails, the old one stays."""
-    there = folder.exists()
-    if there:
-        folder.rename(old)
-    try:
-        by.rename(folder)
-    except OSError:
-        if there:
-            old.rename(folder)
-        raise
 
 
 def _write(messages: dict[str, Any], folder: Path) -> None:
@@ -409,24 +387,19 @@ def _write(messages: dict[str, Any], folder: Path) -> None:
             )
             for topic, kind in kinds.items()
         }
-        for time, topic, message in _in_time(messages):
+        single_first = sorted(messages, key=lambda topic: not _is_single(topic))
+        timed = [
+            (_stamp_of(one), topic, one)
+            for topic in single_first
+            for one in ([messages[topic]] if _is_single(topic) else messages[topic])
+        ]
+        for time, topic, message in sorted(timed, key=lambda row: row[0]):
             built = _built(store, kinds[topic], message)
             bag.write(connections[topic], time, store.serialize_cdr(built, kinds[topic]))
 
 
 def _is_single(topic: str) -> bool:
     return topic.rpartition("/")[2] in SINGLE
-
-
-def _in_time(messages: dict[str, Any]) -> list[tuple[int, str, Message]]:
-    """Time [ns], topic and message, in the order of the times; single ones first."""
-    topics = sorted(messages, key=lambda topic: not _is_single(topic))
-    timed = [
-        (_stamp_of(one), topic, one)
-        for topic in topics
-        for one in ([messages[topic]] if _is_single(topic) else messages[topic])
-    ]
-    return sorted(timed, key=lambda row: row[0])
 
 
 def _stamp_of(message: Message) -> int:
@@ -455,25 +428,18 @@ def _field(store: Any, kind: Any, value: Any) -> Any:
 
 def _latched() -> list[Any]:
     """Who subscribes later gets the last message too."""
-    from rosbags.interfaces import (
-        Qos,
-        QosDurability,
-        QosHistory,
-        QosLiveliness,
-        QosReliability,
-        QosTime,
-    )
+    from rosbags import interfaces as ros
 
-    never = QosTime(0, 0)
+    never = ros.QosTime(0, 0)
     return [
-        Qos(
-            history=QosHistory.KEEP_LAST,
+        ros.Qos(
+            history=ros.QosHistory.KEEP_LAST,
             depth=1,
-            reliability=QosReliability.RELIABLE,
-            durability=QosDurability.TRANSIENT_LOCAL,
+            reliability=ros.QosReliability.RELIABLE,
+            durability=ros.QosDurability.TRANSIENT_LOCAL,
             deadline=never,
             lifespan=never,
-            liveliness=QosLiveliness.SYSTEM_DEFAULT,
+            liveliness=ros.QosLiveliness.SYSTEM_DEFAULT,
             liveliness_lease_duration=never,
             avoid_ros_namespace_conventions=False,
         )

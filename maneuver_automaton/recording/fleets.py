@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from maneuver_automaton.fleet import (
 from maneuver_automaton.fleet.driven import whole_pieces
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.recording.values import (
     Curve,
     Event,
@@ -34,6 +36,7 @@ from maneuver_automaton.recording.values import (
     proven,
     shown,
     times_of,
+    mover_of,
     world_of,
 )
 
@@ -68,23 +71,18 @@ def _planned(result: FleetResult, k: int) -> Mover:
     name, problem = fleet.names[k], fleet.problems[k]
     answer = result.results[name]
     plan = answer.plan
-    stands = Plan(
-        problem.start, (problem.first_trim,), durations=[0.0], start_time=problem.start_time
-    )
-    leaves = fleet.leaves[k] and plan is not None
-    gone = problem.start_time if plan is None else plan.start_time + plan.duration
-    return Mover(
-        name=name,
-        pieces=(plan or stands,),
-        model=problem.automaton.model,
-        bodies=bodies_of(problem),
-        problem=problem,
-        has_plan=plan is not None,
-        reached=plan is not None,
-        reason="" if plan is not None else result.reasons.get(name) or answer.reason,
-        cost=answer.cost,
-        there=(-math.inf, float(gone) if leaves else math.inf),
-    )
+    if plan is None:
+        why = result.reasons.get(name) or answer.reason
+        return _standing(problem, name=name, reason=why, cost=answer.cost)
+    gone = float(plan.start_time + plan.duration) if fleet.leaves[k] else math.inf
+    return mover_of(problem, plan, name=name, cost=answer.cost, there=(-math.inf, gone))
+
+
+def _standing(problem: Problem, **more: Any) -> Mover:
+    """Who has no plan: a piece of no time, with the names of its states."""
+    first, when = problem.first_trim, problem.start_time
+    stands = Plan(problem.start, (first,), durations=[0.0], start_time=when)
+    return mover_of(problem, None, pieces=(stands,), **more)
 
 
 def _plan_facts(result: FleetResult) -> list[Fact]:
@@ -167,22 +165,17 @@ def _driven(log: FleetLog, k: int) -> Mover:
     name, problem = fleet.names[k], fleet.problems[k]
     pieces, begin, arrived = _filled(log, name), float(log.times[0]), log.arrived_s.get(name)
     if not pieces:
-        stands = Plan(problem.start, (problem.first_trim,), durations=[0.0])
-        return Mover(
-            name=name, pieces=(stands,), model=problem.automaton.model, bodies=bodies_of(problem),
-            problem=problem, has_plan=False, reached=False, reason="it was never let in",
-            there=(math.inf, math.inf),
-        )  # fmt: skip
+        why, never = "it was never let in", (math.inf, math.inf)
+        return _standing(problem, name=name, reason=why, there=never)
     why = "it broke down" if name in log.broken_down else "it is under way still"
     first = pieces[0].start_time
     joins = first > begin and next(iter(log.pieces_of(name))) > 0
     gone = arrived if fleet.leaves[k] and arrived is not None else math.inf
-    return Mover(
+    return mover_of(
+        problem,
+        pieces[0],
         name=name,
         pieces=pieces,
-        model=problem.automaton.model,
-        bodies=bodies_of(problem),
-        problem=problem,
         reached=arrived is not None,
         arrived_s=arrived,
         reason="" if arrived is not None else why,

@@ -23,6 +23,7 @@ from maneuver_automaton.recording.values import (
     times_of,
     world_of,
 )
+from maneuver_automaton.recording.values import Curve, Event, Fact, Recording, mover_of, world_of
 
 
 def recorded(result: ClosedLoop | Statistics) -> Recording | None:
@@ -37,32 +38,19 @@ def recorded(result: ClosedLoop | Statistics) -> Recording | None:
 def _loop(loop: ClosedLoop) -> Recording:
     problem, begin = loop.problem, float(loop.times[0])
     still = Plan(loop.poses[0], (), durations=[], start_time=begin)
-    held = [(float(step.time), step.plan) for step in loop.steps]
-    mover = Mover(
+    mover = mover_of(
+        problem,
+        still,
         pieces=loop.driven or (still,),
         end=loop.poses[-1],
-        model=problem.automaton.model,
-        bodies=bodies_of(problem),
-        problem=problem,
         reached=loop.reached,
         reason=loop.reason,
         cost=loop.cost,
-        held=tuple(held),
+        held=tuple((float(step.time), step.plan) for step in loop.steps),
     )
-    values = Curve(
-        label="value", time=loop.times, value=np.array([*(s.value for s in loop.steps), loop.value])
-    )
-    spent = Curve(
-        label="spent",
-        time=loop.times,
-        value=np.array([*(step.accumulated_cost for step in loop.steps), loop.cost]),
-    )
-    bound = Curve(
-        label="lower bound",
-        time=loop.times[:-1],
-        value=np.array([step.lower_bound for step in loop.steps]),
-    )
-    solve = Curve(label="solve time", unit="s", time=loop.times[:-1], value=loop.solve_s)
+    values = np.array([*(step.value for step in loop.steps), loop.value])
+    spent = np.array([*(step.accumulated_cost for step in loop.steps), loop.cost])
+    begins, bounds = loop.times[:-1], np.array([step.lower_bound for step in loop.steps])
     return Recording(
         kind="closed_loop",
         title="Closed loop",
@@ -73,7 +61,12 @@ def _loop(loop: ClosedLoop) -> Recording:
         movers=(mover,),
         world=world_of(problem),
         events=tuple(_events(loop)),
-        curves=(values, spent, bound, solve),
+        curves=(
+            Curve(label="value", time=loop.times, value=values),
+            Curve(label="spent", time=loop.times, value=spent),
+            Curve(label="lower bound", time=begins, value=bounds),
+            Curve(label="solve time", unit="s", time=begins, value=loop.solve_s),
+        ),
     )
 
 

@@ -22,8 +22,8 @@ from maneuver_automaton.recording.values import (
     Search,
     Table,
     asked_for,
-    bodies_of,
     effort_facts,
+    mover_of,
     proven,
     world_of,
 )
@@ -45,18 +45,8 @@ def recorded(result: Plan | PlanResult) -> Recording | None:
 
 
 def _answer(result: PlanResult) -> Recording:
-    problem, plan = result.problem, result.plan
-    stands = Plan(problem.start, (), durations=[], start_time=problem.start_time)
-    mover = Mover(
-        pieces=(stands if plan is None else plan,),
-        model=problem.automaton.model,
-        bodies=bodies_of(problem),
-        problem=problem,
-        has_plan=plan is not None,
-        reached=plan is not None,
-        reason=result.reason,
-        cost=result.cost,
-    )
+    problem, bound, narrow = result.problem, result.bound, result.narrowest
+    mover = mover_of(problem, result.plan, reason=result.reason, cost=result.cost)
     return Recording(
         kind="plan",
         title="Plan",
@@ -70,7 +60,17 @@ def _answer(result: PlanResult) -> Recording:
             replace(mover, pieces=(one.plan,), end=None, cost=one.cost)
             for one in result.alternatives
         ),
-        search=_search(result),
+        search=Search(
+            improvements=result.improvements,
+            bounds=() if bound is None else bound.history,
+            cost=result.cost,
+            bound=result.lower_bound,
+            kind="" if bound is None else bound.kind,
+            nodes=result.nodes,
+            reached=result.reached,
+            narrowest=None if narrow is None else np.array(narrow.place),
+            missing_m=0.0 if narrow is None else narrow.missing,
+        ),
     )
 
 
@@ -146,21 +146,6 @@ def _facts(result: PlanResult) -> list[Fact]:
         *effort_facts(result.timing_s, result.counts),
         Fact(label="notes", value="; ".join(result.notes), heads=False),
     ]
-
-
-def _search(result: PlanResult) -> Search:
-    bound, narrowest = result.bound, result.narrowest
-    return Search(
-        improvements=result.improvements,
-        bounds=() if bound is None else bound.history,
-        cost=result.cost,
-        bound=result.lower_bound,
-        kind="" if bound is None else bound.kind,
-        nodes=result.nodes,
-        reached=result.reached,
-        narrowest=None if narrowest is None else np.array(narrowest.place),
-        missing_m=0.0 if narrowest is None else narrowest.missing,
-    )
 
 
 def tables(result: PlanResult) -> list[Table]:

@@ -330,6 +330,24 @@ class Recording:
         return max(one.end_time for one in self.movers)
 
 
+def mover_of(problem: Problem, plan: Plan | None, **more: Any) -> Mover:
+    """Who is to solve a problem, with what it drives; without a plan it stands, and did not arrive.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0)})
+    >>> one = mover_of(Problem(robot, [0, 0, 0], [2, 0, 0]), None, reason="it is late")
+    >>> one.has_plan, one.reached, one.end.tolist(), one.reason
+    (False, False, [0.0, 0.0, 0.0], 'it is late')
+    """
+    if plan is None:
+        plan = Plan(problem.start, (), durations=[], start_time=problem.start_time)
+        more = {"has_plan": False, "reached": False} | more
+    its = {"pieces": (plan,), "model": problem.automaton.model, "bodies": bodies_of(problem)}
+    return Mover(**{**its, "problem": problem, **more})
+
+
 def bodies_of(problem: Problem) -> dict[str, tuple[Shape, ...]]:
     """The shapes of a problem's vehicle, and those of what it carries."""
     return {"": tuple(problem.footprint)} | {
