@@ -10,13 +10,7 @@ from matplotlib.ticker import NullFormatter
 from maneuver_automaton.planning import PlanResult
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE
 from maneuver_automaton.plotting.look import Look
-from maneuver_automaton.plotting.pages import (
-    axes_at,
-    heading_text,
-    new_figure,
-    title_lines,
-    write_figure,
-)
+from maneuver_automaton.plotting.pages import plain_page, write_figure
 from maneuver_automaton.plotting.style import tidy
 
 EARLIEST = 1e-3  # [s] from where time is drawn, on a logarithmic axis
@@ -35,14 +29,11 @@ def save_progress_figure(result: PlanResult, path: str | Path, *, title: str = "
     """
     if result.plan is None or result.cost is None or result.bound is None:
         raise ValueError("progress: the result holds no plan, so there is nothing to draw")
-    figure = new_figure(6.4, 3.9)
-    look = Look(title=title)
-    ax = axes_at(figure, left=0.75, bottom=0.6, width=4.3, height=2.65)
-    draw_progress(ax, result)
     gap = 0.0 if result.gap is None else 100.0 * result.gap
     said = "proven optimal" if result.bound.optimal else f"gap {gap:.2g} % by {result.bound.kind}"
-    headline = f"Cost {result.cost:.6g}, {said}"
-    heading_text(figure, title_lines(look, 5.8, headline), left=0.3)
+    lines = [f"Cost {result.cost:.6g}, {said}"]
+    figure, axes = plain_page(Look(title=title), lines, [["search"]], width=6.4, height=3.3)
+    draw_progress(axes["search"], result)
     write_figure(figure, path)
 
 
