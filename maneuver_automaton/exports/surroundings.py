@@ -11,9 +11,8 @@ from maneuver_automaton.collision import Disc, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.rectangles import blocked_rectangles
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.footprint import footprint_polygons
+from maneuver_automaton.plotting.footprint import footprint_polygons, merged, swept_region
 from maneuver_automaton.plotting.obstacles import round_times
-from maneuver_automaton.plotting.swept import merged, swept_region
 from maneuver_automaton.plotting.track import Track, joined_track
 from maneuver_automaton.recording import Mover, Recording
 

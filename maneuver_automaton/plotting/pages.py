@@ -169,7 +169,7 @@ def space_page(
 def plain_page(
     look: Look,
     lines: Sequence[str],
-    mosaic: list[list[str]],
+    mosaic: list[Any],
     *,
     width: float,
     height: float,
