@@ -35,7 +35,7 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.lower_bound import known_bound
 from maneuver_automaton.problem import Bounds, Goal, Horizon, SearchSettings
-from maneuver_automaton.scenario.presets import preset_automaton
+from maneuver_automaton.scenario.automata import preset_automaton
 from maneuver_automaton.search.lattice import _enclosed, distance_grids
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_query import lattice_query

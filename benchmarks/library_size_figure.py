@@ -18,10 +18,11 @@ from matplotlib.ticker import (
 
 from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.plotting.colors import SEQUENCE
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.pages import plain_page, write_figure
 from maneuver_automaton.plotting.style import outer_legend, tidy
 
-WIDTH, LEFT, RIGHT, HEIGHT, BETWEEN = 9.6, 0.8, 0.2, 2.9, 0.95  # [in]
+WIDTH, HEIGHT = 9.6, 3.4  # [in] of the page, and below its title
 COST, MEDIAN, SLOWEST = SEQUENCE[0], SEQUENCE[2], SEQUENCE[1]
 LEAST_GAP = 0.09  # between numbers of trims, of the axis
 NARROW = 10.0  # costs within this factor are numbered by round numbers, not by decades
@@ -126,14 +127,9 @@ def save_library_size_figure(sizes: LibrarySizes, path: str | Path, *, title: st
     OSError
         If the file cannot be written; an old one stays as it was.
     """
-    top = 0.5 if title else 0.2
-    figure = new_figure(WIDTH, 0.6 + HEIGHT + top)
-    if title:
-        heading_text(figure, [(title, 10.0, "bold")], left=LEFT)
-    wide = (WIDTH - LEFT - RIGHT - BETWEEN) / 2.0
-    left = axes_at(figure, left=LEFT, bottom=0.6, width=wide, height=HEIGHT)
-    right = axes_at(figure, left=WIDTH - RIGHT - wide, bottom=0.6, width=wide, height=HEIGHT)
-    draw_library_sizes(left, right, sizes)
+    sides = [["costs", "times"]]
+    figure, axes = plain_page(Look(title=title), [], sides, width=WIDTH, height=HEIGHT)
+    draw_library_sizes(axes["costs"], axes["times"], sizes)
     write_figure(figure, path)
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from maneuver_automaton.cli import run
-from maneuver_automaton.cli.user_model import user_model
+from maneuver_automaton.cli.inputs import user_model
 
 MODULE = """
 from maneuver_automaton.groups import SE2

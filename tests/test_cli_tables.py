@@ -11,6 +11,8 @@ from rich.cells import cell_len
 from maneuver_automaton import Automaton, Plan, Problem, SecondOrderCar, Unicycle
 from maneuver_automaton.audit.judge import TerminalError
 from maneuver_automaton.cli import tables
+from maneuver_automaton.audit.values import TerminalError
+from maneuver_automaton.cli import terminal
 from maneuver_automaton.collision import Box
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.planning.result import LowerBound
@@ -26,7 +28,7 @@ CAR = SecondOrderCar(
 
 
 def print_result(result) -> None:
-    tables.print_result("x", tables_of(result), recording_of(result).facts)
+    terminal.print_result("x", tables_of(result), recording_of(result).facts)
 
 
 def driven(controls: list[tuple[float, float, float]]) -> Maneuver:

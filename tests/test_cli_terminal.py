@@ -72,7 +72,7 @@ COMPILES = """
 import time
 from numba.core import event
 from maneuver_automaton._compile_all import _bar
-from maneuver_automaton.cli.progress import announced, progress_bar, waiting
+from maneuver_automaton.cli.terminal import announced, progress_bar, waiting
 
 with announced(), progress_bar("files", 2, quiet=False), waiting("planning", quiet=False):
     time.sleep(0.3)

@@ -508,11 +508,11 @@ def plot(
     files state neither body nor obstacles: --with its scenario, all is drawn as plan and mpc do. A
     closed loop alone is drawn as an arc from step to step.
     """
-    from maneuver_automaton.cli import plot_command
+    from maneuver_automaton.cli import result_commands
     from maneuver_automaton.cli.options import LookOptions
 
     look = LookOptions(title=title, size=size, style=style)
-    return plot_command.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
+    return result_commands.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
 
 
 @app.command(epilog=ending("export"))
@@ -553,7 +553,7 @@ def export(
     the file given. --with its scenario it holds the body and what is around it; a closed loop and a
     solution for CommonRoad need that.
     """
-    from maneuver_automaton.cli import export_command
+    from maneuver_automaton.cli import result_commands
     from maneuver_automaton.cli.inputs import Parts
 
     parts = Parts(beside=with_file, case=case, model=model)
@@ -561,7 +561,7 @@ def export(
         if step is not None or not 0.0 < rate < math.inf:
             raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
         step = 1.0 / rate
-    return export_command.export(file, to, out, parts=parts, step=step)
+    return result_commands.export(file, to, out, parts=parts, step=step)
 
 
 @app.command(epilog=ending("schema"))

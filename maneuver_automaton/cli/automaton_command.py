@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.table import Table
 
@@ -23,13 +22,10 @@ from maneuver_automaton.cli.inputs import (
 )
 from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw
-from maneuver_automaton.cli.progress import Advance, counted, progress_bar, waiting
-from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.cli.terminal import Advance, console, counted, progress_bar, table, waiting
+from maneuver_automaton.design import DesignedLibrary, disperse_library
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
-
-if TYPE_CHECKING:
-    from maneuver_automaton.design import DesignedLibrary
-
+from maneuver_automaton.scenario import build_file
 
 MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
 EVERY_POSE = "every pose can be reached in free space, by words of any length"
@@ -39,10 +35,8 @@ def build(
     file: Path, out: Path, *, jobs: int = 1, scheduler: str | None = None, quiet: bool = False
 ) -> int:
     """Write the library of a scenario, or of a build file."""
-    from maneuver_automaton.scenario.build_file import is_build_file
-
     path = target(out, "library.json")
-    if is_build_file(file):
+    if build_file.is_build_file(file):
         return _build_maneuvers(file, path, jobs=jobs, scheduler=scheduler, quiet=quiet)
     with waiting("making the library", quiet=quiet):
         automaton = automaton_of(file)
@@ -63,8 +57,6 @@ def _build_maneuvers(
     file: Path, path: Path, *, jobs: int, scheduler: str | None, quiet: bool
 ) -> int:
     """Trims of a build file and their maneuvers, with a bar; trims and pairs without are listed."""
-    from maneuver_automaton.scenario import build_file
-
     with waiting("finding the trims", quiet=quiet):
         asked = build_file.load_build_file(file)
         pairs = asked.pairs()
@@ -256,8 +248,6 @@ def design(
 
 def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bool) -> int:
     """The library of a library file, with fewer maneuvers."""
-    from maneuver_automaton.design import disperse_library
-
     others = [key for key in instead if key != "most"]
     if others or "most" not in instead:
         raise InvalidScenario(

@@ -18,7 +18,7 @@ from maneuver_automaton._kernel_folders import (
 from maneuver_automaton._kernel_list import listed
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain
 from maneuver_automaton.cli.inputs import not_written
-from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.cli.terminal import console, table
 from maneuver_automaton.search.cost_to_go import FOLDER, MOST_BYTES
 
 MEGABYTE = 1e6  # [bytes]

@@ -20,8 +20,7 @@ from maneuver_automaton.cli.check_plans import Finding
 from maneuver_automaton.cli.check_plans import findings as findings_of_plans
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN
 from maneuver_automaton.cli.inputs import Parts, problem_of
-from maneuver_automaton.cli.progress import announced, waiting
-from maneuver_automaton.cli.tables import console, table
+from maneuver_automaton.cli.terminal import announced, console, table, waiting
 from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
 from maneuver_automaton.formats.fleet_json import reason_of

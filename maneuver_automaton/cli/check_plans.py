@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.cli.inputs import Parts, scenario_of
-from maneuver_automaton.cli.planned import fleet_planned, road_fleet
-from maneuver_automaton.cli.progress import announced
+from maneuver_automaton.cli.inputs import Parts, fleet_planned, road_fleet, scenario_of
+from maneuver_automaton.cli.terminal import announced
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import (

@@ -18,9 +18,10 @@ from maneuver_automaton.cli.inputs import (
     not_written,
     problem_of,
 )
-from maneuver_automaton.cli.tables import console, print_written
+from maneuver_automaton.cli.terminal import console, print_written
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
+from maneuver_automaton.formats.documents import KINDS, schema_of
 from maneuver_automaton.formats.libraries import (
     JSON,
     MPRIM,
@@ -32,7 +33,7 @@ from maneuver_automaton.formats.libraries import (
 from maneuver_automaton.formats.nav2_map import save_nav2_map
 from maneuver_automaton.formats.registry import YAML_ENDINGS, map_writer_of
 from maneuver_automaton.formats.statement import MapFile
-from maneuver_automaton.scenario import FleetScenario, Scenario, statements_of, to_yaml
+from maneuver_automaton.scenario import FleetScenario, Scenario, json_schema, statements_of, to_yaml
 
 KEEP_MULTIPLIERS = (MPRIM, JSON)  # but Nav2's kind of JSON
 
@@ -141,9 +142,6 @@ def _write_scenario(scenario: Scenario | FleetScenario, source: Path, target: Pa
 
 def print_schema(document: str | None = None) -> int:
     """Print the JSON Schema of scenario files, or of a kind of document."""
-    from maneuver_automaton.formats.documents import KINDS, schema_of
-    from maneuver_automaton.scenario import json_schema
-
     if document is not None and document not in KINDS:
         raise InvalidScenario(f"--document: got {document!r}, need {', '.join(KINDS)}")
     schema = json_schema() if document is None else schema_of(document)

@@ -10,7 +10,7 @@ import maneuver_automaton
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.cli.guard import FOUND
 from maneuver_automaton.cli.inputs import make_folder, not_written
-from maneuver_automaton.cli.tables import console
+from maneuver_automaton.cli.terminal import console
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import parse

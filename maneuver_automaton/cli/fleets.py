@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
-from maneuver_automaton.cli.progress import progress_bar, waiting
 from maneuver_automaton.cli.single import STEPS
+from maneuver_automaton.cli.terminal import progress_bar, waiting
 from maneuver_automaton.fleet import (
     FleetLog,
     FleetResult,
@@ -18,7 +17,9 @@ from maneuver_automaton.fleet import (
     simulate_fleet,
     verify_driven,
 )
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.fleet.held import fleet_with_room, tube_of
+from maneuver_automaton.formats.fleet_json import reason_of, save_fleet
+from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, save_fleet_loop
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.recording.fleets import judged_facts
 from maneuver_automaton.scenario import FleetScenario
@@ -26,8 +27,6 @@ from maneuver_automaton.scenario import FleetScenario
 
 def planned(job: Job, scenario: FleetScenario) -> JobResult:
     """Plan them all."""
-    from maneuver_automaton.formats.fleet_json import reason_of, save_fleet
-
     options, said = job.options, scenario.settings
     limit, best = options.budgets.time_limit or scenario.time_limit_s, [""]
 
@@ -98,17 +97,12 @@ def driven(job: Job, scenario: FleetScenario) -> JobResult:
         when = ", when the loop was interrupted" if stopped() else ""
         complaints.append(f"{log.status}: {log.reason}{when}")
 
-    def save(path: Path) -> None:
-        from maneuver_automaton.formats.fleet_loop_json import save_fleet_loop
-
-        save_fleet_loop(
-            log, path, driven=verdict, name=name, source=_source(job), interrupted=stopped()
-        )
-
     return JobResult(
         name=name,
         result=log,
-        save=save,
+        save=lambda path: save_fleet_loop(
+            log, path, driven=verdict, name=name, source=_source(job), interrupted=stopped()
+        ),
         done=log.reached and verdict.passed and not broken,
         status=log.status,
         complaints=tuple(complaints),
@@ -152,8 +146,6 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
 
 def _first_plans(job: Job, scenario: FleetScenario) -> FleetResult | None:
     """Plans of those that are there from the begin on, if there are any, as a loop needs them."""
-    from maneuver_automaton.fleet.held import fleet_with_room, tube_of
-
     part, fleet = scenario.receding_horizon, scenario.fleet
     assert part is not None
     there = [name for name in fleet.names if name not in scenario.joins_s]

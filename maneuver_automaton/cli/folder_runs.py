@@ -15,7 +15,7 @@ from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import check_scheduler, in_parallel
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import Parts, not_written
-from maneuver_automaton.cli.progress import progress_bar
+from maneuver_automaton.cli.terminal import console, progress_bar, table
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.movingai import map_beside
 from maneuver_automaton.formats.registry import (
@@ -159,14 +159,10 @@ def _journal(out: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
 
 
 def _say(line: str) -> None:
-    from maneuver_automaton.cli.tables import console
-
     console().print(line, soft_wrap=True, markup=False)
 
 
 def _print_rows(rows: Sequence[Row]) -> None:
-    from maneuver_automaton.cli.tables import console, table
-
     def shown(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}g}"
 

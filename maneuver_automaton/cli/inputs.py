@@ -1,18 +1,35 @@
-"""Files named on the command line: what to load of them, and where results go."""
+"""Files and a model named on the command line: what to load of them, and where results go."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import difflib
+import functools
+import importlib
+import inspect
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.cli.guard import complain
-from maneuver_automaton.cli.user_model import user_model
 from maneuver_automaton.errors import InvalidScenario
-
-if TYPE_CHECKING:
-    from maneuver_automaton.automaton import Automaton
-    from maneuver_automaton.scenario import FleetScenario, Scenario
+from maneuver_automaton.formats.commonroad import n_problems
+from maneuver_automaton.formats.libraries import read_primitives
+from maneuver_automaton.formats.plan_json import read_fleet_document
+from maneuver_automaton.models import Model
+from maneuver_automaton.models.kinds import KINDS
+from maneuver_automaton.roads import RoadFleetResult
+from maneuver_automaton.scenario import (
+    FleetScenario,
+    RoadScenario,
+    Scenario,
+    load_scenario,
+    remarks_on,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,8 +48,6 @@ def is_road(path: Path) -> bool:
 
 def states_several(path: Path, parts: Parts) -> bool:
     """Whether a file of CommonRoad states several problems, and --case picks none of them."""
-    from maneuver_automaton.formats.commonroad import n_problems
-
     try:
         return parts.case is None and n_problems(path) > 1
     except OSError:
@@ -46,8 +61,6 @@ def problem_of(
 
     What is legal in it, but hardly meant, is remarked on.
     """
-    from maneuver_automaton.scenario import RoadScenario, load_scenario, remarks_on
-
     parts = parts or Parts()
     own = None if parts.model is None else user_model(parts.model)
     found = load_scenario(path, beside=parts.beside, case=parts.case, model=own)
@@ -61,8 +74,6 @@ def problem_of(
 
 def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
     """The problem of a file of one vehicle, completed by `parts`."""
-    from maneuver_automaton.scenario import Scenario
-
     found = problem_of(path, parts)
     if not isinstance(found, Scenario):
         raise InvalidScenario(
@@ -81,9 +92,6 @@ def automaton_of(path: Path, model: str | None = None) -> Automaton:
 
 def named_automaton(path: Path, model: str | None = None) -> tuple[Automaton, str]:
     """The automaton of a file, see `automaton_of`, and the name of the scenario or library."""
-    from maneuver_automaton.automaton.library import load_library
-    from maneuver_automaton.formats.libraries import read_primitives
-
     own = None if model is None else user_model(model)
     if (read := read_primitives(path)) is not None:
         if own is not None:
@@ -117,3 +125,161 @@ def not_written(path: Path, error: Exception) -> InvalidScenario:
     return InvalidScenario(
         f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}"
     )
+
+
+def fleet_planned(path: Path, document: Mapping[str, Any], parts: Parts) -> FleetScenario:
+    """The scenario of --with, or that which the plans of a file name.
+
+    Raises
+    ------
+    InvalidScenario
+        If they name none, it is not there, or it states one vehicle.
+    """
+    file, its = source_of(path, document, parts)
+    scenario = problem_of(file, its)
+    if not isinstance(scenario, FleetScenario):
+        raise InvalidScenario(f"{path}: holds plans of several vehicles, but {file} states one")
+    return scenario
+
+
+def road_fleet(path: Path, parts: Parts, *, alone: bool = False) -> RoadFleetResult | None:
+    """Plans or loops of several vehicles on the road of a CommonRoad file; None of any other.
+
+    One `alone` is read, too, where --with names such a file.
+    """
+    from maneuver_automaton import exports
+
+    try:
+        document = read_fleet_document(path)
+    except InvalidScenario:
+        return None  # told by who reads the plan of one vehicle
+    if document is None and not (alone and parts.beside is not None):
+        return None
+    road, its = source_of(path, document or {}, parts)
+    if not is_road(road):
+        return None
+    return exports.load_road_fleet(path, beside=road, vehicle=its.beside, case=its.case)
+
+
+def source_of(path: Path, document: Mapping[str, Any], parts: Parts) -> tuple[Path, Parts]:
+    """The file that plans were made from, and what completes it: by --with, or as they say."""
+    if parts.beside is not None:
+        return parts.beside, replace(parts, beside=None)
+    said = document.get("source")
+    if not isinstance(said, dict) or not isinstance(said.get("file"), str):
+        raise InvalidScenario(
+            f"{path}: source: is missing, need --with and the file it was planned from"
+        )
+    beside, case = said.get("with"), said.get("case")
+    file = _beside(path, said["file"])
+    if not file.is_file():
+        raise InvalidScenario(f"{path}: source: there is no {file}, need --with and that file")
+    return file, replace(
+        parts,
+        beside=_beside(path, beside) if isinstance(beside, str) else None,
+        case=case if isinstance(case, int) and parts.case is None else parts.case,
+    )
+
+
+def _beside(path: Path, name: str) -> Path:
+    """A file as seen from another one: by its name alone, whatever links are on the way."""
+    return Path(os.path.normpath(path.parent / name))
+
+
+NEEDED = (
+    "name",
+    "group",
+    "control_names",
+    "reduced_names",
+    "control_limits",
+    "reduced_limits",
+    "part_names",
+    "velocity",
+    "dynamics",
+    "body_velocity",
+    "reduced_dynamics",
+    "part_poses",
+)
+
+
+@functools.lru_cache(maxsize=8)
+def user_model(text: str) -> Model:
+    """The model OBJECT of the module MODULE, which is looked for in the current folder first.
+
+    A class or a function that needs no parameters is called.
+
+    Raises
+    ------
+    InvalidScenario
+        If there is no such module or object, it is no model, needs parameters, or has the name of
+        a model of the package.
+    """
+    module_name, _, name = text.partition(":")
+    if not (module_name and name):
+        raise _wrong(f"got {text!r}, need MODULE:OBJECT, such as boats:BOAT")
+    found = _object(_module(module_name), module_name, name)
+    if inspect.isclass(found) or inspect.isroutine(found):
+        found = _made(found, text)
+    missing = [key for key in NEEDED if not hasattr(found, key)]
+    if missing:
+        raise _wrong(
+            f"{text} is no model, it is of the type {type(found).__name__} and has no "
+            f"{', '.join(missing)}; need a maneuver_automaton.UserModel, or all that one has"
+        )
+    if found.name in KINDS:
+        raise _wrong(
+            f"{text} is called {found.name!r}, as a model of the package is; need another name"
+        )
+    model: Model = found
+    return model
+
+
+def _module(name: str) -> Any:
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    importlib.invalidate_caches()
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        if error.name is not None and f"{name}.".startswith(f"{error.name}."):
+            raise _wrong(
+                f"there is no module {error.name!r} in {here} or among the installed packages"
+            ) from error
+        raise _broken(name, error) from error
+    except Exception as error:  # whatever the user's code raises
+        raise _broken(name, error) from error
+
+
+def _object(module: Any, module_name: str, name: str) -> Any:
+    found = module
+    for step in name.split("."):
+        if not hasattr(found, step):
+            near = difflib.get_close_matches(step, vars(module), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise _wrong(f"the module {module_name!r} has no {name!r}{hint}")
+        found = getattr(found, step)
+    return found
+
+
+def _made(make: Any, text: str) -> Any:
+    """What a class or function without parameters returns."""
+    try:
+        inspect.signature(make).bind()
+    except (TypeError, ValueError) as error:
+        raise _wrong(
+            f"{text} does not fit: it cannot be called without parameters ({error}); need a model "
+            "that is made already"
+        ) from error
+    try:
+        return make()
+    except Exception as error:
+        raise _wrong(f"{text} raises {type(error).__name__}: {error}") from error
+
+
+def _broken(name: str, error: Exception) -> InvalidScenario:
+    return _wrong(f"the module {name!r} cannot be imported: {type(error).__name__}: {error}")
+
+
+def _wrong(said: str) -> InvalidScenario:
+    return InvalidScenario(f"--model: {said}")

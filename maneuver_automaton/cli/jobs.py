@@ -23,10 +23,11 @@ from maneuver_automaton.cli.inputs import (
     states_several,
 )
 from maneuver_automaton.cli.options import Options, refuse_unknown
-from maneuver_automaton.cli.pictures import Draughtsman, draughtsman, draw
-from maneuver_automaton.cli.progress import announced
+from maneuver_automaton.cli.pictures import draughtsman, draw
+from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.recording import Fact, recording_of, tables_of
+from maneuver_automaton.scenario import FleetScenario
 
 NEAR = ("clearance", "least clearance", "apart")  # facts that are distances
 INTERRUPTED = "interrupted before there was a plan"
@@ -63,8 +64,6 @@ class JobResult:
 
     def tell(self, folder: str) -> None:
         """Print it, and the folder that it is in; nothing where one vehicle has no plan."""
-        from maneuver_automaton.cli.tables import console, print_result
-
         movers = () if self.result is None else recording_of(self.result).movers
         if len(movers) == 1 and not movers[0].has_plan:
             return
@@ -120,8 +119,6 @@ class Job:
         """The kind of the job, and what the file states."""
         if is_road(self.path):
             return ("roads" if states_several(self.path, self.parts) else "road"), None
-        from maneuver_automaton.scenario import FleetScenario
-
         scenario = problem_of(self.path, self.parts)
         if self.command == "mpc" and scenario.receding_horizon is None:
             raise InvalidScenario(
@@ -167,7 +164,8 @@ def _run_file(job: Job, out: Path) -> int:
     beside = job.command == "plan" and job.options.plot and not is_road(job.path)
     with draughtsman(wanted=beside) as one:
         outcome = job.done(out)
-        begun = one is not None and not stopped() and _begun(one, job, outcome, out)
+        order = (draw, outcome.result, outcome.name, out / "plan", job.options)
+        begun = one is not None and not stopped() and one.begin(*order)
         if not begun:
             job.drawn(outcome, out)
         try:
@@ -181,11 +179,6 @@ def _run_file(job: Job, out: Path) -> int:
             if begun and one is not None and not one.is_done():
                 job.drawn(outcome, out)
     return FOUND if outcome.done else NO_PLAN
-
-
-def _begun(one: Draughtsman, job: Job, outcome: JobResult, out: Path) -> bool:
-    """Whether another process draws it."""
-    return one.begin(draw, outcome.result, outcome.name, out / "plan", job.options)
 
 
 def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: Parts) -> int:

@@ -6,13 +6,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from maneuver_automaton.cli.inputs import Parts
 from maneuver_automaton.errors import InvalidScenario
-
-if TYPE_CHECKING:  # Matplotlib takes half a second
-    from maneuver_automaton.plotting import Look
+from maneuver_automaton.plotting.look import Look, size_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +31,6 @@ class LookOptions:
 
     def look(self, name: str = "") -> Look:
         """The look of a picture of the scenario `name`; raises InvalidScenario."""
-        from maneuver_automaton.plotting.look import Look, size_of
-
         title = self.title if self.title is not None else name
         if self.title is None and self.style == "paper":
             title = ""  # the caption has it

@@ -9,14 +9,12 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from maneuver_automaton._interrupts import is_main_program
 from maneuver_automaton.cli.options import Options
+from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.recording import Recording, recording_of
-
-if TYPE_CHECKING:  # Matplotlib takes half a second
-    from maneuver_automaton.plotting import Look
 
 
 def draw(result: Any, name: str, file: Path, options: Options) -> None:

@@ -12,7 +12,7 @@ from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.guard import complain
 from maneuver_automaton.cli.inputs import states_several
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
-from maneuver_automaton.cli.progress import progress_bar, waiting
+from maneuver_automaton.cli.terminal import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import source_entry, write_document
 from maneuver_automaton.formats.road_json import (

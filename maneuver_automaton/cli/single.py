@@ -10,7 +10,12 @@ from maneuver_automaton import planning
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
-from maneuver_automaton.cli.progress import counted, has_terminal, progress_bar, waiting
+from maneuver_automaton.cli.terminal import counted, has_terminal, progress_bar, waiting
+from maneuver_automaton.formats.closed_loop_json import (
+    load_steps,
+    save_closed_loop,
+    save_statistics,
+)
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, simulate, simulate_many
@@ -123,8 +128,6 @@ def driven(job: Job, scenario: Scenario) -> JobResult:
         how["disturbance"] = None if noise is None else disturbance_of(noise, seed=options.seed)
         problem, last = scenario.problem, None
         if options.resume is not None:
-            from maneuver_automaton.formats.closed_loop_json import load_steps
-
             done, poses = load_steps(options.resume, problem.automaton)
             if done:
                 last, problem = done[-1], replace(problem, start=poses[-1])
@@ -136,8 +139,6 @@ def driven(job: Job, scenario: Scenario) -> JobResult:
 
 
 def _driven(loop: ClosedLoop, name: str) -> JobResult:
-    from maneuver_automaton.formats.closed_loop_json import save_closed_loop
-
     broken = [f"step {n} broke a guarantee: {one}" for n, one in loop.violations]
     disturbed = [
         f"step {n} was disturbed: {one}"
@@ -158,8 +159,6 @@ def _driven(loop: ClosedLoop, name: str) -> JobResult:
 
 def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
     """Drive the loop with seed after seed."""
-    from maneuver_automaton.formats.closed_loop_json import save_statistics
-
     options, count = job.options, job.options.seeds
     assert count is not None
     first = options.seed or 0

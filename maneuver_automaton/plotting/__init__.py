@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.player import Player as Player
     from maneuver_automaton.plotting.player import player_of as player_of
     from maneuver_automaton.plotting.player import player_of_file as player_of_file
-    from maneuver_automaton.plotting.progress import draw_progress as draw_progress
-    from maneuver_automaton.plotting.progress import save_progress_figure as save_progress_figure
+    from maneuver_automaton.plotting.searches import draw_progress as draw_progress
+    from maneuver_automaton.plotting.searches import save_progress_figure as save_progress_figure
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
 
 _HOMES = {

@@ -18,14 +18,7 @@ from maneuver_automaton.plotting.colors import GREY, INK, Color, twist_color
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers
 from maneuver_automaton.plotting.motions import track_colors
-from maneuver_automaton.plotting.pages import (
-    axes_at,
-    heading_height,
-    heading_text,
-    new_figure,
-    title_lines,
-    write_figure,
-)
+from maneuver_automaton.plotting.pages import plain_page, settled, write_figure
 from maneuver_automaton.plotting.paths import ARC_POINTS, DART
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy
 from maneuver_automaton.primitives import Trim
@@ -37,9 +30,8 @@ SHOWN_S = 1.0  # how long each trim is shown [s]
 SPIN_SIZE = 0.45  # of a node, for turns on the spot
 MOST_LEVEL_NAMES = 12
 NAME_PT, NAME_LENGTH, CHARACTER = 7.5, 40, 0.058  # [pt], characters, [in]
-GRAPH, MOTIONS = 4.1, 3.35  # [in] of the graph, and of the motions beside it
-GUTTER, EDGE, LABELS = 0.95, 0.2, 0.5  # [in] between both, on the right, and below axes
-LEAST_GRAPH = 1.5  # [in]
+GRAPH, MOTIONS = 4.4, 3.6  # [in] of the graph, and of the motions beside it
+RAY, LEAST_LENGTH = 0.27, 6  # of the side of a graph, and characters, for a name that sticks out
 RING = 4.2  # [in] of a ring of nodes whose names stick out
 
 
@@ -121,45 +113,36 @@ def save_automaton_figure(
         Title, size and style; a narrow page has the motions below the graph.
     """
     look = look or Look()
-    points = len(automaton) > MOST_NODES
-    stated = look.is_paper or look.size is not None
-    high = GRAPH
+    points, high = len(automaton) > MOST_NODES, GRAPH
     if not points and len(automaton) > MOST_LEVEL_NAMES:
         longest = max(min(len(name), NAME_LENGTH) for name in automaton.trim_names)
         high = RING + 2.0 * CHARACTER * longest  # names stick out like rays
-    page = look.width if stated else high + 1.0 + GUTTER + MOTIONS + EDGE
-    lines = title_lines(look, page - 0.6, _summary(automaton))
-    top = heading_height(lines) + 0.05
+    stated = look.is_paper or look.size is not None
+    width = look.width if stated else high + MOTIONS + 1.0
+    lines, sides = [_summary(automaton)], (max(width - MOTIONS, MOTIONS), MOTIONS)
     if look.is_narrow:
-        side, wide = page - GUTTER, page
-        high = min(high, page)
-        below = min(side, MOTIONS) + LABELS
+        high = min(high, width)
+        figure, axes = plain_page(
+            look, lines, [["graph"], ["motions"]], width=width, height=high + MOTIONS,
+            height_ratios=(high, MOTIONS),
+        )  # fmt: skip
     else:
-        side = min(MOTIONS, 0.36 * page)
-        wide = page - side - GUTTER - EDGE
-        high, below = min(high, wide), 0.0
-    if look.height is not None:
-        high = max(LEAST_GRAPH, look.height - top - LABELS - below)
-    figure = new_figure(page, look.height or top + high + LABELS + below)
-    edge = 0.62 if points else 0.1
-    left = axes_at(
-        figure, left=edge, bottom=below + (LABELS if points else 0.15), width=wide - edge,
-        height=high - (0.35 if points else 0.0),
-    )  # fmt: skip
-    tall = below - LABELS - 0.25 if below else min(MOTIONS + 0.4, high - 0.35)
-    right = axes_at(
-        figure, left=0.75 if below else wide + GUTTER,
-        bottom=LABELS + (0.0 if below else (high - tall - 0.35) / 2.0), width=side, height=tall,
-    )  # fmt: skip
-    draw_automaton(left, automaton)
+        figure, axes = plain_page(
+            look, lines, [["graph", "motions"]], width=width, height=high, width_ratios=sides
+        )
+    graph, motions = axes["graph"], axes["motions"]
     if automaton.maneuvers and not automaton.body_velocities.any():
-        draw_maneuvers(right, automaton.maneuvers)
-        said = f"every maneuver, {np.ptp(right.get_xlim()):.3g} m wide"
+        draw_maneuvers(motions, automaton.maneuvers)
+        said = f"every maneuver, {np.ptp(motions.get_xlim()):.3g} m wide"
     else:
-        draw_motions(right, automaton)
+        draw_motions(motions, automaton)
+        motions.set_box_aspect(1.0)
         said = "1 s of each trim from the same pose"
-    right.set_title(said, fontsize=TEXT_PT, color=INK, loc="left")
-    heading_text(figure, lines, left=0.62 if points else 0.3)
+    motions.set_title(said, fontsize=TEXT_PT, color=INK, loc="left")
+    if not points:
+        graph.set_axis_off()
+        settled(figure)  # the names have room by the size of the axes
+    draw_automaton(graph, automaton)
     write_figure(figure, path)
 
 
@@ -253,7 +236,7 @@ def _places(automaton: Automaton) -> tuple[Array, float]:
 
 def _draw_names(ax: Axes, automaton: Automaton, centres: Array, radius: float) -> tuple[Text, ...]:
     """Names outside the circle; where they are many, they stick out like rays."""
-    names = []
+    names, length = [], _name_length(ax, automaton)
     for name, (x, y) in zip(automaton.trim_names, centres, strict=True):
         out = np.array([x, y]) if x or y else np.array([0.0, 1.0])
         right, up = np.array([x, y]) + 1.18 * radius * out
@@ -266,17 +249,26 @@ def _draw_names(ax: Axes, automaton: Automaton, centres: Array, radius: float) -
             tilt = 0.0
         names.append(
             ax.text(
-                right, up, shortened(name, NAME_LENGTH), fontsize=NAME_PT, color=INK, ha=side,
+                right, up, shortened(name, length), fontsize=NAME_PT, color=INK, ha=side,
                 va=level, rotation=tilt, rotation_mode="anchor", parse_math=False, zorder=5.0,
             )
         )  # fmt: skip
     return tuple(names)
 
 
+def _name_length(ax: Axes, automaton: Automaton) -> int:
+    """Characters of a name; those that stick out like rays have no more than the axes have room."""
+    if len(automaton) <= MOST_LEVEL_NAMES:
+        return NAME_LENGTH
+    side = min(ax.bbox.width, ax.bbox.height) / ax.figure.dpi
+    return max(LEAST_LENGTH, min(NAME_LENGTH, int(RAY * side / CHARACTER)))
+
+
 def _make_room(ax: Axes, automaton: Automaton, radius: float) -> None:
     """Limits that leave room for the names, as far as the size of the axes tells."""
     wide, high = ax.bbox.width / ax.figure.dpi, ax.bbox.height / ax.figure.dpi
-    name = CHARACTER * max(min(len(name), NAME_LENGTH) for name in automaton.trim_names) + 0.1
+    longest = max(map(len, automaton.trim_names))
+    name = CHARACTER * min(longest, _name_length(ax, automaton)) + 0.1
     above = name if len(automaton) > MOST_LEVEL_NAMES else 0.2
     reach = (1.0 if len(automaton) > 1 else 0.0) + 1.2 * radius
     unit = max(min(0.5 * wide - name, 0.5 * high - above), 0.2 * min(wide, high)) / reach  # [in]

@@ -14,10 +14,9 @@ from maneuver_automaton.collision.outline import outlines, rings_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import SEQUENCE, Color, fleet_colors
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.labels import word_text
+from maneuver_automaton.plotting.limits import shape_path
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.obstacles import round_times
-from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.scene import (
     ROOM,
     STILL_SIZE_M,
@@ -26,6 +25,7 @@ from maneuver_automaton.plotting.scene import (
     mark_size,
     view_box,
 )
+from maneuver_automaton.plotting.style import word_text
 from maneuver_automaton.plotting.track import Track, joined_track, track_of_plan
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.recording import Mover, Recording

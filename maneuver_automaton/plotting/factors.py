@@ -14,7 +14,8 @@ from matplotlib.patches import Circle
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK
 from maneuver_automaton.plotting.ends import draw_goal, draw_headings
-from maneuver_automaton.plotting.pages import axes_at, heading_text, new_figure, write_figure
+from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.pages import plain_page, write_figure
 from maneuver_automaton.plotting.style import tidy
 
 SHADES = "viridis_r"
@@ -115,16 +116,13 @@ def save_factor_figure(proof: FactorsOfWords, path: str | Path) -> None:
     OSError
         If the file cannot be written; an old one stays as it was.
     """
-    figure = new_figure(6.4, 5.6)
-    ax = axes_at(figure, left=0.75, bottom=0.6, width=4.3, height=4.3)
-    places = draw_factor(ax, proof)
-    bar = figure.colorbar(places, cax=axes_at(figure, left=5.3, bottom=0.6, width=0.18, height=4.3))
-    bar.set_label("factor, at the worst heading")
     words = (
         f"Words of at most {proof.max_trims} trims: factor {proof.factor:.4g} proven, "
         f"{proof.sampled:.4g} met"
     )
-    heading_text(figure, [(words, 11.0, "bold")], left=0.75)
+    figure, axes = plain_page(Look(), [words], [["goals"]], width=6.4, height=5.0)
+    bar = figure.colorbar(draw_factor(axes["goals"], proof), aspect=24.0, pad=0.03)
+    bar.set_label("factor, at the worst heading")
     write_figure(figure, path)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,21 +17,14 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
 from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.plotting.look import Look
-from maneuver_automaton.plotting.pages import (
-    axes_at,
-    heading_height,
-    heading_text,
-    new_figure,
-    title_lines,
-    write_figure,
-)
+from maneuver_automaton.plotting.pages import plain_page, write_figure
 from maneuver_automaton.plotting.paths import DART
 from maneuver_automaton.plotting.style import SMALL_PT, shortened
 from maneuver_automaton.primitives import Maneuver
 
 MOST_SINGLE = 48  # maneuvers that have a panel each
 MOST_PANELS = 120
-PANEL, LINE, GAP, EDGE = 1.35, 0.11, 0.2, 0.34  # [in]
+PANEL, LINE, LEAST_WIDTH = 1.5, 0.13, 4.8  # [in] of a panel, of a line of its name, of a page
 COLUMNS = 8
 NAME_LENGTH, HARD = 25, "\N{NO-BREAK SPACE}"
 FULL_COLOR = 0.6  # [rad] of a change of heading
@@ -112,41 +105,30 @@ def save_maneuvers_figure(
     look = look or Look()
     left_out, panels = len(panels) - MOST_PANELS, panels[:MOST_PANELS]
     stated = look.is_paper or look.size is not None
-    room = int((look.width - 2.0 * EDGE + GAP) / (PANEL + GAP)) if stated else COLUMNS
-    columns = max(1, min(room, len(panels)))
+    columns = max(1, min(int(look.width / PANEL) if stated else COLUMNS, len(panels)))
     rows = math.ceil(len(panels) / columns)
-    width = max(columns * (PANEL + GAP) - GAP + 2.0 * EDGE, 4.8)
-    width = look.width if stated else width
-    lines = _heading(automaton, look, left_out, width)
-    above = LINE * max(name.count("\n") + 1 for name, _ in panels) + 0.08
-    top, step = heading_height(lines) + 0.1, PANEL + above + GAP
-    figure = new_figure(width, top + rows * step)
-    high = float(figure.get_size_inches()[1])
-    for k, (name, maneuvers) in enumerate(panels):
-        row, column = divmod(k, columns)
-        ax = axes_at(
-            figure, left=EDGE + column * (PANEL + GAP),
-            bottom=high - top - (row + 1) * step + GAP, width=PANEL, height=PANEL,
-        )  # fmt: skip
+    above = LINE * max(name.count("\n") + 1 for name, _ in panels)
+    more = f"; {left_out} more trims are left out" if left_out > 0 else ""
+    name = shortened(automaton.name or automaton.model.name.replace("_", " "), 40)
+    legend = "how wide a panel is stands in it; dots are 1 s apart; orange turns left, blue right"
+    figure, axes = plain_page(
+        replace(look, size=None),
+        [f"{name}: {_count(automaton)}", legend + more],
+        [
+            [str(k) if k < len(panels) else "" for k in range(first, first + columns)]
+            for first in range(0, rows * columns, columns)
+        ],
+        width=look.width if stated else max(columns * PANEL, LEAST_WIDTH),
+        height=rows * (PANEL + above),
+    )
+    for ax, (name, maneuvers) in zip(axes.values(), panels, strict=True):
         draw_maneuvers(ax, maneuvers)
         ax.text(
             0.04, 0.04, f"{np.ptp(ax.get_xlim()):.2g} m", transform=ax.transAxes, color=INK,
             fontsize=SMALL_PT - 2.0,
         )  # fmt: skip
         ax.set_title(name, fontsize=SMALL_PT - 2.0, color=INK, parse_math=False, pad=2.5)
-    heading_text(figure, lines, left=EDGE)
     write_figure(figure, path)
-
-
-def _heading(
-    automaton: Automaton, look: Look, left_out: int, width: float
-) -> list[tuple[str, float, str]]:
-    """Title, what is drawn, and how to read it."""
-    more = f"; {left_out} more trims are left out" if left_out > 0 else ""
-    name = shortened(automaton.name or automaton.model.name.replace("_", " "), 40)
-    legend = "how wide a panel is stands in it; dots are 1 s apart; orange turns left, blue right"
-    said = f"{name}: {_count(automaton)}"
-    return title_lines(look, width - EDGE, said, legend + more)
 
 
 def _panels(automaton: Automaton) -> list[tuple[str, list[Maneuver]]]:

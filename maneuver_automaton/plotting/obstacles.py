@@ -17,7 +17,7 @@ from maneuver_automaton.collision import AnyObstacle, Motion, Obstacle, Occupanc
 from maneuver_automaton.collision.shapes import as_obstacles
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import Color, shaded
-from maneuver_automaton.plotting.regions import map_paths, moved_path, shape_path
+from maneuver_automaton.plotting.limits import map_paths, moved_path, shape_path
 
 SOLID: Color = (0.36, 0.38, 0.42)
 MOVING: Color = (0.44, 0.22, 0.58)

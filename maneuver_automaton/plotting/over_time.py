@@ -19,10 +19,10 @@ from maneuver_automaton.plotting.cast import Actor, Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.controls import TIME_LABEL, draw_over_time, step_curves, within
 from maneuver_automaton.plotting.distances import distance_times, nearest_others
-from maneuver_automaton.plotting.labels import control_labels
 from maneuver_automaton.plotting.paths import JUMP
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
+    control_labels,
     dashed_handle,
     line_handle,
     mark_handle,

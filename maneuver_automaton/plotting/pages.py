@@ -47,12 +47,6 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def axes_at(figure: Figure, *, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Axes in `figure` whose inner box is given in inches."""
-    wide, high = figure.get_size_inches()
-    return figure.add_axes((left / wide, bottom / high, width / wide, height / high))
-
-
 def hide_times(column: Sequence[Axes]) -> None:
     """Leave the times to the axes below."""
     for ax in column:
@@ -60,25 +54,8 @@ def hide_times(column: Sequence[Axes]) -> None:
         ax.tick_params(labelbottom=False)
 
 
-def heading_text(figure: Figure, lines: Sequence[tuple[str, float, str]], *, left: float) -> None:
-    """Lines of (text, size [pt], weight) from the upper left corner down, `left` in inches."""
-    wide, high = figure.get_size_inches()
-    top = 0.12
-    for text, size, weight in lines:
-        figure.text(
-            left / wide, 1.0 - top / high, text, fontsize=size, fontweight=weight, color=INK,
-            va="top", ha="left", parse_math=False, linespacing=1.25,
-        )  # fmt: skip
-        top += 1.42 * size / 72.0 * (1 + text.count("\n"))
-
-
-def heading_height(lines: Sequence[tuple[str, float, str]]) -> float:
-    """Height [in] that lines of `heading_text` take, from the upper edge down."""
-    return 0.12 + sum(1.42 * size / 72.0 * (1 + text.count("\n")) for text, size, _ in lines)
-
-
-def title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
-    """Lines of `heading_text`: the title, then `others`, the first of which is bold without one.
+def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
+    """Lines of (text, size [pt], weight): the title, then `others`, the first bold without one.
 
     All are wrapped to a `width` [in]. In a paper the title stands alone.
     """
@@ -189,15 +166,42 @@ def space_page(
     return Page(figure, axes["space"], (axes["above"], axes["aside"]), is_stacked=False)
 
 
+def plain_page(
+    look: Look,
+    lines: Sequence[str],
+    mosaic: list[Any],
+    *,
+    width: float,
+    height: float,
+    **ratios: Any,
+) -> tuple[Figure, dict[str, Axes]]:
+    """A page of a `width` [in] with a heading and axes in a `mosaic`, which has a `height` [in].
+
+    A height that the look states is that of the whole page.
+    """
+    figure, top = _headed(look, lines, width)
+    _settle(figure, look.height or top + height, top)
+    return figure, figure.subplot_mosaic(mosaic, empty_sentinel="", **ratios)
+
+
 def _framed(
     look: Look, lines: Sequence[str], legend: tuple[Sequence[Artist], Sequence[str]]
 ) -> tuple[Figure, float, float]:
     """A figure with heading and legend, and the heights [in] that these take."""
-    heading = title_lines(look, look.width - 2.0 * EDGE, *lines)
-    figure = new_figure(look.width, FIRST)
-    foot = _legend_below(figure, *legend) + EDGE
-    heading_text(figure, heading, left=EDGE)
-    return figure, heading_height(heading) + 0.5 * EDGE, foot
+    figure, top = _headed(look, lines, look.width)
+    return figure, top, _legend_below(figure, *legend) + EDGE
+
+
+def _headed(look: Look, lines: Sequence[str], width: float) -> tuple[Figure, float]:
+    """A figure with a heading from the upper left corner down, and the height [in] of that."""
+    figure, top = new_figure(width, FIRST), EDGE
+    for text, size, weight in _title_lines(look, width - 2.0 * EDGE, *lines):
+        figure.text(
+            EDGE / width, 1.0 - top / FIRST, text, fontsize=size, fontweight=weight, color=INK,
+            va="top", ha="left", parse_math=False, linespacing=1.25,
+        )  # fmt: skip
+        top += 1.42 * size / 72.0 * (1 + text.count("\n"))
+    return figure, top + 0.5 * EDGE
 
 
 def _settle(figure: Figure, height: float, top: float) -> None:

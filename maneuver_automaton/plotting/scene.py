@@ -12,9 +12,8 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Obstacle, OccupancyMap
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.limits import limit_boxes
+from maneuver_automaton.plotting.limits import limit_boxes, shape_path
 from maneuver_automaton.plotting.obstacles import moving_shapes, static_shapes
-from maneuver_automaton.plotting.regions import shape_path
 from maneuver_automaton.plotting.style import count_from_near, tidy
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.problem import Bounds, Goal

@@ -22,7 +22,6 @@ from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
 from maneuver_automaton.models import Model, SecondOrderCar
 from maneuver_automaton.roads import RoadScene, RoadVehicle
-from maneuver_automaton.scenario.combining import combined
 from maneuver_automaton.scenario.fleet import (
     FleetScenario,
     fleet_of_document,
@@ -30,7 +29,7 @@ from maneuver_automaton.scenario.fleet import (
     states_several,
     without_fleet,
 )
-from maneuver_automaton.scenario.scenario import Scenario, scenario_of_document
+from maneuver_automaton.scenario.scenario import Scenario, combined, scenario_of_document
 
 MANY_TURNS = 2.0 * math.pi + 0.01  # [rad] a full turn, however it was rounded
 

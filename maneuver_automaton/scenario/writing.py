@@ -15,8 +15,7 @@ from maneuver_automaton._files import relative
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Horizon, Unstated
-from maneuver_automaton.scenario.fleet import FleetScenario
-from maneuver_automaton.scenario.fleet_schema import FleetFile
+from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
 from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import (

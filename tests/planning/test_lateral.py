@@ -19,7 +19,7 @@ from maneuver_automaton.models import Car, CarWithTrailer, SecondOrderCar
 from maneuver_automaton.planning import plan
 from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.problem import Problem, SearchSettings
-from maneuver_automaton.scenario.presets import preset_automaton
+from maneuver_automaton.scenario.automata import preset_automaton
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from tests.search.cases import compiled_only
 

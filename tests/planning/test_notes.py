@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from maneuver_automaton.cli import run
-from maneuver_automaton.cli.tables import print_result
+from maneuver_automaton.cli.terminal import print_result
 from maneuver_automaton.fleet import FleetProblem, plan_fleet
 from maneuver_automaton.formats.fleet_json import fleet_to_dict
 from maneuver_automaton.formats.plan_json import load_plan, load_result, plan_to_dict, save_plan

@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from maneuver_automaton.models.kinds import KINDS
-from maneuver_automaton.plotting.labels import control_labels
+from maneuver_automaton.plotting.style import control_labels
 
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)

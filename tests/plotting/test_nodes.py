@@ -5,7 +5,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from maneuver_automaton.plotting.nodes import draw_nodes
+from maneuver_automaton.plotting.searches import draw_nodes
 
 NODES = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 1.0], [3.0, 1.0, -2.0]])
 

@@ -21,8 +21,7 @@ from maneuver_automaton.scenario import (
     scenario_of_text,
     to_yaml,
 )
-from maneuver_automaton.scenario.fleet import fleet_of_document
-from maneuver_automaton.scenario.fleet_schema import FleetPart
+from maneuver_automaton.scenario.fleet import FleetPart, fleet_of_document
 from tests.formats.outside import message_of
 from tests.formats.test_cl_cbs import PROBLEM
 from tests.scenario.test_scenario import assert_same, scenarios

@@ -22,8 +22,8 @@ from maneuver_automaton.models import (
 )
 from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.scenario import json_schema, load_scenario, scenario_of_text, to_yaml
+from maneuver_automaton.scenario.automata import preset_automaton
 from maneuver_automaton.scenario.parts import keys_of
-from maneuver_automaton.scenario.presets import preset_automaton
 from maneuver_automaton.scenario.vehicles import MODELS, PARTS, described
 from tests import inertia
 

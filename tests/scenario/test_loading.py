@@ -11,7 +11,7 @@ from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.scenario import load_scenario, scenario_of_text, to_yaml
-from maneuver_automaton.scenario.combining import TPCAP
+from maneuver_automaton.scenario.scenario import TPCAP
 from tests.formats import test_benchmr, test_dynobench, test_movingai, test_sbpl_cfg, test_tpcap
 from tests.formats.outside import DATA, needs_data
 from tests.scenario.test_scenario import assert_same

@@ -17,7 +17,7 @@ from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.scenario.presets import TABLE_2
+from maneuver_automaton.scenario.automata import TABLE_2
 from maneuver_automaton.search import cost_to_go
 from maneuver_automaton.search._kernels_table import fill_table
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table

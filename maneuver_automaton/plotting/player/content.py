@@ -16,17 +16,13 @@ from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import Color
 from maneuver_automaton.plotting.distances import distance_times, nearest_others
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.labels import shown_name
 from maneuver_automaton.plotting.motions import track_colors
-from maneuver_automaton.plotting.player.clearances import (
-    clearance_entry,
-    distance_curve,
-    sample_times,
-)
 from maneuver_automaton.plotting.player.numbers import (
     Local,
     body_entries,
+    clearance_entry,
     curve_entries,
+    distance_curve,
     goal_entries,
     hex_color,
     limit_entries,
@@ -35,9 +31,11 @@ from maneuver_automaton.plotting.player.numbers import (
     part_entries,
     part_frames,
     rounded,
+    sample_times,
 )
 from maneuver_automaton.plotting.player.page import Player
 from maneuver_automaton.plotting.scene import BODIES, LEAST_MARK
+from maneuver_automaton.plotting.style import shown_name
 from maneuver_automaton.plotting.track import Track, joined_track
 from maneuver_automaton.recording import Curve, Fact, Mover, Recording, Search, recording_of
 from maneuver_automaton.recording.plans import stated

@@ -15,9 +15,9 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import Player, player_of, player_of_file
 from maneuver_automaton.plotting.colors import trim_colors, twist_color
-from maneuver_automaton.plotting.player.clearances import clearance_entry
 from maneuver_automaton.plotting.player.numbers import (
     Local,
+    clearance_entry,
     hex_color,
     motion_entry,
     obstacle_entries,

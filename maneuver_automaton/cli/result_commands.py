@@ -1,19 +1,29 @@
-"""`plot`: a plan.json or closed_loop.json drawn again, without planning."""
+"""`plot` and `export`: result files drawn again, or written for another program."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from maneuver_automaton.cli.guard import FOUND
-from maneuver_automaton.cli.inputs import Parts, make_folder, not_written, scenario_of
+from maneuver_automaton import exports
+from maneuver_automaton.cli.guard import FOUND, complain
+from maneuver_automaton.cli.inputs import (
+    Parts,
+    fleet_planned,
+    make_folder,
+    not_written,
+    road_fleet,
+    scenario_of,
+    source_of,
+    user_model,
+)
 from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
-from maneuver_automaton.cli.planned import fleet_planned, road_fleet
-from maneuver_automaton.cli.tables import print_written
-from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.cli.terminal import print_written
+from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 from maneuver_automaton.formats.closed_loop_json import (
     driven_document,
     load_closed_loop,
@@ -27,8 +37,87 @@ from maneuver_automaton.formats.plan_json import (
     read_fleet_document,
     read_plan_document,
 )
-from maneuver_automaton.recording import recording_of
+from maneuver_automaton.recording import Recording, recording_of
 from maneuver_automaton.recording.plans import stated
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """A format that is written."""
+
+    function: str  # of `exports`, that writes it
+    name: str  # of what is written: that of the file stands for {}
+    steps: bool  # whether it has rows in time
+
+    @property
+    def ending(self) -> str:
+        """Ending of its files; a folder has none."""
+        return Path(self.name).suffix
+
+
+FORMATS: Mapping[str, Format] = {
+    "commonroad": Format(
+        function="save_commonroad_solution", name="{}_commonroad.xml", steps=False
+    ),
+    "csv": Format(function="save_csv", name="{}.csv", steps=True),
+    "geojson": Format(function="save_geojson", name="{}.geojson", steps=False),
+    "rerun": Format(function="save_rerun", name="{}.rrd", steps=True),
+    "ros2": Format(function="save_ros2_bag", name="{}_ros2", steps=True),
+}
+
+
+def export(
+    file: Path, kind: str, out: Path | None, *, parts: Parts, step: float | None = None
+) -> int:
+    """Write the plans or loops of `file` in a format; say where a goal was not reached."""
+    if kind not in FORMATS:
+        raise InvalidScenario(f"--to: got {kind!r}, need one of {', '.join(FORMATS)}")
+    form = FORMATS[kind]
+    if step is not None and not form.steps:
+        raise InvalidScenario(f"--step: {kind} has no rows in time; leave it out")
+    recording = _recording(file, parts)
+    path = _export_target(file, out, form, kind)
+    options: dict[str, Any] = {} if step is None else {"step": step}
+    write: Callable[..., None] = getattr(exports, form.function)
+    make_folder(path.parent)
+    try:
+        write(recording, path, **options)
+    except ManeuverAutomatonError:
+        raise
+    except OSError as error:
+        raise not_written(path, error) from error
+    except ValueError as error:
+        raise InvalidScenario(f"{file}: {error}") from error
+    print_written(path)
+    clean = all(one.reached and not one.reason for one in recording.movers)
+    if kind == "commonroad" and not clean:
+        complain(f"{file}: it is no clean drive to a goal: the official checker refuses {path}")
+    return FOUND
+
+
+def _recording(file: Path, parts: Parts) -> Recording:
+    """What the file holds; several vehicles in the world that it names itself."""
+    if (roads := road_fleet(file, parts)) is not None:
+        return recording_of(roads)
+    document = read_fleet_document(file)
+    if document is not None and (parts.beside is not None or document.get("source")):
+        beside, its = source_of(file, document, parts)
+        return exports.load_recording(file, beside=beside, case=its.case)
+    own = None if parts.model is None else user_model(parts.model)
+    return exports.load_recording(file, beside=parts.beside, case=parts.case, model=own)
+
+
+def _export_target(file: Path, out: Path | None, form: Format, kind: str) -> Path:
+    """Where it goes: beside the file, into a folder, or to the file or folder given."""
+    name = form.name.format(file.stem)
+    if out is None:
+        return file.with_name(name)
+    if form.ending and out.is_dir():
+        return out / name
+    if form.ending and out.suffix.lower() != form.ending:
+        raise InvalidScenario(f"--out: {out}: need an ending of {form.ending} for {kind}")
+    return out
+
 
 ENDINGS = {
     "picture": (".png", ".pdf", ".svg"),
@@ -50,7 +139,7 @@ def plot(
     if animate and html:
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
-    path = _target(file, out, what)
+    path = _picture_target(file, out, what)
     with _named(file):
         result, name = _result_of(file, beside)
     make_folder(path.parent)
@@ -125,7 +214,7 @@ def _draw_motion(document: dict[str, Any], path: Path, what: str, look: LookOpti
         plotting.player_of_file(document, plan, title=title).save(path)
 
 
-def _target(file: Path, out: Path | None, what: str) -> Path:
+def _picture_target(file: Path, out: Path | None, what: str) -> Path:
     """Where the picture goes: beside the file, into a folder, or to the file given."""
     endings = ENDINGS[what]
     path = file.with_suffix(endings[0]) if out is None else out
