@@ -15,6 +15,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.fleet import Closest
 from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
@@ -42,13 +43,12 @@ from maneuver_automaton.roads import (
     RoadDrive,
     RoadFleetDrive,
     RoadFleetResult,
-    RoadPair,
     RoadPlanner,
     RoadPlanResult,
     RoadStep,
     RoadVerdict,
 )
-from maneuver_automaton.roads.library import RoadLibrary
+from maneuver_automaton.roads.vehicle import RoadLibrary
 
 GUARANTEES = {"touched": "no collision", "off_road": "on the road", "undrivable": "drivable"}
 
@@ -297,7 +297,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
     }
 
 
-def _closest(pairs: Sequence[RoadPair]) -> list[ClosestEntry]:
+def _closest(pairs: Sequence[Closest]) -> list[ClosestEntry]:
     return [{"pair": one.pair, "time_s": one.time_s, "distance_m": one.distance_m} for one in pairs]
 
 
