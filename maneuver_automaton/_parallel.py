@@ -65,10 +65,15 @@ def in_parallel(
     """
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
-    if scheduler is not None:
-        check_scheduler(scheduler)
-        return _on_dask(function, pieces, jobs, scheduler, order)
-    return _results(function, pieces, jobs, order, ends_early)
+    if scheduler is None:
+        return _results(function, pieces, jobs, order, ends_early)
+    client = _client(scheduler, jobs)
+
+    def results() -> Iterator[Result]:
+        with client:
+            yield from _of_client(client, function, pieces, order=order)
+
+    return results()
 
 
 def _results(
@@ -150,26 +155,10 @@ def check_scheduler(scheduler: str) -> None:
         ) from error
 
 
-def _on_dask(
-    function: Callable[[Piece], Result],
-    pieces: Sequence[Piece],
-    jobs: int,
-    scheduler: str,
-    order: str,
-) -> Iterator[Result]:
-    """Results of a Dask cluster, each as it comes; what is not done when they end is called off."""
-    client = _client(scheduler, jobs)
-
-    def results() -> Iterator[Result]:
-        with client:
-            yield from _of_client(client, function, pieces, order=order)
-
-    return results()
-
-
 def _of_client(
     client: Any, function: Callable[[Piece], Result], pieces: Sequence[Piece], *, order: str
 ) -> Iterator[Result]:
+    """Results of a Dask cluster, each as it comes; what is not done when they end is called off."""
     from distributed import as_completed
 
     futures = client.map(function, pieces, pure=False)
@@ -201,13 +190,13 @@ def gathered(*, jobs: int = 1, scheduler: str | None = None) -> Iterator[Gathere
     if scheduler is None:
         yield functools.partial(in_parallel, jobs=jobs, ends_early=True)
         return
-    check_scheduler(scheduler)
     with _client(scheduler, jobs) as client:
         yield functools.partial(_of_client, client, order="as given")
 
 
 def _client(scheduler: str, jobs: int) -> Any:
     """A client of a scheduler, or of a cluster on this machine."""
+    check_scheduler(scheduler)
     from distributed import Client
 
     if scheduler == LOCAL:

@@ -34,6 +34,7 @@ from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, within
 from maneuver_automaton.recording.values import pair_text
 from maneuver_automaton.roads import RoadFleetResult, RoadPair
+from maneuver_automaton.roads import RoadFleetResult
 
 ENDING = ".json"
 AGREES = 1e-9  # share by which a cost may differ from that of the file
@@ -148,9 +149,7 @@ def _on_road(result: RoadFleetResult) -> Iterator[Finding]:
     yield from _pairs(result.pairs, near)
 
 
-def _pairs(
-    closest: Sequence[Closest | RoadPair], too_near: Sequence[Closest | RoadPair]
-) -> list[Finding]:
+def _pairs(closest: Sequence[Closest], too_near: Sequence[Closest]) -> list[Finding]:
     """Those that come too near, or one line for all."""
     if not too_near:
         words = "there is none that comes near"

@@ -32,8 +32,8 @@ from maneuver_automaton.roads import (
     plan_roads,
     road_planner,
 )
-from maneuver_automaton.roads.library import tick_of
 from maneuver_automaton.roads.search_arrays import LONGEST
+from maneuver_automaton.roads.vehicle import tick_of
 from maneuver_automaton.scenario import RoadScenario, load_roads, load_scenario
 
 TIME_LIMIT = 10.0  # [s] of one plan

@@ -22,9 +22,6 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet.coordination import (
     HeldPlans,
-    Turns,
-    by_conflicts,
-    by_priorities,
     one_at_a_time,
 )
 from maneuver_automaton.fleet.courses import FleetCourse
@@ -33,7 +30,7 @@ from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
 from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, courses_of, vehicles_of
 from maneuver_automaton.fleet.verdict import verified
-from maneuver_automaton.fleet.workers import Done, How, PoolTask, WorkerPool
+from maneuver_automaton.fleet.workers import How, PoolTask, WorkerPool
 
 Objective = Literal["sum", "last"]
 
@@ -123,30 +120,6 @@ def plan_fleet(
         return search.run(orders, max_rounds)
 
 
-def _alone(turns: Turns, task: PoolTask) -> Done:
-    """The ways of some by themselves."""
-    for k in task.numbers:
-        turns.vehicles[k].plan_alone(turns.budget)
-    return Done(None)
-
-
-def _in_order(turns: Turns, task: PoolTask) -> Done:
-    """Plans in an order."""
-    return Done(turns.one_after_another(task.numbers, task.held), turns.queries)
-
-
-def _better(turns: Turns, task: PoolTask) -> Done:
-    """Better plans of a group, or better ways of some by themselves."""
-    if task.how == "alone":
-        for k in task.numbers:
-            turns.vehicles[k].look_for_better_ways(turns.budget)
-        return Done(None)
-    if task.how == "in turn":
-        return Done(turns.anew(task.numbers, task.held), turns.queries)
-    search = by_priorities if task.how == "by priorities" else by_conflicts
-    return Done(search(turns, task.numbers, task.held, task.known), turns.queries)
-
-
 @dataclass(slots=True, eq=False)
 class _FleetSearch:
     """One search for the plans of a fleet."""
@@ -194,8 +167,8 @@ class _FleetSearch:
 
     def _plan_alone(self) -> None:
         """The way of each by itself."""
-        tasks = [PoolTask((one.number,), {}) for one in self.vehicles]
-        for _ in self.pool.each(_alone, tasks, self.budget.stage(ALONE_SHARE)):
+        tasks = [PoolTask((one.number,), {}, "alone") for one in self.vehicles]
+        for _ in self.pool.each(tasks, self.budget.stage(ALONE_SHARE)):
             pass
         for one in self.vehicles:
             if one.alone is None:
@@ -255,8 +228,8 @@ class _FleetSearch:
             if until.is_over and best is not None:
                 break
             chosen = drawn[begin : begin + self.pool.jobs]
-            tasks = [PoolTask(tuple(order), self.held) for order in chosen]
-            for order, done in zip(chosen, self.pool.each(_in_order, tasks, until), strict=True):
+            tasks = [PoolTask(tuple(order), self.held, "in order") for order in chosen]
+            for order, done in zip(chosen, self.pool.each(tasks, until), strict=True):
                 planned = done.held or {}
                 self.queries += done.queries
                 if best is None or self._rank(planned) < self._rank(best):
@@ -304,15 +277,15 @@ class _FleetSearch:
             idle += at_once - len(tasks)
             ways = unseen[: min(at_once, left - len(tasks) if max_rounds is not None else left)]
             del unseen[: len(ways)]
-            tasks += [PoolTask((k,), {}, "alone") for k in ways]
+            tasks += [PoolTask((k,), {}, "better alone") for k in ways]
             if left <= 0 or not (tasks or self._losing(set())):
                 return
             self.rounds += len(tasks)
             taken: set[int] = set()
             known = {k: self._known(k) for k in ways}
-            for task, done in zip(tasks, self.pool.each(_better, tasks, self.budget), strict=True):
+            for task, done in zip(tasks, self.pool.each(tasks, self.budget), strict=True):
                 self.queries += done.queries
-                if task.how == "alone":
+                if task.how == "better alone":
                     self.versions.update(k for k in task.numbers if self._known(k) != known[k])
                 elif done.held is not None and self._is_taken(done.held, taken):
                     taken |= set(task.numbers)

@@ -29,7 +29,6 @@ from maneuver_automaton.fleet.result import (
 from maneuver_automaton.fleet.vehicle import FleetMember
 from maneuver_automaton.fleet.verdict import measured
 from maneuver_automaton.fleet.workers import Workers
-from maneuver_automaton.groups import group_of
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.rest_of_plan import moves_on
 from maneuver_automaton.receding_horizon.settings import switches_at_will
@@ -39,6 +38,7 @@ from maneuver_automaton.receding_horizon.simulation import (
     as_driven,
     checked,
     draws,
+    pushed,
 )
 
 TOUCHES = 1e-9  # [m] what is closer touches
@@ -220,10 +220,7 @@ class _VehicleDrive:
         self.pose = np.array(piece.end)
         if moves_on(piece):
             self.pose = self.pose + noise
-        if number in self.upset.pushes:
-            group = group_of(self.pose.size)
-            push = np.array(self.upset.pushes[number], dtype=np.float64)
-            self.pose = np.array((group(self.pose) @ group(push)).pose)
+        self.pose = pushed(self.pose, self.upset, after=number)
 
     def leaves_at(self, plan: Plan) -> float:
         """When [s] it leaves at the end of the plan that it holds; inf if it does not."""

@@ -18,7 +18,7 @@ from maneuver_automaton._parallel import Gathered
 from maneuver_automaton.automaton.pieces import packed, unpacked
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
-from maneuver_automaton.fleet.coordination import HeldPlans, Turns
+from maneuver_automaton.fleet.coordination import HeldPlans, Turns, by_conflicts, by_priorities
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -291,8 +291,10 @@ class DaskWorkers:
 
 # -- a fleet's plans, in pieces of work
 
-How: TypeAlias = Literal["alone", "in turn", "by priorities", "by conflicts"]
-"""Better plans: of each by itself, one after another, or of a group at once."""
+How: TypeAlias = Literal[
+    "alone", "in order", "better alone", "in turn", "by priorities", "by conflicts"
+]
+"""Ways of each by itself; plans in an order; better ways, or plans one after another or at once."""
 
 
 class PoolTask(NamedTuple):
@@ -303,7 +305,7 @@ class PoolTask(NamedTuple):
 
     numbers: tuple[int, ...]
     held: HeldPlans
-    how: How = "in turn"  # to look for better plans
+    how: How = "in turn"
     known: float = math.inf  # cost of those that they have
 
 
@@ -314,7 +316,21 @@ class Done(NamedTuple):
     queries: int = 0
 
 
-Work: TypeAlias = Callable[[Turns, PoolTask], Done]
+def done(turns: Turns, task: PoolTask) -> Done:
+    """What comes of a piece of work."""
+    numbers, held = task.numbers, task.held
+    if task.how in ("alone", "better alone"):
+        for k in numbers:
+            one = turns.vehicles[k]
+            look = one.plan_alone if task.how == "alone" else one.look_for_better_ways
+            look(turns.budget)
+        return Done(None)
+    if task.how == "in order":
+        return Done(turns.one_after_another(numbers, held), turns.queries)
+    if task.how == "in turn":
+        return Done(turns.anew(numbers, held), turns.queries)
+    search = by_priorities if task.how == "by priorities" else by_conflicts
+    return Done(search(turns, numbers, held, task.known), turns.queries)
 
 
 class _Known(NamedTuple):
@@ -327,11 +343,10 @@ class _Known(NamedTuple):
 
 
 class _Parcel(NamedTuple):
-    """Pieces of one kind of work for another process, which keeps fleets by their tokens."""
+    """Pieces of work for another process, which keeps fleets by their tokens."""
 
     token: str
     fleet: FleetProblem | None  # None: it is known there
-    work: Work | None = None  # None: only have all ready
     tasks: tuple[tuple[PoolTask, dict[int, bytes]], ...] = ()  # without plans, which follow
     known: Mapping[int, _Known] = {}
     seconds: float = 0.0  # [s] that are left
@@ -359,7 +374,7 @@ class WorkerPool:
         if self.gathered is not None:
             list(self.gathered(_served, [_Parcel(self._token, self.fleet)] * self.jobs))
 
-    def each(self, work: Work, tasks: Sequence[PoolTask], budget: Budget) -> Iterator[Done]:
+    def each(self, tasks: Sequence[PoolTask], budget: Budget) -> Iterator[Done]:
         """What comes of pieces of work, in their order; nothing of those that a signal broke off.
 
         What is learned of a vehicle alone counts for none of the other pieces: those about it come
@@ -367,12 +382,12 @@ class WorkerPool:
         """
         if self.gathered is None or len(tasks) < 2:
             for task in tasks:
-                yield work(Turns(self.vehicles, self.fleet.margin, budget), task)
+                yield done(Turns(self.vehicles, self.fleet.margin, budget), task)
             return
         size = max(1, -(-len(tasks) // (PIECES * self.jobs)))
         chunks = [tasks[k : k + size] for k in range(0, len(tasks), size)]
         left = len(tasks)
-        for reply in self._replies([self._parcel(work, chunk, budget.left) for chunk in chunks]):
+        for reply in self._replies([self._parcel(chunk, budget.left) for chunk in chunks]):
             for k, known in reply.known.items():
                 _learn(self.vehicles[k], known)
             for k, spent in reply.expansions.items():
@@ -383,11 +398,11 @@ class WorkerPool:
                 yield Done(None if told is None else held, queries)
         yield from [Done(None)] * left
 
-    def _parcel(self, work: Work, tasks: Sequence[PoolTask], seconds: float) -> _Parcel:
+    def _parcel(self, tasks: Sequence[PoolTask], seconds: float) -> _Parcel:
         numbers = sorted({k for task in tasks for k in task.numbers})
         known = {k: _known(self.vehicles[k]) for k in numbers}
         rows = [(task._replace(held={}), _told(self.vehicles, task.held)) for task in tasks]
-        return _Parcel(self._token, None, work, tuple(rows), known, seconds)
+        return _Parcel(self._token, None, tuple(rows), known, seconds)
 
     def _replies(self, parcels: Sequence[_Parcel]) -> Iterator[_Reply]:
         """Replies to parcels; who does not know the fleet is told of it."""
@@ -423,18 +438,17 @@ def _served(parcel: _Parcel) -> _Reply | None:
     for k, known in parcel.known.items():
         _learn(vehicles[k], known)
     before = [one.expansions for one in vehicles]
-    done: list[tuple[dict[int, bytes] | None, int]] = []
+    found: list[tuple[dict[int, bytes] | None, int]] = []
     budget = Budget.from_now(max(parcel.seconds, LEAST_LIMIT))
     for task, told in parcel.tasks:
-        assert parcel.work is not None
         for k, said in told.items():
             if k not in last or last[k][0] != said:
                 last[k] = said, decoded(vehicles[k], said)
         held = {k: last[k][1] for k in told}
-        found = parcel.work(Turns(vehicles, margin, budget), task._replace(held=held))
-        done.append((None if found.held is None else _told(vehicles, found.held), found.queries))
+        plans, queries = done(Turns(vehicles, margin, budget), task._replace(held=held))
+        found.append((None if plans is None else _told(vehicles, plans), queries))
     known_now = {k: _known(vehicles[k]) for k in parcel.known}
-    return _Reply(done, known_now, {k: vehicles[k].expansions - before[k] for k in parcel.known})
+    return _Reply(found, known_now, {k: vehicles[k].expansions - before[k] for k in parcel.known})
 
 
 def _told(vehicles: Sequence[FleetMember], held: Mapping[int, OwnPlan]) -> dict[int, bytes]:

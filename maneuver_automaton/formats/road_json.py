@@ -14,6 +14,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.fleet import Closest
 from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,
@@ -42,7 +43,7 @@ from maneuver_automaton.roads import (
     RoadStep,
     RoadVerdict,
 )
-from maneuver_automaton.roads.library import RoadLibrary
+from maneuver_automaton.roads.vehicle import RoadLibrary
 
 GUARANTEES = {"touched": "no collision", "off_road": "on the road", "undrivable": "drivable"}
 

@@ -25,7 +25,7 @@ from maneuver_automaton.planning.tracking import (
     track,
 )
 from maneuver_automaton.problem import Bounds, Goal, Problem
-from maneuver_automaton.receding_horizon.candidates import Candidate, bounded
+from maneuver_automaton.receding_horizon.candidates import StepPlan, bounded
 from maneuver_automaton.receding_horizon.failsafe import FailSafe
 from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin
 from maneuver_automaton.receding_horizon.rest_of_plan import moves_on, quickest, rejoining, rested
@@ -58,10 +58,10 @@ class InFreeSpace(StepSearch):
         """Nothing comes either."""
         return True
 
-    def cheaper(self, kept: Candidate | None) -> list[Candidate]:
+    def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """The result of a search from here for each goal."""
         now, here = self.now, self.here
-        found: list[Candidate] = []
+        found: list[StepPlan] = []
         now.exhaustive = True
         alternatives = PACES if self.settings.retimed else 0
         for index, goal in enumerate(here.goals):
@@ -152,11 +152,11 @@ class InFreeSpace(StepSearch):
                 f"the search was cut short after {limit:g} s; the best plan so far is kept",
             )
 
-    def otherwise(self) -> Candidate | None:
+    def otherwise(self) -> StepPlan | None:
         """No plan arrives in time: the quickest there is; None if there is none."""
         now, here = self.now, self.here
         hurry = quickest(here)
-        found: list[Candidate] = []
+        found: list[StepPlan] = []
         for index, goal in enumerate(here.goals):
             plans = list(rejoining(hurry, now.planned(), goal, pad=None))
             again = Budget.from_now(self.settings.time_limit)
@@ -222,7 +222,7 @@ class AmongObstacles(StepSearch):
             return None
         return self.fail_safe_from(piece.end, piece.start_time + piece.duration)
 
-    def cheaper(self, kept: Candidate | None) -> list[Candidate]:
+    def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """The plan that a search from here finds, if it is safe."""
         known = None if kept is None or self.settings.continuous else kept.plan
         found = self._candidate(self._tracked(self.here, known))
@@ -241,14 +241,14 @@ class AmongObstacles(StepSearch):
             patience=ANEW if moving and known is None else LITTLE,
         )
 
-    def _candidate(self, found: Tracked) -> Candidate | None:
+    def _candidate(self, found: Tracked) -> StepPlan | None:
         """The plan found; it is proven free, but among moving obstacles its end may not stay so."""
         if found.plan is None or found.goal_index is None:
             return None
         one = self.now.candidate(found.plan, found.goal_index, Origin.SEARCHED)
         return one if not self.here.moves or self.is_safe(one.plan) else None
 
-    def otherwise(self) -> Candidate | None:
+    def otherwise(self) -> StepPlan | None:
         """No plan arrives in time: one that takes longer."""
         horizon = self.here.horizon
         if horizon.time is None and horizon.max_time is None:

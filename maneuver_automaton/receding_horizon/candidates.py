@@ -92,7 +92,7 @@ def is_uniform(plan: Plan, cost: StageCost) -> bool:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Candidate:
+class StepPlan:
     """A plan that may be applied."""
 
     plan: Plan
@@ -106,7 +106,7 @@ class Candidate:
 
 
 def preference(
-    one: Candidate, problem: Problem, step: float
+    one: StepPlan, problem: Problem, step: float
 ) -> tuple[float, bool, int, tuple[str, ...]]:
     """Order of plans that cost the same, the first one to be applied for a `step` [s].
 
@@ -121,7 +121,7 @@ def preference(
 
 def candidate(
     here: Problem, settings: Settings, plan: Plan, *, goal_index: int, origin: Origin
-) -> Candidate:
+) -> StepPlan:
     """A plan at its best pace, if that is asked for, and in the order that costs most at first.
 
     The order stays where another one drives elsewhere among obstacles, or where there
@@ -136,7 +136,7 @@ def candidate(
         costlier = here.cost_of(ordered)
         if costlier <= cost + TIE * (1.0 + abs(cost)) and allowed(here, ordered):
             plan, cost = ordered, costlier
-    return Candidate(plan=plan, cost=cost, goal_index=goal_index, origin=origin)
+    return StepPlan(plan=plan, cost=cost, goal_index=goal_index, origin=origin)
 
 
 def allowed(here: Problem, plan: Plan) -> bool:
@@ -188,7 +188,7 @@ CALM = 0.5  # share of the tolerance that a plan of several steps may use up at 
 FINE = 0.01  # [m, rad] between the poses that are looked at
 
 
-def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | None:
+def holding(here: Problem, settings: Settings, goal_index: int) -> StepPlan | None:
     """A plan to the middle of a goal's set within a step or a few.
 
     The cheapest that stays in the set all along and does not linger at its edge, otherwise one that
@@ -198,7 +198,7 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> Candidate | N
         return None
     goal = here.goals[goal_index]
     middle = replace(goal, tolerance_m=0.0, tolerance_rad=0.0)
-    second: Candidate | None = None
+    second: StepPlan | None = None
     for steps in range(1, MOST_STEPS + 1):
         limit = steps * settings.step
         fixed = settings.pad_of(here) is not None

@@ -18,7 +18,7 @@ from maneuver_automaton.collision import AnyObstacle, AnyShape, as_obstacles
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.at_will import AmongObstacles, InFreeSpace, as_it_stands
 from maneuver_automaton.receding_horizon.candidates import (
-    Candidate,
+    StepPlan,
     cost_until,
     is_rest_of,
     is_uniform,
@@ -274,7 +274,7 @@ class RecedingHorizon:
         spent = cost_until(self.problem, plan, passed)
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
-    def _logged(self, chosen: Candidate, search: StepSearch, now: Situation) -> Step:
+    def _logged(self, chosen: StepPlan, search: StepSearch, now: Situation) -> Step:
         here, last, delta = now.here, now.last, self.settings.step
         plan = chosen.plan
         if plan.maneuvers:
@@ -339,7 +339,7 @@ class RecedingHorizon:
         if steady and step.decision.leads and not step.arrived:
             yield from too_cheap(self.promises, step)
 
-    def _bound(self, chosen: Candidate, search: StepSearch, now: Situation) -> float:
+    def _bound(self, chosen: StepPlan, search: StepSearch, now: Situation) -> float:
         """No plan to any goal costs less."""
         if now.exhaustive:
             return chosen.cost
@@ -371,7 +371,7 @@ def _is_taken(violation: Violation, now: Situation) -> bool:
     return bool(now.off_plan or now.changed or violation.guarantee in before)
 
 
-def _decision(chosen: Candidate, now: Situation, *, same: bool) -> Decision:
+def _decision(chosen: StepPlan, now: Situation, *, same: bool) -> Decision:
     """What a step decides, where the plan tells; `same`: its word is the last one."""
     if chosen.decision is not None:
         return chosen.decision

@@ -22,7 +22,7 @@ from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, bounded
+from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import FailSafe, Mitigation, settled
 from maneuver_automaton.receding_horizon.log import Decision, Origin
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, rested
@@ -107,7 +107,7 @@ class OverManeuvers(StepSearch):
         late = 1.0 - LATE if self.here.moves else 0.0
         return self.now.budget.before(late * self.settings.time_limit) if late else self.now.budget
 
-    def cheaper(self, kept: Candidate | None) -> list[Candidate]:
+    def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """The cheapest safe word for each goal, if it costs less than the kept plan.
 
         At first a planner is asked instead among obstacles: it looks at words too.
@@ -124,7 +124,7 @@ class OverManeuvers(StepSearch):
         if here.moves and kept is None:
             share = WORDS_SHARE
         guarded = bool(here.obstacles or here.zones) or bounded(here)
-        found: list[Candidate] = []
+        found: list[StepPlan] = []
         for index, goal in enumerate(problem.goals):
             if self._for_plans.is_over:
                 break
@@ -155,7 +155,7 @@ class OverManeuvers(StepSearch):
             return None  # a plan with trims of its own is driven to its end
         return settled(replace(onward, start_trim=name))
 
-    def otherwise(self) -> Candidate | None:
+    def otherwise(self) -> StepPlan | None:
         """The plan of the lattice, or of a planner, which is asked alone at first.
 
         Where something moves the planner comes first: it knows how to stop and steer as well.
@@ -166,13 +166,13 @@ class OverManeuvers(StepSearch):
         found = self._on_lattice() if self.anew or not first else None
         return self._planned() if found is None else found
 
-    def _on_lattice(self) -> Candidate | None:
+    def _on_lattice(self) -> StepPlan | None:
         problem = self.onward()
         return None if problem is None else self._best_on_lattice(problem, self.is_safe)
 
     def _best_on_lattice(
         self, problem: Problem, is_good: Callable[[Plan], bool], *, first: bool = False
-    ) -> Candidate | None:
+    ) -> StepPlan | None:
         """The cheapest good plan of the lattice, or its first, after the committed part."""
         if not problem.automaton.maneuvers:
             return None
@@ -180,7 +180,7 @@ class OverManeuvers(StepSearch):
         if not goals:
             return None
         query = lattice_query(problem, goals)
-        best: Candidate | None = None
+        best: StepPlan | None = None
         for incumbent in incumbent_words(
             query, budget=replace(self._for_plans, expansions=problem.search.max_expansions)
         ):
@@ -198,7 +198,7 @@ class OverManeuvers(StepSearch):
                 break
         return best
 
-    def _planned(self, share: float = 1.0) -> Candidate | None:
+    def _planned(self, share: float = 1.0) -> StepPlan | None:
         """The plan of a planner, from the end of the committed part on, in a share of the time."""
         now, limit, problem = self.now, self.now.longest, self.onward()
         if problem is None:

@@ -96,6 +96,15 @@ def draws(upset: Disturbance, dof: int) -> Iterator[Draw]:
         yield Draw(spread * numbers[0], blur * numbers[1])
 
 
+def pushed(pose: Array, upset: Disturbance, *, after: int) -> Array:
+    """Where the push after the step of a number leads from a pose, if there is one."""
+    if after not in upset.pushes:
+        return pose
+    group = group_of(pose.size)
+    push = as_array("disturbance: push", upset.pushes[after], last=pose.size)
+    return np.array((group(pose) @ group(push)).pose)
+
+
 def as_driven(piece: Plan, upset: Disturbance) -> Plan:
     """A piece of plan as the disturbed vehicle drives it."""
     if upset.twist_scale is None:
@@ -279,11 +288,7 @@ class _Track:
     def arrive(self, noise: Array) -> None:
         """Note the pose after the last step: the end of its piece, with noise and pushes."""
         now = self.log[-1]
-        where = np.array(self.driven[-1].end) + noise
-        if now.number in self.upset.pushes:
-            group = group_of(where.size)
-            push = as_array("disturbance: push", self.upset.pushes[now.number], last=where.size)
-            where = np.array((group(where) @ group(push)).pose)
+        where = pushed(np.array(self.driven[-1].end) + noise, self.upset, after=now.number)
         self.poses.append(where)
         self.times.append(now.time + now.applied)
         self.inside.append(any(within(where, goal) for goal in self.problem.goals))

@@ -12,7 +12,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
 from maneuver_automaton.receding_horizon.candidates import (
-    Candidate,
+    StepPlan,
     between_trims,
     candidate,
     preference,
@@ -135,7 +135,7 @@ class Situation:
         fixed = self.here.horizon.time is not None and self.settings.pad is None
         return self.settings.at_will and not fixed
 
-    def given(self, first: Plan) -> Candidate:
+    def given(self, first: Plan) -> StepPlan:
         """The plan that the first step was told to apply, which may not take too long."""
         here, limit = self.here, self.longest
         if limit is not None and first.duration > limit * (1.0 + EXACT):
@@ -164,7 +164,7 @@ class Situation:
             return plan
         return rested(plan, pad, total - plan.duration)
 
-    def resting(self, index: int) -> Candidate:
+    def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
         total = here.horizon.time
@@ -178,7 +178,7 @@ class Situation:
         value = here.cost_of(plan)
         shifted = None if self.rest is None else min(value, here.cost_of(self.rest))
         self.exhaustive = True
-        return Candidate(
+        return StepPlan(
             plan=plan,
             goal_index=index,
             cost=value,
@@ -210,7 +210,7 @@ class Situation:
         for plan in reanchored(here, self.planned(), goal, pad=pad, under_way=under_way):
             yield plan, Origin.REANCHORED
 
-    def best(self, kept: Candidate | None, found: Iterable[Candidate]) -> Candidate | None:
+    def best(self, kept: StepPlan | None, found: Iterable[StepPlan]) -> StepPlan | None:
         """The cheapest; of equal ones, that which costs most at first; of these, the known word."""
         everything = [*found] if kept is None else [kept, *found]
         if not everything:
@@ -229,17 +229,17 @@ class Situation:
             return tied[0]
         return min(tied, key=lambda one: preference(one, self.here, self.settings.step))
 
-    def between_trims(self, kept: Candidate | None, found: Sequence[Candidate]) -> list[Candidate]:
+    def between_trims(self, kept: StepPlan | None, found: Sequence[StepPlan]) -> list[StepPlan]:
         """The cheapest of some candidates again, with controls between those of the library."""
         everything = [*found] if kept is None else [kept, *found]
-        better: list[Candidate] = []
+        better: list[StepPlan] = []
         for one in sorted(everything, key=lambda one: one.cost)[:FINISHED]:
             plan = between_trims(self.here, one.plan, self.settings.pieces)
             if plan is not one.plan:
                 better.append(self.candidate(plan, one.goal_index, one.origin))
         return better
 
-    def candidate(self, plan: Plan, index: int, origin: Origin) -> Candidate:
+    def candidate(self, plan: Plan, index: int, origin: Origin) -> StepPlan:
         """A plan from here, with the costs by which it is compared."""
         return candidate(self.here, self.settings, plan, goal_index=index, origin=origin)
 

@@ -15,7 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import committed
 from maneuver_automaton.planning.tracking import free_until
 from maneuver_automaton.problem import Horizon, Problem, moves
-from maneuver_automaton.receding_horizon.candidates import Candidate, allowed, holding, within
+from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, holding, within
 from maneuver_automaton.receding_horizon.failsafe import (
     FailSafe,
     Mitigation,
@@ -66,11 +66,11 @@ class StepSearch:
         """Whether a plan is free, and the vehicle may stay at its end or leave it safely."""
         raise NotImplementedError
 
-    def cheaper(self, kept: Candidate | None) -> list[Candidate]:
+    def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """Safe plans, which may cost less than the one that is kept."""
         raise NotImplementedError
 
-    def otherwise(self) -> Candidate | None:
+    def otherwise(self) -> StepPlan | None:
         """A safe plan where none is kept and none was found: late, or from a longer search."""
         raise NotImplementedError
 
@@ -104,7 +104,7 @@ class StepSearch:
 
     # --- the decision ---
 
-    def decide(self) -> Candidate:
+    def decide(self) -> StepPlan:
         """The plan to apply."""
         now = self.now
         there = self._there()
@@ -148,7 +148,7 @@ class StepSearch:
             self.unsafe.append(plan)
         return False
 
-    def _known_free(self, chosen: Candidate) -> Candidate:
+    def _known_free(self, chosen: StepPlan) -> StepPlan:
         """What is applied, with the time until which it is known to be free [s].
 
         A plan that ends in motion was looked at to its end alone.
@@ -158,7 +158,7 @@ class StepSearch:
             until = min(until, plan.start_time + plan.duration)
         return replace(chosen, free_until=until)
 
-    def _there(self) -> Candidate | None:
+    def _there(self) -> StepPlan | None:
         """At the goal, or within it if that is to be held: rest, if that is safe."""
         now, here = self.now, self.here
         goals = here.goals if now.may_rest else ()
@@ -178,7 +178,7 @@ class StepSearch:
         there = now.resting(index)
         return there if self.is_safe(there.plan) else None
 
-    def _kept(self) -> Candidate | None:
+    def _kept(self) -> StepPlan | None:
         """The first safe rest of the last plan that is no detour; else the cheapest that is safe.
 
         As it is, it may end within the goal's tolerance: that will do where no other is safe, and
@@ -187,7 +187,7 @@ class StepSearch:
         now, last, rest = self.now, self.now.last, self.now.rest
         if last is None or rest is None or (now.here.moves and not last.decision.leads):
             return None
-        safe: list[Candidate] = []
+        safe: list[StepPlan] = []
         for plan, origin in now.rests():
             if not self.is_safe(plan):
                 continue
@@ -203,7 +203,7 @@ class StepSearch:
 
     # --- where no safe plan leads to the goal from here, now ---
 
-    def _without_plan(self) -> Candidate:
+    def _without_plan(self) -> StepPlan:
         now = self.now
         if not now.here.moves or (now.last is not None and now.last.decision.leads):
             now.flag(Guarantee.FEASIBILITY, self.why_none())
@@ -214,9 +214,9 @@ class StepSearch:
         harmful = self._leading_nowhere(least.plan, Decision.MITIGATED)
         return replace(harmful, free_until=least.contact)
 
-    def _leading_nowhere(self, plan: Plan, decision: Decision) -> Candidate:
+    def _leading_nowhere(self, plan: Plan, decision: Decision) -> StepPlan:
         last = self.now.last
-        return Candidate(
+        return StepPlan(
             plan=plan,
             cost=math.inf,
             goal_index=0 if last is None else last.goal_index,

@@ -19,9 +19,9 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.roads.judge import RoadVerdict, judged, nearest_miss
 from maneuver_automaton.roads.planner import RoadPlanner, road_planner
 from maneuver_automaton.roads.plans import AT_REST, ROUNDS, RoadDecision, RoadSettings
+from maneuver_automaton.roads.rules import RoadVerdict, judged, nearest_miss
 from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 

@@ -27,8 +27,6 @@ from maneuver_automaton.roads.arrays import (
     HorizonTask,
     RoadArrays,
 )
-from maneuver_automaton.roads.judge import hopeless
-from maneuver_automaton.roads.library import RoadLibrary, road_library, tick_of
 from maneuver_automaton.roads.plans import (
     AT_REST,
     ROUND,
@@ -38,7 +36,7 @@ from maneuver_automaton.roads.plans import (
     polished_controls,
 )
 from maneuver_automaton.roads.route import Route, route_of
-from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
+from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules, hopeless
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
@@ -49,7 +47,7 @@ from maneuver_automaton.roads.search_arrays import (
     static_obstacles,
     weights_of,
 )
-from maneuver_automaton.roads.vehicle import RoadVehicle
+from maneuver_automaton.roads.vehicle import RoadLibrary, RoadVehicle, road_library, tick_of
 
 CELL, TURN_CELL, SPEED_CELL = 0.5, 0.06, 2.0  # [m], [rad], [m/s] of equal nodes
 SHARES = (math.nan, 0.0, 0.2, -0.2, 0.5, -0.5, 1.0, -1.0)  # of steering while it stops; nan: held

@@ -1,7 +1,9 @@
-"""Rules of the road: what closes a stop line, and which rules a drive broke.
+"""What a drive on the road is judged by: stop lines, limits of speed, traffic, the road, its goal.
 
 For the search a closed line is an obstacle across the lane, there as long as it is closed. Nobody
-else sees it: neither the judge, who measures distances to road users, nor a picture.
+else sees it: neither the judge, who measures distances to road users, nor a picture. The judge uses
+nothing of the planner: the equations are integrated once more, and the body is held against all
+other road users while they are there, and against the land beside the road.
 """
 
 from __future__ import annotations
@@ -15,12 +17,16 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
+from maneuver_automaton.audit import Audit, audit_plan, closest_to
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
 from maneuver_automaton.collision.outline import united
+from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area
+from maneuver_automaton.problem import Goal
+from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area, obstacles_in
 from maneuver_automaton.roads.plans import AT_REST
-from maneuver_automaton.roads.scene import RoadScene, RoadStart
+from maneuver_automaton.roads.scene import EXACT, GoalRegion, RoadScene, RoadStart, presence_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 AT_LINE = 3.0  # [m] from the body to a line: who stands there has stopped at it
@@ -168,3 +174,186 @@ def _too_fast(
             f"the limit of {allowed[worst]:.4g} m/s is exceeded by {over[worst]:.2g} m/s at "
             f"{times[worst]:.4g} s"
         )
+
+
+BESIDE = 30.0  # [m] from the path: the edge of the road is not looked for further away
+PIECE = 1e-11  # [m, rad] of rounding that each piece of a motion adds to its end
+PER_RADIAN, PER_SPEED = 5.0, 1.0  # [m/rad], [s]: what counts as one metre when samples are compared
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RoadVerdict:
+    """Findings along a drive."""
+
+    audit: Audit  # of the vehicle's equations and limits
+    hit: tuple[str, ...]  # road users that the body touches
+    clearance_m: float  # least distance to any of them; inf without any
+    edge_m: float  # least distance of the body to the edge of the road, 0 outside
+
+    __repr__ = brief
+
+    @property
+    def collisions(self) -> int:
+        """How many road users were touched."""
+        return len(self.hit)
+
+    @property
+    def off_road(self) -> bool:
+        """Whether a part of the body was outside the lanelets."""
+        return self.edge_m <= too_close(0.0)
+
+    @property
+    def room(self) -> str:
+        """How far it kept from road users and from the edge of the road, in words."""
+        near = "nobody is near" if math.isinf(self.clearance_m) else f"{self.clearance_m:.3g} m"
+        return f"{near}, to the edge of the road {self.edge_m:.3g} m"
+
+    @property
+    def faults(self) -> tuple[tuple[str, str], ...]:
+        """Status and words of each: touched | off_road | undrivable, in this order."""
+        found = [("touched", f"collision with {name}") for name in self.hit]
+        if self.off_road:
+            found.append(("off_road", "off the road: a part of the body was outside the lanelets"))
+        if not self.audit.passed:
+            found.append(("undrivable", f"the model cannot drive it: {self.audit.reason}"))
+        return tuple(found)
+
+    @property
+    def clean(self) -> bool:
+        """Whether no road user was touched, the road not left, and the model obeyed."""
+        return not self.faults
+
+
+def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
+    """The verdict on a plan in the coordinates and on the clock of the scene."""
+    model, body = vehicle.model, (vehicle.footprint,)
+    clearance, hit = math.inf, set()
+    for one in scene.traffic:
+        # A road user counts only while it is there, so each is measured within its own times.
+        distance = closest_to(plan, model, (one,), footprint=body, within=presence_of(one)).distance
+        clearance = min(clearance, distance)
+        if distance <= too_close(0.0):
+            hit.add(one.name)
+    rounding = PIECE * len(plan.trims)
+    return RoadVerdict(
+        audit=audit_plan(
+            plan, Goal(pose=plan.end, tolerance_m=rounding, tolerance_rad=rounding), model
+        ),
+        hit=tuple(sorted(hit)),
+        clearance_m=clearance,
+        edge_m=closest_to(plan, model, land_beside(scene.lanelets, plan), footprint=body).distance,
+    )
+
+
+def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, str] | None:
+    """Status and words of what lets every drive fail, as the start and the goals show; else None.
+
+    `there` is the start, a plan of no duration.
+    """
+    if faults := judged(scene, vehicle, there).faults:
+        return faults[0][0], "; ".join(f"{said} at the start" for _, said in faults)
+    speed, (low, high) = scene.start.speed, vehicle.model.reduced_limits[0].tolist()
+    if (beyond := max(low - speed, speed - high)) > EXACT:
+        said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
+        return "undrivable", f"the model cannot drive it: {said}"
+    why = [_never_reached(goal, scene, vehicle) for goal in scene.goals]
+    said = "; ".join(dict.fromkeys(why))
+    return None if "" in why else ("missed", f"no goal can be reached: {said}")
+
+
+def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle) -> str:
+    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen."""
+    import shapely
+
+    model, start = vehicle.model, scene.start
+    lasts = goal.time[1] - start.time
+    if lasts < -EXACT:
+        return f"its time is over at {goal.time[1]:.6g} s, before the start at {start.time:.6g} s"
+    low, high = goal.speed or (0.0, 0.0)
+    slowest, top = model.reduced_limits[0].tolist()
+    if low > top + EXACT or high < slowest - EXACT:
+        return (
+            f"it asks for {low:.6g} to {high:.6g} m/s, but the vehicle's speeds are"
+            f" {slowest:.6g} to {top:.6g} m/s"
+        )
+    # The middle of the body is where its half width on all sides is on the road.
+    within = shapely.buffer(drivable_area(scene.lanelets), -0.5 * vehicle.width)
+    if (off := goal.away_from(within)) > 0.0:
+        return f"it is off the road, {off:.3g} m from where the middle of the vehicle may be"
+    away = goal.away_from(shapely.Point(start.middle[:2]))
+    fastest = min(abs(start.speed) + 0.5 * model.max_acceleration * lasts, max(top, -slowest))
+    if away > (most := fastest * lasts):
+        return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
+    return ""
+
+
+def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]:
+    """Land beside the road as static obstacles, within `BESIDE` [m] of a plan's path.
+
+    Examples
+    --------
+    >>> lane = Lanelet(1, [[-99, 2], [99, 2]], [[-99, -2], [99, -2]])
+    >>> there = Plan([0.0, 0.0, 0.0], (), durations=[])
+    >>> pieces = land_beside([lane], there)
+    >>> min(abs(float(y)) for one in pieces for y in one.shape.corners[:, 1])
+    2.0
+    """
+    import shapely
+
+    places = plan.sample().pose[:, :2]
+    path = shapely.LineString(places) if len(places) > 1 else shapely.Point(places[0])
+    near = shapely.buffer(path, BESIDE)
+    return obstacles_in(shapely.difference(near, drivable_area(lanelets)))
+
+
+def nearest_miss(
+    goals: Sequence[GoalRegion], vehicle: RoadVehicle, times: Array, states: Array
+) -> str:
+    """Where and how a motion came nearest to a goal, in words without a full stop.
+
+    Parameters
+    ----------
+    goals : sequence of GoalRegion
+    vehicle : RoadVehicle
+    times : (n,) array
+        [s], those at which goals are looked at.
+    states : (n, 5) array
+        x, y, heading of the rear axle, speed, steering at these times, seen as the goals are.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> goal = GoalRegion(speed=(5.0, 8.0), time=(1.0, 2.0))
+    >>> states = np.array([[0.0, 0.0, 0.0, 3.0, 0.0], [3.0, 0.0, 0.0, 4.0, 0.0]])
+    >>> nearest_miss([goal], RoadVehicle(), np.array([0.0, 1.0]), states)
+    'nearest to it at 1 s: 1 m/s too slow'
+    """
+    middles = vehicle.middle_of(states[:, :3])
+    best: tuple[float, str] = (math.inf, "")
+    for goal in goals:
+        within = (times >= goal.time[0] - EXACT) & (times <= goal.time[1] + EXACT)
+        met: list[float] = []
+        for k, time in enumerate(times.tolist()):
+            away, turned, faster = goal.off_by(middles[k], speed=float(states[k, 3]))
+            badness = away + PER_RADIAN * turned + PER_SPEED * abs(faster)
+            if badness <= 0.0:
+                met.append(time)
+            elif within[k] and badness < best[0]:
+                best = badness, f"nearest to it at {time:.6g} s: {_off_by(away, turned, faster)}"
+        if met:
+            window = f"{goal.time[0]:.6g} s to {goal.time[1]:.6g} s"
+            best = 0.0, f"everything but the time was right at {met[0]:.6g} s, need {window}"
+    if best[1]:
+        return best[1]
+    return f"its time begins at {min(goal.time[0] for goal in goals):.6g} s"
+
+
+def _off_by(away: float, turned: float, faster: float) -> str:
+    parts = []
+    if away > 0.0:
+        parts.append(f"{away:.3g} m away")
+    if turned > 0.0:
+        parts.append(f"heading {turned:.3g} rad off")
+    if faster:
+        parts.append(f"{abs(faster):.3g} m/s too {'fast' if faster > 0.0 else 'slow'}")
+    return ", ".join(parts)

@@ -22,7 +22,6 @@ from maneuver_automaton.roads.arrays import (
     Weights,
 )
 from maneuver_automaton.roads.lanelets import Lanelet, drivable_area, obstacles_in
-from maneuver_automaton.roads.library import RoadLibrary
 from maneuver_automaton.roads.plans import RoadSettings
 from maneuver_automaton.roads.route import (
     ASIDE,
@@ -42,7 +41,7 @@ from maneuver_automaton.roads.scene import (
     outlines_of,
     presence_of,
 )
-from maneuver_automaton.roads.vehicle import RoadVehicle
+from maneuver_automaton.roads.vehicle import RoadLibrary, RoadVehicle
 
 STRIPS = 17  # along the route, side by side
 LONGEST = 60.0  # [s] that is looked ahead from its begin on to a goal without a last time

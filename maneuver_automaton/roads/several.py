@@ -26,10 +26,11 @@ from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.collision.blocked import too_close
+from maneuver_automaton.fleet.result import Closest
 from maneuver_automaton.roads.driving import Driver, RoadDrive, RoadPlanResult, plan_road
-from maneuver_automaton.roads.judge import RoadVerdict, judged
 from maneuver_automaton.roads.planner import LONGEST_STOP, road_planner
 from maneuver_automaton.roads.plans import RoadSettings
+from maneuver_automaton.roads.rules import RoadVerdict, judged
 from maneuver_automaton.roads.scene import TIME_TOLERANCE, RoadScene, presence_of
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
@@ -38,22 +39,13 @@ ROOM = 0.05  # [m] on each side by which they see it larger then: more than its 
 WORST_FIRST = ("touched", "off_road", "undrivable", "missed", "steps_spent", "reached")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RoadPair:
-    """Two vehicles, and where they are nearest to each other while both are there."""
-
-    pair: tuple[str, str]
-    time_s: float  # [s] on the clock of the scene
-    distance_m: float
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoadFleetResult(Played):
     """Plans of several vehicles on one road, each with its verdict past all others."""
 
     name: str
     results: Mapping[str, RoadPlanResult]
-    pairs: tuple[RoadPair, ...]  # of those that have plans, the nearest first
+    pairs: tuple[Closest, ...]  # of those that have plans, the nearest first
     order: tuple[str, ...]  # in which they were planned at last
     search_s: float
 
@@ -207,7 +199,7 @@ def _checked(
         kept[wrong[-1]] = replace(kept[wrong[-1]], plan=None, verdict=None, reason=reason)
 
 
-def nearest_pairs(vehicle: RoadVehicle, plans: Mapping[str, Plan]) -> tuple[RoadPair, ...]:
+def nearest_pairs(vehicle: RoadVehicle, plans: Mapping[str, Plan]) -> tuple[Closest, ...]:
     """Least distances of those that are there at once, by the audit's bounds."""
     rows, named = [], [*plans.items()]
     for k, (name, plan) in enumerate(named):
@@ -222,10 +214,7 @@ def nearest_pairs(vehicle: RoadVehicle, plans: Mapping[str, Plan]) -> tuple[Road
                 enough=too_close(0.0),
             )
             if math.isfinite(least.distance):
-                row = RoadPair(
-                    pair=(name, other), time_s=least.time, distance_m=float(least.distance)
-                )
-                rows.append(row)
+                rows.append(Closest((name, other), least.time, float(least.distance)))
     return tuple(sorted(rows, key=lambda row: row.distance_m))
 
 
@@ -235,7 +224,7 @@ class RoadFleetDrive(Played):
 
     name: str
     results: Mapping[str, RoadDrive]
-    pairs: tuple[RoadPair, ...]  # the nearest first
+    pairs: tuple[Closest, ...]  # the nearest first
     before: RoadFleetResult  # the plans made before the start
 
     __repr__ = brief

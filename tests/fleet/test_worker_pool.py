@@ -8,7 +8,6 @@ import pytest
 
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet, workers
-from maneuver_automaton.fleet.planning import _alone, _better, _in_order
 from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.fleet.workers import Done, PoolTask, WorkerPool
 from maneuver_automaton.scenario import load_scenario
@@ -34,15 +33,15 @@ def answers(result):
 def planned(pool):
     """Ways alone, then plans in an order, then better ones of two groups and of one by itself."""
     n, budget = len(pool.vehicles), Budget.from_now(100.0)
-    list(pool.each(_alone, [PoolTask((k,), {}) for k in range(n)], budget))
+    list(pool.each([PoolTask((k,), {}, "alone") for k in range(n)], budget))
     orders = [tuple(range(n)), tuple(reversed(range(n)))]
-    (one, other) = pool.each(_in_order, [PoolTask(order, {}) for order in orders], budget)
+    (one, other) = pool.each([PoolTask(order, {}, "in order") for order in orders], budget)
     groups = [(0, 1), (2,)]
     tasks = [
         PoolTask(group, {k: found for k, found in one.held.items() if k not in group})
         for group in groups
     ]
-    better = list(pool.each(_better, [*tasks, PoolTask((3,), {}, "alone")], budget))
+    better = list(pool.each([*tasks, PoolTask((3,), {}, "better alone")], budget))
     return [one, other, *better], [vehicle.ways for vehicle in pool.vehicles]
 
 
@@ -68,8 +67,8 @@ def test_what_travels_comes_back_the_same():
 def test_nothing_comes_of_what_a_signal_broke_off():
     fleet = fleets.random_fleet(4, 3)
     pool = WorkerPool(fleet, vehicles_of(fleet), 2, lambda function, pieces: iter(()))
-    tasks = [PoolTask((k,), {}) for k in range(4)]
-    assert list(pool.each(_alone, tasks, Budget.from_now(1.0))) == [Done(None)] * 4
+    tasks = [PoolTask((k,), {}, "alone") for k in range(4)]
+    assert list(pool.each(tasks, Budget.from_now(1.0))) == [Done(None)] * 4
 
 
 def test_expansions_are_counted_wherever_they_are():

@@ -9,8 +9,8 @@ import pytest
 
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.roads import RoadVehicle, _kernels_motion
-from maneuver_automaton.roads.library import road_library, tick_of
 from maneuver_automaton.roads.plans import plan_of_controls
+from maneuver_automaton.roads.vehicle import road_library, tick_of
 
 VEHICLE = RoadVehicle()
 LIBRARY = road_library(VEHICLE, top_speed=14.0)
