@@ -12,7 +12,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.costs import Cost, StageCost, terms_of
 from maneuver_automaton.optimal_control.polish_values import LEAST_DURATION, MOST_DURATION
 from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.problem import Problem
@@ -36,7 +36,7 @@ class PolishedPrice:
 
     def of(self, plan: Plan) -> float:
         """Cost of a plan at this price."""
-        if self.cost is self.problem.cost:
+        if self.cost is terms_of(self.problem.cost):
             return self.problem.cost_of(plan)
         return replace(self.problem, cost=self.cost).cost_of(plan)
 
@@ -88,8 +88,8 @@ def polished_price(problem: Problem) -> PolishedPrice:
     >>> price.time, price.switch
     (1.0, 0.0)
     """
-    cost = problem.cost
-    if not isinstance(cost, Cost):
+    cost = terms_of(problem.cost)
+    if cost is None:
         return PolishedPrice(problem, Cost(time=1.0), 0.0)
     rest = problem.automaton.rest
     pads = problem.horizon.time is not None and rest is not None and rests_at_an_end(problem)
@@ -109,9 +109,10 @@ def polished_price(problem: Problem) -> PolishedPrice:
 
 def prices_metres_alone(cost: StageCost) -> bool:
     """Whether a cost prices the length of a motion, and neither its time nor its controls."""
-    if not isinstance(cost, Cost):
+    terms = terms_of(cost)
+    if terms is None:
         return False
-    return cost.length > 0.0 and not any((cost.time, cost.effort, cost.norm))
+    return terms.length > 0.0 and not any((terms.time, terms.effort, terms.norm))
 
 
 def admitted_durations(problem: Problem) -> tuple[float, float]:

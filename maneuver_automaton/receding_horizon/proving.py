@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import prices_switches
 from maneuver_automaton.planning.lower_bound import Proving, in_costs
 from maneuver_automaton.problem import Problem
 
@@ -84,7 +84,5 @@ class LoopBounds:
         Not where a switch or a change of direction between two steps has a price, which neither
         step counts, nor for a fixed time, which every step begins anew.
         """
-        cost = here.cost
-        priced = not isinstance(cost, Cost) or cost.switch or cost.direction_change
-        if not priced and here.horizon.time is None:
+        if not prices_switches(here.cost) and here.horizon.time is None:
             self.least, self.at = least, accumulated

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import FEW, SearchSetup, few_of
@@ -104,7 +104,7 @@ class WordScan:
         self.gridded = False  # whether a word with two times free, which may miss a solution, was
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
-        self.own_prices = not isinstance(problem.cost, Cost)
+        self.own_prices = terms_of(problem.cost) is None
         if self.own_prices:
             alternatives = None
         self.pruned = alternatives is not None or upper_bound < math.inf
@@ -259,7 +259,7 @@ class WordScan:
         """The kernels' problem and its transitions; of one class of trims, the identity."""
         from maneuver_automaton.search._kernels_problem import WordProblem
 
-        setup, cost, tables = self.setup, self.problem.cost, self.tables
+        setup, terms, tables = self.setup, terms_of(self.problem.cost), self.tables
         rest_rate = setup.rest_rate if pad else 0.0
         ends = setup.start_class, setup.goal_class
         same = _same_for_all(tables, setup.transitions, rest_rate, setup.climbs, fixed, *ends)
@@ -289,8 +289,8 @@ class WordScan:
             time_limit=float(bounded),
             pad=int(pad),
             pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
-            switch=float(getattr(cost, "switch", 0.0)),
-            direction_change=0.0 if linked else float(getattr(cost, "direction_change", 0.0)),
+            switch=terms.switch if terms else 0.0,
+            direction_change=0.0 if linked or not terms else terms.direction_change,
             more_turns=int((fixed_time and not self.spare) or setup.climbs),
             nodes=self.nodes,
             nodes_2d=NODES_2D,
