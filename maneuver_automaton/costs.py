@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -17,7 +18,10 @@ NORM_ORDERS = (1.0, 2.0, math.inf)
 class StageCost(Protocol):
     """A cost that the symmetry leaves alone: it sees controls and body velocities, not poses.
 
-    A value that can be hashed: what follows from it is computed once.
+    A value that can be hashed: what follows from it is computed once. A cost that is a sum of the
+    terms of `Cost` may say so in a method ``terms(self) -> Cost``. Switches are then counted as the
+    search goes on, vehicles with inertia are polished at this price and not in time alone, and
+    bounds hold for them too.
     """
 
     def __hash__(self) -> int: ...
@@ -68,6 +72,10 @@ class Cost:
         if self.effort_matrix is not None:
             object.__setattr__(self, "effort_matrix", _positive_definite(self.effort_matrix))
 
+    def terms(self) -> Cost:
+        """The weights that it is the sum of: itself."""
+        return self
+
     def rates(self, controls: Array, body_velocities: Array) -> Array:
         """Cost per second (m,) of trims with `controls` (m, n_u), `body_velocities` (m, dof)."""
         n_controls = controls.shape[-1]
@@ -100,6 +108,21 @@ class Cost:
         return self.switch * (len(body_velocities) - 1) + self.direction_change * changes
 
 
+def terms_of(cost: StageCost) -> Cost | None:
+    """The weights that a cost is the sum of; None if it does not say that it is one.
+
+    Examples
+    --------
+    >>> class Hurry:
+    ...     def terms(self):
+    ...         return Cost(time=2.0)
+    >>> terms_of(Hurry()).time
+    2.0
+    """
+    terms: Callable[[], Cost] | None = getattr(cost, "terms", None)
+    return None if terms is None else terms()
+
+
 def prices_switches(cost: StageCost) -> bool:
     """Whether a switch of trims costs something by itself, or may: a user's own cost may.
 
@@ -108,7 +131,8 @@ def prices_switches(cost: StageCost) -> bool:
     >>> prices_switches(Cost(time=1.0)), prices_switches(Cost(time=1.0, switch=0.1))
     (False, True)
     """
-    return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
+    terms = terms_of(cost)
+    return terms is None or terms.switch > 0.0 or terms.direction_change > 0.0
 
 
 WEIGHTS = ("effort", "norm", "time", "length", "switch", "direction_change")

@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.models import Car, CarWithTrailer, Model
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
@@ -68,15 +68,17 @@ def motions_of(problem: Problem) -> Motions | None:
     >>> motions.families.speed.tolist(), motions.families.turn_rate.round(3).tolist()
     ([2.0, 1.0], [0.489, 0.0])
     """
-    cost = problem.cost
-    if not isinstance(cost, Cost) or problem.automaton.translated:
+    if problem.automaton.translated:
         return None
+    cost = terms_of(problem.cost)
     if not problem.has_inertia:
         twists, rates = problem.automaton.body_velocities[:, :3], problem.rates
-        price = cost.direction_change
+        price = cost.direction_change if cost else 0.0  # at least that
         if (rest := rest_rate(problem)) is not None:
             rates = rates - rest
-    elif (simpler := _at_the_limits(problem.automaton.model)) and (cost.time or cost.length):
+    elif (
+        cost and (cost.time or cost.length) and (simpler := _at_the_limits(problem.automaton.model))
+    ):
         twists, price = simpler.body_velocities[:, :3], 0.0
         rates = Cost(time=cost.time, length=cost.length).rates(simpler.controls, twists)
     else:

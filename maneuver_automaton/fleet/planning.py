@@ -19,7 +19,7 @@ import numpy as np
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.fleet.coordination import (
     HeldPlans,
     one_at_a_time,
@@ -410,9 +410,9 @@ class _FleetSearch:
         """No fleet arrives sooner [s]: each vehicle by itself, where its cost is its time."""
         times = [0.0]
         for one in self.vehicles:
-            cost = one.problem.cost
-            timed = isinstance(cost, Cost) and cost.time > 0.0 and cost == Cost(time=cost.time)
-            if one.bound is not None and isinstance(cost, Cost) and timed:
+            cost = terms_of(one.problem.cost)
+            timed = cost and cost.time > 0.0 and cost == Cost(time=cost.time)
+            if one.bound is not None and cost and timed:
                 times.append(one.problem.start_time + one.bound.value / cost.time)
         return max(times)
 

@@ -13,6 +13,8 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.models.speeds import greatest_speed
+from maneuver_automaton.costs import StageCost, terms_of
+from maneuver_automaton.models.greatest_speed import greatest_speed
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.limits import closed_bounds
@@ -93,18 +95,18 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
     from maneuver_automaton.search.lattice_query import lattice_query
 
-    model, cost = problem.automaton.model, problem.cost
+    model, cost = problem.automaton.model, terms_of(problem.cost)
     # the straight line to the nearest goal: at the greatest speed, or the best price of words
     straight = min(
         max(0.0, goal.off(problem.start)[0] - goal.tolerance_m) for goal in problem.goals
     )
     known = 0.0
-    if isinstance(cost, Cost):
+    if cost:
         known = cost.time * min(_quickest(problem, goal) for goal in problem.goals)
         known += cost.length * straight
     if why_not_polished(problem) and not follows_paths(model):  # all plans are words
-        known = max(known, straight * least_price_per_metre(problem.automaton, cost))
-    if not (follows_paths(model) and problem.rests_at_both_ends and isinstance(cost, Cost)):
+        known = max(known, straight * least_price_per_metre(problem.automaton, problem.cost))
+    if not (follows_paths(model) and problem.rests_at_both_ends and cost):
         return LowerBound(value=known, kind="distance")
     simpler = kinematic_problem(problem, switch=0.0)
     bound = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))

@@ -18,7 +18,7 @@ import numpy as np
 from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import terms_of
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.bounds import bound_along_paths, formula_bound, lattice_bound
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
@@ -153,8 +153,8 @@ def _with_few_changes(
     problem: Problem, budget: Budget, work: int | None, *, most: int, incumbent: float
 ) -> LowerBound:
     """Bound of plans with few changes: at some price for each, less that of so many."""
-    best, cost = known_bound(problem), problem.cost
-    if not isinstance(cost, Cost):
+    best, cost = known_bound(problem), terms_of(problem.cost)
+    if cost is None:
         return best
     scale = incumbent if incumbent < math.inf else 2.0 * best.value
     for number, share in enumerate(SHARES):
@@ -299,11 +299,11 @@ class _Ramp:
 
 def _ramp(problem: Problem) -> _Ramp:
     """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
-    model, cost = problem.automaton.model, problem.cost
+    model, cost = problem.automaton.model, terms_of(problem.cost)
     if not (follows_paths(model) and problem.has_inertia and problem.rests_at_both_ends):
         return _Ramp()
     twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
-    if not isinstance(cost, Cost) or not cost.time or (twists[:, 0] == 0.0).any():
+    if cost is None or not cost.time or (twists[:, 0] == 0.0).any():
         return _Ramp()
     fastest = float(np.abs(twists[:, 0]).max())
     seconds = fastest / float(model.control_limits[0, 1])

@@ -16,6 +16,9 @@ from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import LEAST_DURATION, MOST_DURATION
+from maneuver_automaton.costs import Cost, StageCost, terms_of
+from maneuver_automaton.optimal_control.polish_values import LEAST_DURATION, MOST_DURATION
+from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.problem import Problem
 
 EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some
@@ -37,7 +40,7 @@ class PolishedPrice:
 
     def of(self, plan: Plan) -> float:
         """Cost of a plan at this price."""
-        if self.cost is self.problem.cost:
+        if self.cost is terms_of(self.problem.cost):
             return self.problem.cost_of(plan)
         return replace(self.problem, cost=self.cost).cost_of(plan)
 
@@ -89,8 +92,8 @@ def polished_price(problem: Problem) -> PolishedPrice:
     >>> price.time, price.switch
     (1.0, 0.0)
     """
-    cost = problem.cost
-    if not isinstance(cost, Cost):
+    cost = terms_of(problem.cost)
+    if cost is None:
         return PolishedPrice(problem, Cost(time=1.0), 0.0)
     rest = problem.automaton.rest
     pads = problem.horizon.time is not None and rest is not None and rests_at_an_end(problem)
@@ -110,9 +113,10 @@ def polished_price(problem: Problem) -> PolishedPrice:
 
 def prices_metres_alone(cost: StageCost) -> bool:
     """Whether a cost prices the length of a motion, and neither its time nor its controls."""
-    if not isinstance(cost, Cost):
+    terms = terms_of(cost)
+    if terms is None:
         return False
-    return cost.length > 0.0 and not any((cost.time, cost.effort, cost.norm))
+    return terms.length > 0.0 and not any((terms.time, terms.effort, terms.norm))
 
 
 def admitted_durations(problem: Problem) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.fcl_checker import origin_near
 from maneuver_automaton.collision.outline import blocked_rectangles
 from maneuver_automaton.collision.surroundings import parts_of, surroundings_of
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import Interval
@@ -50,6 +50,7 @@ from maneuver_automaton.search.setup import search_setup, sub_library
 from maneuver_automaton.search.words import search_setup_words
 
 NUMBERS_ALONE = "part_poses of the vehicle takes numbers alone, no symbols"
+NO_TERMS = "the cost has no method terms(), which would return the weights it is the sum of"
 POINT = ((np.zeros((1, 2)), 0.0),)  # the body of a vehicle without a footprint
 SAMPLES = 500  # of a plan that passes above or below obstacles
 EXPANSIONS_AN_ITERATION = 4  # of the lattice, in place of one iteration of polishing
@@ -100,6 +101,8 @@ def left_out(*problems: Problem) -> tuple[str, ...]:
         why = why_not_polished(one) if one.has_inertia else ""
         if why and why in (why_no_casadi(), NUMBERS_ALONE):
             return (f"plans are not polished, and may cost much more: {why}",)
+        if one.has_inertia and not why and terms_of(one.cost) is None:
+            return (f"plans are polished in time alone: {NO_TERMS}",)
     return ()
 
 

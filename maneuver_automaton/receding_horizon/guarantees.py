@@ -14,6 +14,7 @@ from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.lower_bound import Proving, in_costs
+from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.settings import switches_at_will
@@ -90,19 +91,19 @@ def promises(problem: Problem, *, step: float) -> Promises:
     rest = rest_rate(problem) or 0.0
     steady = switches_at_will(problem) and not problem.zones
     least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
-    cost = problem.cost
+    cost = terms_of(problem.cost)
     fixed = problem.horizon.time is not None
     effort = 0.0
-    if fixed and isinstance(cost, Cost):
+    if fixed and cost:
         effort = _least_effort(problem, cost)
     return Promises(
         least_rate=max(least, 0.0),
         rest_rate=rest,
-        time_rate=cost.time if isinstance(cost, Cost) and not fixed else 0.0,
+        time_rate=cost.time if cost and not fixed else 0.0,
         effort=effort,
         horizon=problem.horizon.time,
         step=step,
-        switch=cost.switch if isinstance(cost, Cost) and fixed else 0.0,
+        switch=cost.switch if cost and fixed else 0.0,
         steady=steady,
     )
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import plain_numbers
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.costs import terms_of
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
 
@@ -72,14 +73,15 @@ class Settings:
 
     def _check_continuous(self, problem: Problem) -> None:
         """Raise ValueError if plans of a problem cannot be driven with other controls."""
-        what, cost = "plans with pieces" if self.pieces else "retimed plans", problem.cost
+        what = "plans with pieces" if self.pieces else "retimed plans"
+        terms = terms_of(problem.cost)
         if not self.at_will or problem.zones or problem.climbs_among_obstacles:
             raise ValueError(
                 f"receding horizon: {'pieces are' if self.pieces else 'retimed is'} for vehicles "
                 "without inertia, and no zones or heights: at another pace a maneuver leads "
                 "elsewhere, and a zone may forbid it"
             )
-        if problem.horizon.time is None or not getattr(cost, "effort", 0.0) > 0.0:
+        if problem.horizon.time is None or terms is None or not terms.effort > 0.0:
             raise ValueError(
                 f"receding horizon: {what} need a fixed horizon and a cost with effort"
             )

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton._files import relative
-from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Horizon, Unstated
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
@@ -254,10 +254,14 @@ def _automaton(scenario: Scenario, folder: Path) -> dict[str, Any]:
 
 
 def _cost(cost: StageCost) -> dict[str, Any]:
-    if not isinstance(cost, Cost):
-        raise ValueError("cost: a scenario file can state the class Cost only")
-    order = {1.0: 1, 2.0: 2}.get(cost.norm_order, "inf")
-    return stated(CostPart, cost, norm_order=order)
+    terms = terms_of(cost)
+    if terms is None:
+        raise ValueError(
+            "cost: a scenario file can state the terms of the class Cost only, need its method "
+            "terms(), which returns them"
+        )
+    order = {1.0: 1, 2.0: 2}.get(terms.norm_order, "inf")
+    return stated(CostPart, terms, norm_order=order)
 
 
 def _horizon(horizon: Horizon) -> dict[str, Any]:

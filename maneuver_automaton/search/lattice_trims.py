@@ -12,7 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
-from maneuver_automaton.costs import StageCost
+from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.words.library import (
     NO_TRIM,
@@ -147,9 +147,10 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
 
 def _with_prices(arrays: LibraryArrays, cost: StageCost) -> LibraryArrays:
     """The arrays with the prices of a switch and of a change of direction."""
+    terms = terms_of(cost)
     return arrays._replace(
-        switch=float(getattr(cost, "switch", 0.0)),
-        direction_change=float(getattr(cost, "direction_change", 0.0)),
+        switch=terms.switch if terms else 0.0,
+        direction_change=terms.direction_change if terms else 0.0,
     )
 
 

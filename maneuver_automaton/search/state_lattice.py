@@ -20,9 +20,8 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, wrapped
 from maneuver_automaton.budget import Budget, Pace
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import OnLattice
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
@@ -126,7 +125,8 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
     timed = horizon.time is not None or horizon.max_time is not None or horizon.stay
     if model is None or problem.moves or timed:
         return None
-    if not isinstance(problem.cost, Cost) or problem.automaton.body_velocities.any():
+    cost = terms_of(problem.cost)
+    if cost is None or problem.automaton.body_velocities.any():
         return None
     named, index = [], []
     for k in goals:
@@ -137,7 +137,7 @@ def graph_of(problem: Problem, goals: Sequence[int], prepared: Prepared) -> Grap
         return None
     there = problem.starting_at(problem.start, time=problem.start_time, goals=named)
     query = lattice_query(there, range(len(named)), prepared=prepared)
-    fine = prepared.once(_followed, query.library, problem.cost)
+    fine = prepared.once(_followed, query.library, cost)
     states = prepared.once(_states, query.library, fine, problem.setting)
     if states is None:
         return None
@@ -191,10 +191,10 @@ def _states(
 
     Before the price the least costs of edges, and after it where tables of costs are kept.
     """
-    arrays, automaton, cost = library.arrays, library.priced.automaton, problem.cost
+    arrays, automaton, cost = library.arrays, library.priced.automaton, terms_of(problem.cost)
     model = automaton.lattice
-    assert isinstance(model, OnLattice)
-    assert isinstance(cost, Cost)
+    assert model is not None
+    assert cost is not None
     heading = np.array([model.heading(automaton.trims[k].reduced_state) for k in library.trims])
     source, target = arrays.edge_source, arrays.edge_target
     ends = (SE2(facing(heading[source])) @ SE2(arrays.edge_displacement[:, :3])).pose

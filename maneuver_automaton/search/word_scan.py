@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget, EvenPace
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_words
 from maneuver_automaton.search._kernels_polish import polish_candidates
@@ -107,7 +107,7 @@ class WordScan:
         self.not_first = rows[0] if rows else -1  # a row of the search
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
-        self.own_prices = not isinstance(problem.cost, Cost)
+        self.own_prices = terms_of(problem.cost) is None
         if self.own_prices:
             alternatives = None
         self.pruned = alternatives is not None or upper_bound < math.inf
@@ -252,7 +252,7 @@ class WordScan:
 
     def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> KernelProblem:
         """The kernels' problem and its transitions; of one class of trims, the identity."""
-        setup, cost, tables = self.setup, self.problem.cost, self.tables
+        setup, terms, tables = self.setup, terms_of(self.problem.cost), self.tables
         rest_rate = setup.rest_rate if pad else 0.0
         ends = setup.start_class, setup.goal_class
         same = _same_for_all(tables, setup.transitions, rest_rate, setup.climbs, fixed, *ends)
@@ -287,8 +287,8 @@ class WordScan:
                 time_limit=float(bounded),
                 pad=int(pad),
                 pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
-                switch=float(getattr(cost, "switch", 0.0)),
-                direction_change=0.0 if linked else float(getattr(cost, "direction_change", 0.0)),
+                switch=terms.switch if terms else 0.0,
+                direction_change=0.0 if linked or not terms else terms.direction_change,
                 more_turns=int((fixed_time and not self.spare) or setup.climbs),
                 shortest=setup.shortest,
             ),

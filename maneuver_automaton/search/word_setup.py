@@ -19,6 +19,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.automaton.validation import trims_between
 from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.costs import StageCost, prices_switches, terms_of
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import TimedWord, plan_of
@@ -167,19 +168,19 @@ class WordSetup:
     @property
     def switch(self) -> float:
         """Cost of a word for each of its trims but the first, as far as known."""
-        return float(getattr(self.problem.cost, "switch", 0.0))
+        terms = terms_of(self.problem.cost)
+        return terms.switch if terms else 0.0
 
     @property
     def is_mispriced(self) -> bool:
         """Whether words may cost more than their parts and switches: a search has lower bounds."""
-        cost = self.problem.cost
-        return not isinstance(cost, Cost) or cost.direction_change > 0.0
+        terms = terms_of(self.problem.cost)
+        return terms is None or terms.direction_change > 0.0
 
     @property
     def prices_switches(self) -> bool:
         """Whether the cost of a word is more than that of its parts."""
-        cost = self.problem.cost
-        return not isinstance(cost, Cost) or cost.switch > 0.0 or cost.direction_change > 0.0
+        return prices_switches(self.problem.cost)
 
     def plan(self, trims: Sequence[int], durations: Array) -> Plan:
         """The plan of a word from the problem's start, padded by rest where the time is fixed."""
@@ -313,8 +314,8 @@ def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
     """Cost of every maneuver (M,), with the switches to it and within it as far as known."""
     name, still = automaton.trim_names[0], origin_of(automaton, automaton.trims[0])
     any_problem = Problem(automaton, still, Goal(pose=still, trim=name), cost=cost, start_trim=name)
-    counted = isinstance(cost, Cost) and (cost.switch > 0.0 or cost.direction_change > 0.0)
-    if not counted or not isinstance(cost, Cost):
+    terms = terms_of(cost)
+    if terms is None or not prices_switches(cost):
         return np.array([any_problem.maneuver_cost(one) for one in automaton.maneuvers])
     alone = [
         Plan(
@@ -325,7 +326,7 @@ def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
         )
         for one in automaton.maneuvers
     ]
-    return np.array([any_problem.cost_of(one) for one in alone]) + cost.switch
+    return np.array([any_problem.cost_of(one) for one in alone]) + terms.switch
 
 
 @kept_by_first
