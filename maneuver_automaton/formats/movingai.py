@@ -136,7 +136,7 @@ def read_movingai_scenario(path: Path) -> tuple[Statement, ...]:
     finite(first[1], at=f"{path}:1: version")
     beside = map_beside(path)
     cells = load_movingai_map(beside)
-    statements = []
+    statements: list[Statement] = []
     for at, columns in _queries(path):
         case = len(statements)
         ends, headings = _ends(columns, at, cells, beside), drawn_headings(case)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Bounds, Goal, Problem
+
+NAMELESS = ("Plan", "Closed loop", "Fleet", "Closed loop of a fleet")  # titles that name nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -285,6 +288,15 @@ class Recording:
     search: Search | None = None
 
     __repr__ = brief
+
+    @property
+    def drivers(self) -> tuple[Mover, ...]:
+        """Those who have a plan."""
+        return tuple(one for one in self.movers if one.has_plan)
+
+    def name_in(self, path: Path | str) -> str:
+        """What a file calls its content: the scenario, or the file's own name."""
+        return Path(path).stem if self.title in ("", *NAMELESS) else self.title
 
     @property
     def begin(self) -> float:
