@@ -21,8 +21,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.recorded import drivers, exported
-from maneuver_automaton.recording import Mover
+from maneuver_automaton.recording import Mover, recording_to_write
 
 COST_FUNCTION = "SA1"
 SAME_M = 1e-3  # [m] between our vehicle and one of CommonRoad's
@@ -66,7 +65,7 @@ def save_commonroad_solution(
     ...     print(str(error).split(",")[0])
     CommonRoad solution: got no drive on a CommonRoad scenario
     """
-    movers = drivers(exported(value))
+    movers = recording_to_write(value).drivers
     if any(one.road is None or one.road.scene.benchmark is None for one in movers):
         raise ValueError(
             "CommonRoad solution: got no drive on a CommonRoad scenario, need a plan or drive of "

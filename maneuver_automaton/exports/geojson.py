@@ -19,10 +19,9 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import Obstacle, Polygon
-from maneuver_automaton.exports.recorded import exported, title_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solids_of
 from maneuver_automaton.plotting.footprint import placed
-from maneuver_automaton.recording import Recording
+from maneuver_automaton.recording import Recording, recording_to_write
 
 PLACES = (0, 1, 3)  # x, y and altitude of a pose
 METRES = 'LOCAL_CS["plan",LOCAL_DATUM["plan",32767],UNIT["metre",1],AXIS["x",EAST],AXIS["y",NORTH]]'
@@ -63,11 +62,11 @@ def save_geojson(value: Any, path: Path | str) -> None:
     >>> first["properties"]["kind"], first["geometry"]["coordinates"]
     ('path', [[0.0, 0.0], [2.0, 0.0]])
     """
-    recording = exported(value)
+    recording = recording_to_write(value)
     features = ",\n".join(json.dumps(one, allow_nan=False) for one in _features(recording))
     head = {
         "type": "FeatureCollection",
-        "name": title_of(recording, path),
+        "name": recording.name_in(path),
         "crs": {"type": "name", "properties": {"name": METRES}},
         "units": "m",
         "frame": "x and y in metres in the plan's own frame, not longitude and latitude",

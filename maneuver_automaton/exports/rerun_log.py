@@ -13,12 +13,11 @@ from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.recorded import exported, title_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
 from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color
 from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
-from maneuver_automaton.recording import Mover, Recording
+from maneuver_automaton.recording import Mover, Recording, recording_to_write
 
 APPLICATION = "maneuver_automaton"
 TIMELINE = "plan"  # [s] on the clock of the plan
@@ -69,7 +68,7 @@ def save_rerun(value: Any, path: Path | str, *, step: float = STEP) -> None:
         raise MissingExtra(
             "rerun: rerun-sdk is not installed; need pip install 'maneuver-automaton[rerun]'"
         ) from error
-    recording, target = exported(value), Path(path)
+    recording, target = recording_to_write(value), Path(path)
     rows = [one.rows(step=step) for one in recording.movers]
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = target.parent / f"{PART}{uuid.uuid4().hex}"
@@ -78,7 +77,7 @@ def save_rerun(value: Any, path: Path | str, *, step: float = STEP) -> None:
         stream = rerun.RecordingStream(APPLICATION)
         stream.save(beside, default_blueprint=_blueprint(rerun.blueprint))
         log = _Log(rerun, stream)
-        stream.send_recording_name(title_of(recording, target))
+        stream.send_recording_name(recording.name_in(target))
         log.fixed(WORLD, rerun.ViewCoordinates.RIGHT_HAND_Z_UP)
         several = len(recording.movers) > 1
         for mover, table in zip(recording.movers, rows, strict=True):

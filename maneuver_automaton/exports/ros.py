@@ -17,10 +17,9 @@ from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.exports.kinematics import accelerations, component, twist_rates
-from maneuver_automaton.exports.recorded import drivers, exported
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
-from maneuver_automaton.recording import Mover
+from maneuver_automaton.recording import Mover, recording_to_write
 
 TYPES = {  # by topic
     "path": "nav_msgs/msg/Path",
@@ -110,11 +109,11 @@ def ros_messages(
     """
     if not (math.isfinite(stamp) and stamp >= 0.0):
         raise ValueError(f"stamp: must not be negative, got {stamp} s")
-    recording = exported(value, model=model)
+    recording = recording_to_write(value, model=model)
     start = round(stamp * NANO)  # whole: today's seconds leave a float no nanoseconds
     found: dict[str, Any] = {}
     frames: list[Message] = []
-    for mover in drivers(recording):
+    for mover in recording.drivers:
         begin = start + round((mover.start_time - recording.begin) * NANO)
         name = f"{_ros_name(mover.name)}/" if len(recording.movers) > 1 else ""
         messages = _messages(

@@ -9,9 +9,8 @@ from typing import Any
 
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.exports.kinematics import kinematics
-from maneuver_automaton.exports.recorded import drivers, exported
 from maneuver_automaton.models import Model
-from maneuver_automaton.recording import Mover
+from maneuver_automaton.recording import Mover, recording_to_write
 
 
 def save_csv(
@@ -54,8 +53,8 @@ def save_csv(
     >>> print((folder / "plan.csv").read_text().splitlines()[2])
     1.0,1.0,0.0,0.0,1.0,0.0,0.0,1.0,1.0,0.0,ahead
     """
-    recording = exported(value, model=model)
-    tables = {one.name: _columns(one, step) for one in drivers(recording)}
+    recording = recording_to_write(value, model=model)
+    tables = {one.name: _columns(one, step) for one in recording.drivers}
     names = list(dict.fromkeys(name for table in tables.values() for name in table))
     names.append(names.pop(names.index("primitive")))  # stays the last one
     several = len(recording.movers) > 1

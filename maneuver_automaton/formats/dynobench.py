@@ -336,9 +336,16 @@ Ends: TypeAlias = dict[str, tuple[Array, Array]]
 
 def _with_robot(world: Statement, vehicle: StatedVehicle, ends: Ends) -> Statement:
     """The problem of one robot alone."""
-    stated: dict[str, Any] = {what: pose for what, (pose, _) in ends.items()}
-    stated |= {f"{what}_state": state for what, (_, state) in ends.items()}
-    return replace(world, footprint=vehicle.footprint, vehicle=vehicle, **stated)
+    (start, start_state), (goal, goal_state) = ends.values()
+    return replace(
+        world,
+        start=start,
+        goal=goal,
+        start_state=start_state,
+        goal_state=goal_state,
+        footprint=vehicle.footprint,
+        vehicle=vehicle,
+    )
 
 
 def _vehicles(models: Sequence[StatedModel], ends: Sequence[Ends]) -> list[StatedVehicle]:

@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from typing import Any
 
+from maneuver_automaton.models import Model
 from maneuver_automaton.recording.values import Curve as Curve
 from maneuver_automaton.recording.values import Environment as Environment
 from maneuver_automaton.recording.values import Event as Event
@@ -76,3 +78,28 @@ def _room_of(result: Any) -> Any:
     package, _, home = type(result).__module__.partition(".")
     room = ROOMS.get(home.partition(".")[0]) if package == "maneuver_automaton" else None
     return None if room is None else importlib.import_module(f"{__name__}.{room}")
+
+
+def recording_to_write(value: Any, *, model: Model | None = None) -> Recording:
+    """The recording of a value that somebody moves in; `model` is that of a Plan alone.
+
+    Raises
+    ------
+    TypeError
+        If nobody moves in it.
+    ValueError
+        If nobody has a plan.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.automaton import Plan
+    >>> recording_to_write(Plan([1.0, 2.0, 0.5], (), durations=[])).movers[0].end.tolist()
+    [1.0, 2.0, 0.5]
+    """
+    recording = recording_of(value)
+    if not recording.drivers:
+        raise ValueError(f"the result has no plan to write: {recording.reason}")
+    if model is None:
+        return recording
+    movers = tuple(replace(one, model=one.model or model) for one in recording.movers)
+    return replace(recording, movers=movers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from maneuver_automaton.problem import Bounds, Goal, Problem
 MOST_DIGITS = 6  # of a number in a heading
 MOST_PAIRS = 3  # that are named, the nearest first
 TIGHT_M = 1e-3  # [m] a clearance that is smaller is remarked on
+NAMELESS = ("Plan", "Closed loop", "Fleet", "Closed loop of a fleet")  # titles that name nothing
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -318,6 +320,15 @@ class Recording:
     def heading(self) -> tuple[Fact, ...]:
         """The facts that head pictures and pages."""
         return tuple(one for one in self.facts if one.heads)
+
+    @property
+    def drivers(self) -> tuple[Mover, ...]:
+        """Those who have a plan."""
+        return tuple(one for one in self.movers if one.has_plan)
+
+    def name_in(self, path: Path | str) -> str:
+        """What a file calls its content: the scenario, or the file's own name."""
+        return Path(path).stem if self.title in ("", *NAMELESS) else self.title
 
     @property
     def begin(self) -> float:

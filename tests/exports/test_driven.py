@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports.recorded import exported
-from maneuver_automaton.recording import recording_of
+from maneuver_automaton.recording import recording_of, recording_to_write
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes, ends
 from tests.plotting.cases import parking_plan
 from tests.plotting.fleets import crossing
@@ -19,7 +18,7 @@ from tests.plotting.loops import pushed_loop
 
 def driver(value):
     """The one that drives."""
-    (mover,) = exported(value).movers
+    (mover,) = recording_to_write(value).movers
     return mover
 
 
@@ -103,10 +102,10 @@ def test_what_is_no_plan_is_told():
     problem = VALUES["among obstacles"]().problem
     empty = ma.PlanResult(problem=problem, status=ma.PlanStatus.NO_PLAN, reason="none at all")
     with pytest.raises(ValueError) as error:
-        exported(empty)
+        recording_to_write(empty)
     assert str(error.value) == "the result has no plan to write: none at all"
     with pytest.raises(TypeError) as wrong:
-        exported(3)
+        recording_to_write(3)
     assert str(wrong.value).startswith("recording: got int, need a Plan, PlanResult")
 
 
