@@ -44,8 +44,28 @@ def kept_by_first(
     return once
 
 
-class _Kept(dict[Hashable, Callable[..., Any]]):
-    """Results by the function that makes them; copies and other processes begin without any."""
+def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
+    """What is kept under a key with a value, made when it is first asked for; lives as long as it.
+
+    Examples
+    --------
+    >>> class Library:
+    ...     pass
+    >>> one = Library()
+    >>> kept_with(one, "spare", list).append(3)
+    >>> kept_with(one, "spare", list), kept_with(Library(), "spare", list)
+    ([3], [])
+    """
+    values: _Kept = owner.__dict__.setdefault("_values", _Kept())
+    if key not in values:
+        for old in list(values)[: 1 - MOST]:
+            values.pop(old, None)
+    made: _T = values[key] if key in values else values.setdefault(key, make())
+    return made
+
+
+class _Kept(dict[Hashable, Any]):
+    """What is kept, by its key; copies and other processes begin without any."""
 
     def __reduce__(self) -> tuple[type[_Kept], tuple[()]]:
         return _Kept, ()

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import kept_by_first, kept_with
 from maneuver_automaton._limits import MOST_TURNS, check_heading, check_size
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
@@ -480,7 +480,7 @@ class Problem:
             return 0.0
         if course is None:
             raise ValueError(f"maneuver {maneuver.name!r}: has no course, so its cost is not known")
-        known = _known_costs(self.automaton, self.cost)
+        known = kept_with(self.automaton, ("prices", self.cost), dict[str, tuple[Maneuver, float]])
         entry = known.get(maneuver.name)
         if entry is None or entry[0] is not maneuver:
             controls = course.control[:-1]
@@ -688,13 +688,6 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
     return {
         trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
     }
-
-
-@kept_by_first
-def _known_costs(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Maneuver, float]]:
-    """Maneuvers that were priced, by name; a plan of a library is priced several times."""
-    del automaton, cost  # whoever asks keeps one for each
-    return {}
 
 
 def _as_parts(

@@ -16,7 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.checking import TooLate, what_is_hit
-from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.polishing import Polish, guess_along
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.planning.tracking import AT_ONCE, Tracked, track
@@ -32,7 +32,7 @@ WAITS = 9  # at rest, before a path is followed among moving obstacles
 
 
 @dataclass(slots=True, eq=False)
-class AlongPaths:
+class AlongPaths(Step):
     """Stop and steer along the paths of a kinematic vehicle."""
 
     polish: Polish | None  # what guesses along the paths are for
@@ -42,10 +42,6 @@ class AlongPaths:
         load_kernels("lattice", "improvement")
         simpler = kinematic_problem(problem, switch=0.0)
         cost_to_go_table(simpler, prepared=workspace.prepared)
-
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether there is time, and more is asked for."""
-        return found.wants_more
 
     def offer(self, found: Incumbents) -> None:
         """Offer plans along a first path, then along one that is fast to follow so."""

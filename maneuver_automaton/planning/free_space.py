@@ -14,7 +14,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.checking import Condition, load_checking
-from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents, Step
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
@@ -90,7 +90,7 @@ def certificate_of(found: Incumbents) -> float | None:
 
 
 @dataclass(slots=True, eq=False)
-class AllWords:
+class AllWords(Step):
     """The words of free space, by exhaustive search or insertion: obstacles sort out what hits."""
 
     candidates: list[Candidate] = field(default_factory=list)  # cheapest first, then the shortest
@@ -110,22 +110,6 @@ class AllWords:
     def offer(self, found: Incumbents) -> None:
         """Offer the cheapest ones that stay free and inside, as many as are asked for."""
         problem, ended = found.problem, found.ended
-        self._search(found)
-        ended.is_complete, ended.searched = True, found.budget.elapsed
-        found.offer_in_turn(self.candidates)
-        found.counts["rejected_by_audit"] = found.refused(Condition.AUDIT)
-        if problem.obstacles:
-            found.counts["words_that_hit"] = found.refused(Condition.COLLISION)
-        if not found.plans:
-            ended.why = self._why_none(found)
-        elif self.proven and not any(one.tolerance_m or one.tolerance_rad for one in problem.goals):
-            ended.bound = LowerBound(value=self.candidates[0].cost, kind="exhaustive")
-        else:
-            ended.bound = formula_bound(problem)
-
-    def _search(self, found: Incumbents) -> None:
-        """Search for every goal that is inside the bounds."""
-        problem = found.problem
         sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
         goals = [
             k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)
@@ -141,6 +125,17 @@ class AllWords:
         words.sort(key=lambda row: (float(f"{row[0].cost:.9g}"), len(row[0].trims), *row[0].trims))
         self.candidates = [word_candidate(problem, word, index) for word, index in words]
         self.proven = len(proven) == len(goals)
+        ended.is_complete, ended.searched = True, found.budget.elapsed
+        found.offer_in_turn(self.candidates)
+        found.counts["rejected_by_audit"] = found.refused(Condition.AUDIT)
+        if problem.obstacles:
+            found.counts["words_that_hit"] = found.refused(Condition.COLLISION)
+        if not found.plans:
+            ended.why = self._why_none(found)
+        elif self.proven and not any(one.tolerance_m or one.tolerance_rad for one in problem.goals):
+            ended.bound = LowerBound(value=self.candidates[0].cost, kind="exhaustive")
+        else:
+            ended.bound = formula_bound(problem)
 
     def _why_none(self, found: Incumbents) -> tuple[PlanStatus, str]:
         problem, refused = found.problem, found.refused
@@ -203,7 +198,7 @@ def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | No
     )
 
 
-class FreeWords:
+class FreeWords(Step):
     """Words of free space before the lattice is searched; among obstacles some may be free."""
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
@@ -216,10 +211,6 @@ class FreeWords:
         for goal in problem.goals:
             word_setup(problem, goal, most_trims=ALPHABET, steers=True)
 
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether there is time, and more is asked for."""
-        return found.wants_more
-
     def offer(self, found: Incumbents) -> None:
         """Offer words as they are found."""
         problem = found.problem
@@ -231,11 +222,8 @@ class FreeWords:
         found.offer_as_they_come(plans, proven=not problem.obstacles)
 
 
-class TurnedByManeuvers:
+class TurnedByManeuvers(Step):
     """Maneuvers in a row with straight coasts, where no word of trims turns the vehicle."""
-
-    def prepare(self, problem: Problem, workspace: Workspace) -> None:
-        """Nothing has to be ready."""
 
     def is_due(self, found: Incumbents) -> bool:
         """Whether there is no plan."""

@@ -6,6 +6,7 @@ import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.audit import Audit, TerminalError, terminal_error
@@ -417,3 +418,21 @@ class Incumbents:
     def _timing(self, searched: float) -> dict[str, float]:
         refined = max(self.budget.elapsed - searched - self.checking, 0.0)
         return {"search": searched, "refine": refined, "audit": self.checking}
+
+
+class Step(Protocol):
+    """One way to plans of a problem."""
+
+    __slots__ = ()
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> bool | None:
+        """Have ready what it needs before the clock runs; True if later steps need nothing."""
+        return None
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether it is tried after what was found: by default if more is asked for, in time."""
+        return found.wants_more
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer plans as they are found, within the budget of the incumbents."""
+        raise NotImplementedError

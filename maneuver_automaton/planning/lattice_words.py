@@ -22,7 +22,7 @@ from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
-from maneuver_automaton.planning.incumbents import Candidate, Incumbents
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents, Step
 from maneuver_automaton.planning.no_way import along_free_path, before_proof
 from maneuver_automaton.planning.polishing import BY_TIME, Polish
 from maneuver_automaton.planning.result import Workspace
@@ -33,6 +33,7 @@ from maneuver_automaton.refinement.improve import Improved, Patience, improve, r
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.beginning import Begun
+from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_library import lattice_library
@@ -65,7 +66,7 @@ STONES = (  # where stones are laid and their radii, in shares of the path
 
 
 @dataclass(slots=True, eq=False)
-class Lattice:
+class Lattice(Step):
     """The words that the lattice finds: a first one, then better ones, and others beside it."""
 
     polish: Polish | None = None  # of what it finds; it then gets a share of the time alone
@@ -90,10 +91,6 @@ class Lattice:
             if horizon.time or horizon.max_time or library.per_metre == 0.0:
                 in_time = replace(problem, cost=BY_TIME)
                 lattice_library(in_time, goals, prepared=workspace.prepared)
-
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether there is time, and more is asked for."""
-        return found.wants_more
 
     def offer(self, found: Incumbents) -> None:
         """Offer words as they are found, then what improving them finds.
@@ -142,9 +139,31 @@ class Lattice:
         self.table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
         self.query = query = query if known else late_at_first(query)
         self.found, self.words, self.spent = found, [], 0
-        self.limit, self.alone = found.for_first.stage(share), not found.plans
-        first = ended.lattice = self._first(begun)
-        ended.finds_plans, ended.nodes = known, first.nodes if first else None
+        limit = self.limit = found.for_first.stage(share)
+        self.alone, ended.finds_plans = not found.plans, known
+        if problem.obstacles and not found.plans:
+            last = before_proof(found.for_first)
+            limit = replace(limit, deadline=min(limit.deadline, last.deadline))
+        word, first = None, None
+        if not known and (math.isfinite(query.most_time) or query.library.per_metre == 0.0):
+            # where a search by cost alone would look everywhere, or for too long motions
+            in_time = replace(problem, cost=BY_TIME)
+            quick = late_at_first(lattice_query(in_time, _goals(query), prepared=prepared))
+            word, more = quick_word(query, quick, budget=limit)
+            found.counts.update(expansions=more)
+        elif problem.moves and known:  # one with rests, if a quick search finds none
+            first = self.first_plan(query, limit, most=QUICK)
+            word = first.word
+            if word is None:
+                path = self.first_plan(_among_static(query), limit)
+                word = None if path.word is None else with_waits(query, path.word)
+        if word is None:
+            aside = along_free_path(query, self.table)
+            first = self.first_plan(query, limit, begun=begun, aside=aside)
+            word = first.word
+        if word is not None:
+            self.gained(word)
+        ended.lattice, ended.nodes = first, first.nodes if first else None
         # The path in the plane, where a way leads far round, takes longer than a first plan.
         at_once = not problem.has_inertia and problem.search.improve
         ended.bound = lattice_bound(query) if at_once else None
@@ -234,43 +253,6 @@ class Lattice:
         self.found.counts.update(expansions=expansions, collision_queries=queries)
         if self.finds_plans:
             self.found.counts.update(more)
-
-    def _first(self, begun: Begun | None = None) -> FirstPlan | None:
-        """The first plan; where obstacles move, one with rests if a quick search finds none."""
-        query, limit = self.query, self.limit
-        if query.problem.obstacles and not self.found.plans:
-            last = before_proof(self.found.for_first)
-            limit = replace(limit, deadline=min(limit.deadline, last.deadline))
-        # where a search by cost alone would look everywhere, or for too long motions
-        in_time = math.isfinite(query.most_time) or query.library.per_metre == 0.0
-        if not self.finds_plans and in_time and self._quick():
-            return None
-        if query.problem.moves and self.finds_plans:
-            first = self.first_plan(query, limit, most=QUICK)
-            if first.word is not None:
-                self.gained(first.word)
-                return first
-            path = self.first_plan(_among_static(query), limit)
-            timed = None if path.word is None else with_waits(query, path.word)
-            if timed is not None:
-                self.gained(timed)
-                return first
-        aside = along_free_path(query, self.table)
-        first = self.first_plan(query, limit, begun=begun, aside=aside)
-        if first.word is not None:
-            self.gained(first.word)
-        return first
-
-    def _quick(self) -> bool:
-        """Whether a search at the price of time alone found a word in time."""
-        query, limit = self.query, self.limit
-        in_time = replace(query.problem, cost=BY_TIME)
-        quick = lattice_query(in_time, _goals(query), prepared=query.prepared)
-        known, more = quick_word(query, late_at_first(quick), budget=limit)
-        self.found.counts.update(expansions=more)
-        if known is not None:
-            self.gained(known)
-        return known is not None
 
     def improved(self) -> list[Candidate]:
         """Plans to be checked, the cheapest first: what was found, and others if asked for."""

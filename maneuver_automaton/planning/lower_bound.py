@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import as_number, as_whole
+from maneuver_automaton._kept import kept_with
 from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import terms_of
@@ -62,14 +63,8 @@ def kept_bounds(problem: Problem, workspace: Workspace) -> KeptBounds | None:
     )
     given = (problem.automaton, problem.cost, lasting_obstacles(problem), problem.footprint)
     limits = (problem.margin, problem.bounds.x, problem.bounds.y)
-    return workspace.prepared.once(
-        _kept_for, aims, *given, *limits, problem.horizon.time is not None
-    )
-
-
-def _kept_for(*_given: object) -> KeptBounds:
-    """A place for functions, one for all that they depend on."""
-    return KeptBounds()
+    key = aims, given, limits, problem.horizon.time is not None
+    return kept_with(workspace.prepared, key, KeptBounds)
 
 
 def lower_bound(

@@ -12,7 +12,7 @@ from typing import Any
 
 from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import kept_with
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.checking import load_checks
@@ -181,19 +181,12 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
 
 def _load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs: once for all like queries."""
-    ready = _ready(problem.setting, workspace)
+    ready: set[Any] = kept_with(problem.setting, workspace, set)
     if problem.ends not in ready:
         prepare_steps(problem, workspace)
         ready.add(problem.ends)
     if problem.setting is not problem and uses_lattice(problem):  # others may follow it
         prepare_bench(problem, workspace.prepared)
-
-
-@kept_by_first
-def _ready(setting: Problem, workspace: Workspace) -> set[Any]:
-    """Which kinds of ends everything is loaded for."""
-    del setting, workspace  # they say which set is meant
-    return set()
 
 
 def plans(

@@ -27,6 +27,9 @@ from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import BodyPart, Guard
 from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.optimal_control.problem import Components, RunningCost
+from maneuver_automaton.optimal_control.separation import BodyPart
+from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
@@ -107,7 +110,7 @@ def left_out(*problems: Problem) -> tuple[str, ...]:
 
 
 @dataclass(slots=True, eq=False)
-class Polish:
+class Polish(Step):
     """Polish kinematic plans of different gears, and the plans found; offer what is cheaper."""
 
     guesses: list[Aimed] = field(default_factory=list)  # along kinematic plans that are known

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from maneuver_automaton.planning.free_space import (
     TurnedByManeuvers,
     certificate_of,
 )
-from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.lattice_words import Lattice
 from maneuver_automaton.planning.on_state_lattice import StateLattice
 from maneuver_automaton.planning.polished_price import prices_metres_alone
@@ -40,20 +40,6 @@ from maneuver_automaton.refinement.stop_and_steer import follows_paths
 from maneuver_automaton.search.beginning import begin, end
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.words.maneuver_words import only_maneuvers_turn
-
-
-class Step(Protocol):
-    """One way to plans of a problem."""
-
-    def prepare(self, problem: Problem, workspace: Workspace) -> bool | None:
-        """Have ready what it needs before the clock runs; True if later steps need nothing."""
-
-    def is_due(self, found: Incumbents) -> bool:
-        """Whether it is to be tried, after what was found and with the time that is left."""
-        ...
-
-    def offer(self, found: Incumbents) -> None:
-        """Offer plans as they are found, within the budget of the incumbents."""
 
 
 class Steps(NamedTuple):
@@ -200,11 +186,8 @@ def _uses_lattice(problem: Problem) -> bool:
     return method == "lattice" or (method == "auto" and bool(problem.obstacles))
 
 
-class Ends:
+class Ends(Step):
     """Tell where no vehicle can be; where all ends are free, begin the search of the lattice."""
-
-    def prepare(self, problem: Problem, workspace: Workspace) -> None:
-        """Nothing: what begins a search is prepared for a map, by `prepare`."""
 
     def is_due(self, found: Incumbents) -> bool:
         """Always."""
@@ -219,11 +202,8 @@ class Ends:
             ended.is_complete = ended.verdict is not None
 
 
-class NearlyMet:
+class NearlyMet(Step):
     """What meets a goal for the checks, however far an exact end is from it."""
-
-    def prepare(self, problem: Problem, workspace: Workspace) -> None:
-        """Nothing has to be ready."""
 
     def is_due(self, found: Incumbents) -> bool:
         """Always."""
@@ -234,7 +214,7 @@ class NearlyMet:
         found.offer_nearly_met()
 
 
-class Checks:
+class Checks(Step):
     """Have the map ready for checks, where plans are checked as they come."""
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:

@@ -21,9 +21,9 @@ from maneuver_automaton.automaton.same_motion import CONVERGED
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
-from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.no_way import proven_blocked
-from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus, Workspace
+from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.lattice_goals import nodes_within
@@ -43,13 +43,10 @@ SPARE = 3  # plans asked for each alternative: with loose ends some are one moti
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WithinTolerance:
+class WithinTolerance(Step):
     """Plans that end within the tolerance of a goal, by `answer` to simpler questions."""
 
     answer: Answer
-
-    def prepare(self, problem: Problem, workspace: Workspace) -> None:
-        """Nothing but what the questions need."""
 
     def is_due(self, found: Incumbents) -> bool:
         """Always: each question has a moment."""

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from maneuver_automaton._compile import bound
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import kept_with
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
@@ -97,19 +97,18 @@ class Begun:
 class _Benches:
     """Those that nobody uses now."""
 
-    free: list[Bench]
+    free: list[Bench] = field(default_factory=list)
     is_made: bool = False  # whether one was made, or found to be impossible
 
 
-@kept_by_first
-def _benches(setting: Problem, ends: object, prepared: Prepared) -> _Benches:
-    del setting, ends, prepared  # they say which benches are meant
-    return _Benches([])
+def _benches(problem: Problem, prepared: Prepared) -> _Benches:
+    """Those for queries of the same setting and kinds of ends."""
+    return kept_with(problem.setting, (problem.ends, prepared), _Benches)
 
 
 def prepare_bench(problem: Problem, prepared: Prepared) -> None:
     """Have a bench ready for queries like this one, where they can begin so."""
-    benches = _benches(problem.setting, problem.ends, prepared)
+    benches = _benches(problem, prepared)
     if not benches.is_made:
         benches.is_made = True
         bench = _bench(problem, prepared)
@@ -122,7 +121,7 @@ def begin(problem: Problem, prepared: Prepared, budget: Budget) -> Begun | None:
 
     Nor is it begun where its ends are not clearly free, or where it would be late.
     """
-    free = _benches(problem.setting, problem.ends, prepared).free
+    free = _benches(problem, prepared).free
     try:
         bench = free.pop()
     except IndexError:  # asked for before, another thread might take the last one
@@ -145,7 +144,7 @@ def begin(problem: Problem, prepared: Prepared, budget: Budget) -> Begun | None:
 
 def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
     """Leave the bench to the next query."""
-    _benches(problem.setting, problem.ends, prepared).free.append(begun.bench)
+    _benches(problem, prepared).free.append(begun.bench)
 
 
 def _bench(problem: Problem, prepared: Prepared) -> Bench | None:

@@ -23,7 +23,7 @@ class _Block(np.ndarray[Any, Any]):
     """Memory that is lent: an array of a kind of its own, whose parts views keep alive."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Prepared:
     """The values of each kind that were made last, by the arguments of their making.
 

@@ -31,7 +31,7 @@ MOVING = "speed 1.5, steering 0"
 
 
 def unpolished(problem):
-    with patch("maneuver_automaton.planning.in_steps.polish_found", lambda *_: None):
+    with patch("maneuver_automaton.planning.polishing.Polish.polish", lambda *_, **__: None):
         return plan(problem, time_limit=60.0)
 
 

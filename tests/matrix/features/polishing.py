@@ -16,7 +16,7 @@ from tests.matrix.vehicles import Vehicle
 
 def _unpolished(problem: Problem, **options: Any) -> PlanResult:
     """A planner that leaves what it finds as it is."""
-    with patch("maneuver_automaton.planning.in_steps.polish_found", lambda *_: None):
+    with patch("maneuver_automaton.planning.polishing.Polish.polish", lambda *_, **__: None):
         return plan(problem, **options)
 
 
