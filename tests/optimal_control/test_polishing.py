@@ -88,12 +88,6 @@ def test_rounding_counts_on_both_sides() -> None:
     assert (reach.nodes, reach.piece) == (pytest.approx([0.75]), pytest.approx([1.5]))
 
 
-def test_pairs_are_joined_once() -> None:
-    one = SolidPairs(*(np.array(column) for column in ([0, 1], [0, 0], [2, 2])))
-    other = SolidPairs(*(np.array(column) for column in ([1, 2], [0, 0], [2, 2])))
-    assert one.extended(other).interval.tolist() == [0, 1, 2]
-
-
 def test_the_number_of_intervals_follows_the_duration_between_its_limits() -> None:
     settings = PolishSettings()
     assert [intervals_for(s, settings) for s in (0.1, 12.0, 900.0)] == [40, 100, 300]
