@@ -19,14 +19,6 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import _kernels_insertion
-from maneuver_automaton.search.library_arrays import (
-    UNUSED,
-    LibraryArrays,
-    corrected,
-    library_arrays,
-    with_fewer_digits,
-    within_time,
-)
 from maneuver_automaton.search.result import (
     Found,
     InsertionTask,
@@ -35,10 +27,18 @@ from maneuver_automaton.search.result import (
     TimedWord,
     in_order,
 )
-from maneuver_automaton.search.setup import FEW, SearchSetup, search_setup, sub_library
+from maneuver_automaton.search.setup import (
+    FEW,
+    UNUSED,
+    InsertionLibrary,
+    SearchSetup,
+    insertion_library,
+    search_setup,
+    sub_library,
+    with_fewer_digits,
+)
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.words import resting, search_setup_words
-from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.word import Word
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
@@ -65,23 +65,23 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     """
     problem = task.problem
     setup = search_setup(problem, task.goal)
-    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+    if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         yield resting(problem, setup)
         return
-    if not len(setup.trims):  # nothing that words are made of
+    if not len(setup.library.trims):  # nothing that words are made of
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
     found = Found(problem, task.alternatives + 1, task.budget)
     exact, setup = setup.goal, with_fewer_digits(setup)
     seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
-    work = _Work(problem, setup, library_arrays(problem, setup), exact, task, seeds)
+    work = _Work(problem, setup, insertion_library(problem, setup), exact, task, seeds)
     most_time = problem.horizon.max_time
     free = _improved(work)
     found.add(_in_time(free, most_time))
     yield found.result()
     late = not free.solutions or free.solutions[0].duration > _latest(most_time)
     if most_time is not None and late and not task.budget.is_over:
-        library = within_time(work.library, most_time)
+        library = work.library.within_time(most_time)
         found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), most_time))
         yield found.result()
 
@@ -99,7 +99,7 @@ def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
 
 def _usual_seeds(task: InsertionTask, setup: SearchSetup) -> int:
     """How many words a search starts from."""
-    few = SEEDS_OF_MANY if len(setup.trims) > FEW else SEEDS
+    few = SEEDS_OF_MANY if len(setup.library.trims) > FEW else SEEDS
     return max(few, 2 * task.alternatives + 1)
 
 
@@ -109,7 +109,7 @@ class _Work:
 
     problem: Problem
     setup: SearchSetup
-    library: LibraryArrays
+    library: InsertionLibrary
     exact: Array  # (4,) the goal with all its digits
     task: InsertionTask
     seeds: int
@@ -150,7 +150,7 @@ def _improved(work: _Work) -> SearchResult:
 def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
     """Solutions of some words and of what insertion makes of them, each word once."""
     problem, library, task, most = work.problem, work.library, work.task, work.most
-    many = len(work.setup.trims) > FEW
+    many = len(work.setup.library.trims) > FEW
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     limit = problem.search.max_expansions
     words: list[TimedWord] = []
@@ -185,7 +185,7 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
 
 def _fitting(work: _Work, rounds: int) -> int:
     """As many of some rounds of insertion as fit into the time left, at least one."""
-    fits = work.task.budget.left / (SECONDS_A_ROUND * len(work.library.rates))
+    fits = work.task.budget.left / (SECONDS_A_ROUND * len(work.library.problem.rates))
     return max(1, int(min(rounds, fits)))
 
 
@@ -212,7 +212,7 @@ def _cost(word: TimedWord) -> float:
 
 def compile_short_runs(problem: Problem) -> None:
     """Have the kernel that shortens runs of two trims compiled, for any problem like this one."""
-    library = library_arrays(problem, search_setup(problem, problem.goals[0]))
+    library = insertion_library(problem, search_setup(problem, problem.goals[0]))
     _with_short_runs(library, TimedWord((0,) * RUN, np.ones(RUN), cost=1.0))
 
 
@@ -236,7 +236,7 @@ def _from_longer(
 
 
 def _with_fewer_switches(
-    library: LibraryArrays, words: Sequence[TimedWord], budget: Budget
+    library: InsertionLibrary, words: Sequence[TimedWord], budget: Budget
 ) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
     if library.free_heading:
@@ -257,12 +257,14 @@ def _names(automaton: Automaton) -> frozenset[str]:
 
 
 def _with_insertions(
-    library: LibraryArrays, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
+    library: InsertionLibrary, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
 ) -> TimedWord:
     """The word with its best times, after inserting what pays, at most `rounds` times."""
     trims, times = _with_room(word)
     size, cost, least, used = _kernels_insertion.improve_word(
-        *_seen_by_kernels(library),
+        library.problem,
+        library.n_priced,
+        library.tail,
         trims,
         times,
         len(word.trims),
@@ -274,19 +276,15 @@ def _with_insertions(
     return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 
 
-def _seen_by_kernels(library: LibraryArrays) -> tuple[TimesProblem, int, int]:
-    """The library, how many of its trims are priced, and its turns of a free heading."""
-    seen = TimesProblem(library.twists, library.rates, library.rows, library.goal, library.targets)
-    return seen, library.n_priced, library.tail
-
-
-def _with_short_runs(library: LibraryArrays, word: TimedWord) -> TimedWord:
+def _with_short_runs(library: InsertionLibrary, word: TimedWord) -> TimedWord:
     """The word with its runs of two trims that alternate shortened."""
     if len(word.trims) - library.tail < RUN:
         return word
     trims, times = _with_room(word)
     size, cost, least = _kernels_insertion.word_with_short_runs(
-        *_seen_by_kernels(library),
+        library.problem,
+        library.n_priced,
+        library.tail,
         trims,
         times,
         len(word.trims),
@@ -306,10 +304,10 @@ def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
     """The solution from a word under work, closed at the exact goal; none if it cannot be."""
     problem, library = work.problem, work.library
     numbers = word.numbers
-    times = corrected(library, numbers, word.durations, work.exact)
+    times = library.corrected(numbers, word.durations, work.exact)
     if times is None:
         return
-    cost = word.cost + float(library.rates[numbers] @ (times - word.durations))
+    cost = word.cost + float(library.problem.rates[numbers] @ (times - word.durations))
     kept = slice(0, numbers.size - library.tail)
     trims, lasting = _without_unused(library.trims[numbers[kept]], times[kept])
     switching = problem.cost.switching(problem.automaton.body_velocities[trims])
@@ -351,9 +349,9 @@ def _fast_words(work: _Work) -> list[TimedWord]:
     hurry = replace(work.problem, cost=Cost(time=1.0), horizon=Horizon())
     setup = search_setup(hurry, hurry.goals[0])
     setup = replace(setup, goal=work.setup.goal, free_heading=work.setup.free_heading)
-    library = library_arrays(hurry, setup)
+    library = insertion_library(hurry, setup)
     least = replace(
-        work, problem=hurry, setup=setup, library=library, exact=library.goal, limit=None
+        work, problem=hurry, setup=setup, library=library, exact=library.problem.goal, limit=None
     )
     met = []
     for seed in _words_of_few(least, hurry):
@@ -377,7 +375,9 @@ def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
     if library.free_heading:
-        turned = float(library.twists[word, 2] @ np.array(times))  # the rest is turned at 1 rad/s
-        word.append(len(library.rates) - 1)
-        times.append(float(np.remainder(library.goal[2] - turned, 2.0 * np.pi)))
+        turned = float(
+            library.problem.twists[word, 2] @ np.array(times)
+        )  # the rest is turned at 1 rad/s
+        word.append(len(library.problem.rates) - 1)
+        times.append(float(np.remainder(library.problem.goal[2] - turned, 2.0 * np.pi)))
     return TimedWord(tuple(word), np.array(times))
