@@ -9,18 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import _kernels_insertion
 from maneuver_automaton.search.result import (
-    Found,
+    BestWords,
     InsertionTask,
     SearchResult,
     SearchStatus,
@@ -39,7 +38,7 @@ from maneuver_automaton.search.setup import (
 )
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.words import resting, search_setup_words
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, normal_form
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
 SEEDS_OF_MANY = 4  # the same for larger libraries: insertion makes more of them
@@ -71,29 +70,25 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     if not len(setup.library.trims):  # nothing that words are made of
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
-    found = Found(problem, task.alternatives + 1, task.budget)
+    found = BestWords(problem, task.alternatives + 1, task.budget)
     exact, setup = setup.goal, with_fewer_digits(setup)
     seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
     work = _Work(problem, setup, insertion_library(problem, setup), exact, task, seeds)
     most_time = problem.horizon.max_time
     free = _improved(work)
-    found.add(_in_time(free, most_time))
+    latest = math.inf if most_time is None else most_time + LATE
+    found.add(_in_time(free, latest))
     yield found.result()
-    late = not free.solutions or free.solutions[0].duration > _latest(most_time)
+    late = not free.solutions or free.solutions[0].duration > latest
     if most_time is not None and late and not task.budget.is_over:
         library = work.library.within_time(most_time)
-        found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), most_time))
+        found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), latest))
         yield found.result()
 
 
-def _latest(most_time: float | None) -> float:
-    """When a plan has to end, but for rounding [s]."""
-    return math.inf if most_time is None else most_time + LATE
-
-
-def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
+def _in_time(found: SearchResult, latest: float) -> SearchResult:
     """The solutions that end in time."""
-    kept = tuple(one for one in found.solutions if one.duration <= _latest(most_time))
+    kept = tuple(one for one in found.solutions if one.duration <= latest)
     return replace(found, solutions=kept)
 
 
@@ -130,12 +125,11 @@ class _Work:
 def _improved(work: _Work) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
-    if plan is not None and len(plan.trims) <= LONGEST:
-        names = _names(automaton)
-        if all(trim.name in names for trim in plan.trims):
-            word = np.array([automaton.index_of(trim.name) for trim in plan.trims], dtype=np.int64)
-            if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
-                known.append(_in_library(work, word, plan.durations))
+    names = [] if plan is None else [trim.name for trim in plan.trims]
+    if plan is not None and len(names) <= LONGEST and set(names) <= set(automaton.trim_names):
+        word = np.array([automaton.index_of(name) for name in names], dtype=np.int64)
+        if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
+            known.append(_in_library(work, word, plan.durations))
     if work.seeds == 0:
         found = _improved_from(work, known)
         if found.solutions:
@@ -162,12 +156,14 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
             break
         words.append(_with_insertions(library, seed, most, _fitting(work, rounds), counts))
     counts["expansions"] = counts["seeds"] = len(words)
-    words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
+    words = sorted((word for word in words if math.isfinite(word.cost)), key=attrgetter("cost"))
     for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
         if words[k].certificate < -ACCURACY * library.scale and not task.budget.is_over:
             words[k] = _with_insertions(library, words[k], most, _fitting(work, ROUNDS), counts)
     words = [_with_short_runs(library, word) for word in words]
-    binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
+    binding = (
+        not words or min(words, key=attrgetter("cost")).certificate < -ACCURACY * library.scale
+    )
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
     if prices_switches(problem.cost) and not task.budget.is_over:
@@ -195,7 +191,7 @@ def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
     in_turn = work.task.alternatives == 0 and not prices_switches(work.problem.cost)
     solutions: list[Word] = []
     enough = math.inf
-    for word in sorted(words, key=_cost) if in_turn or budget.is_over else words:
+    for word in sorted(words, key=attrgetter("cost")) if in_turn or budget.is_over else words:
         if word.cost > enough or (solutions and budget.is_over):
             break
         if len(word.trims) - work.library.tail <= work.most:
@@ -204,10 +200,6 @@ def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
             if solutions and in_turn:  # closing changes a cost by less
                 enough = min(enough, word.cost + CLOSING * (1.0 + abs(word.cost)))
     return solutions
-
-
-def _cost(word: TimedWord) -> float:
-    return word.cost
 
 
 def compile_short_runs(problem: Problem) -> None:
@@ -227,7 +219,7 @@ def _from_longer(
         word = _with_insertions(library, seed, LONGEST, _fitting(work, ROUNDS), counts)
         grown.append(_with_short_runs(library, word))
     longer = [word for word in grown if math.isfinite(word.cost) and len(word.trims) > most]
-    for word in sorted(longer, key=_cost)[:1]:
+    for word in sorted(longer, key=attrgetter("cost"))[:1]:
         short = None if work.task.budget.is_over else shortened(library, word, most)
         if short is not None and len(short.trims) <= most:
             again = _with_insertions(library, short, most, _fitting(work, ROUNDS), counts)
@@ -249,11 +241,6 @@ def _with_fewer_switches(
                 break
             yield short
             longer = short
-
-
-@kept_by_first
-def _names(automaton: Automaton) -> frozenset[str]:
-    return frozenset(automaton.trim_names)
 
 
 def _with_insertions(
@@ -309,7 +296,9 @@ def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
         return
     cost = word.cost + float(library.problem.rates[numbers] @ (times - word.durations))
     kept = slice(0, numbers.size - library.tail)
-    trims, lasting = _without_unused(library.trims[numbers[kept]], times[kept])
+    trims, lasting = library.trims[numbers[kept]], times[kept]
+    if (used := trims != UNUSED).sum() < trims.size:  # neighbours that unused time parts are one
+        trims, lasting = normal_form(trims[used], lasting[used], shortest=-math.inf)
     switching = problem.cost.switching(problem.automaton.body_velocities[trims])
     yield Word(
         trims=trims,
@@ -317,18 +306,6 @@ def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
         cost=cost + library.fixed_cost + switching,
         certificate=word.certificate,
     )
-
-
-def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
-    """A word without unused time; neighbours that it has parted become one."""
-    if not (trims == UNUSED).any():
-        return trims, times
-    used = trims != UNUSED
-    trims, times = trims[used], times[used]
-    if not trims.size:
-        return trims, times
-    begins = np.flatnonzero(np.append(True, trims[1:] != trims[:-1]))
-    return trims[begins], np.add.reduceat(times, begins)
 
 
 def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:

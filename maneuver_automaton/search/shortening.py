@@ -15,12 +15,14 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.search.result import TimedWord
 from maneuver_automaton.search.setup import InsertionLibrary
 from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words.word import normal_form
 
 AT_ONCE = 4  # of the shortest trims, how many are tried to be left out
 LAST = 2  # trims too many, from when on everything is tried
 NEAR_MEAN = 5  # trims near the mean of two that may stand for both
 NEAR = 4  # trims of similar twist that one trim is exchanged for
 SWEEPS = 3  # over all trims of a word, at most
+VANISHING = 1e-9  # [s] what lasts no longer lasts no time
 GAIN = 1e-9  # relative, by which an exchange must be cheaper
 
 
@@ -134,10 +136,5 @@ def _solved(library: InsertionLibrary, word: IntArray, times: Array) -> TimedWor
     )
     if solved.status is TimesStatus.FAILED or not math.isfinite(solved.cost):
         return None
-    used = solved.durations > 1e-9
-    kept, lasting = word[used], solved.durations[used]
-    same = np.append(False, kept[1:] == kept[:-1]) if kept.size else np.zeros(0, dtype=bool)
-    if same.any():
-        starts = np.flatnonzero(~same)
-        kept, lasting = kept[starts], np.add.reduceat(lasting, starts)
+    kept, lasting = normal_form(word, solved.durations, shortest=VANISHING)
     return TimedWord(tuple(kept.tolist()), lasting, solved.cost)

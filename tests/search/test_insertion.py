@@ -27,9 +27,8 @@ from maneuver_automaton.search import (
 from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import insertion_stages
-from maneuver_automaton.search.setup import insertion_library
 from maneuver_automaton.search.result import InsertionTask, TimedWord, plan_of
-from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.setup import insertion_library, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.words._kernels_times import TimesProblem
 from tests import reference
