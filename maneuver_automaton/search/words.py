@@ -79,6 +79,7 @@ def search_words(
     """
     setup = search_setup(problem, goal)
     most = problem.horizon.max_trims
+    longest = MOST_TRIMS - int(setup.free_heading)  # moving trims
     limit = most_admitted(free_heading=setup.free_heading, fixed=problem.horizon.time is not None)
     if most is None:
         most = limit
@@ -106,6 +107,7 @@ def search_words(
         solutions = asked + tuple(
             one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
         )
+    exhaustive = finished and most <= longest  # no words of more moving trims are admitted
     if solutions:
         status = SearchStatus.FOUND
     else:
@@ -113,8 +115,8 @@ def search_words(
     return SearchResult(
         status=status,
         solutions=solutions,
-        complete=alternatives is None and finished and upper_bound == math.inf,
-        exhaustive=finished and problem.horizon.max_trims is not None and most <= MOST_TRIMS,
+        complete=alternatives is None and exhaustive and upper_bound == math.inf,
+        exhaustive=exhaustive and problem.horizon.max_trims is not None,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
 
@@ -139,7 +141,7 @@ def search_setup_words(
     conditions = 3 + int(setup.climbs)
     padded = problem.horizon.time is not None and setup.library.rest is not None
     exact = problem.horizon.time is not None and not padded
-    most = min(conditions + int(exact), MOST_TRIMS)
+    most = conditions + int(exact)  # as far as so many are scanned
     job = WordScan(
         problem, setup, most + int(padded), alternatives, nodes=SEED_NODES, spare=spare and padded
     )

@@ -553,3 +553,21 @@ def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
     assert short is not None
     end = reference.plain_end(arrays.problem.twists[short.numbers], short.durations)
     np.testing.assert_allclose(end, goal, atol=1e-9)
+
+
+@compiled_only
+def test_a_climb_to_any_heading_begins_with_three_trims():
+    """Place, altitude and heading are four conditions: three trims, and the turn that is free."""
+    craft = {
+        "ahead": (1, 0, 0, 0),
+        "left": (1, 0, 1, 0),
+        "right": (1, 0, -1, 0),
+        "up": (0, 0, 0, 1),
+    }
+    model = UserModel(
+        name="craft", group=SE2xR, control_names=tuple("abcd"), velocity=lambda _, u: np.asarray(u)
+    )
+    goal = Goal(pose=[3.0, 2.0, 1.0, 2.0], free_heading=True)
+    problem = Problem(Automaton.of_controls(model, craft), [0, 0, 0, 0], goal)
+    solution = best(problem)
+    assert plan_of(problem, solution).end[[0, 1, 3]] == pytest.approx([3.0, 2.0, 2.0], abs=1e-9)
