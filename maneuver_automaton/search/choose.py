@@ -27,10 +27,11 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.free_insertion import free_stages
 from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
-from maneuver_automaton.search.setup import SearchSetup, search_setup, sub_library
-from maneuver_automaton.search.word_scan import MOST_TRIMS, tables_of
+from maneuver_automaton.search.setup import SearchSetup, few_of, search_setup
+from maneuver_automaton.search.word_scan import MOST_TRIMS, tables
 from maneuver_automaton.search.words import resting, search_words
 from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words.library import moving_trims
 from maneuver_automaton.words.word import Word
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
@@ -48,7 +49,8 @@ def load_search(problem: Problem) -> None:
     if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
         load_kernels("words")
         if len(problem.automaton) > LARGE:
-            tables_of(search_setup(problem, problem.goals[0]))
+            library = moving_trims(problem.automaton, problem.cost)
+            tables(library, free_heading=problem.goals[0].free_heading)
     else:
         load_kernels("words", "insertion")
 
@@ -161,14 +163,14 @@ def search_with_least_times(
     (True, 4.3623)
     """
     setup = search_setup(problem, goal)
-    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+    if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         return resting(problem, setup)
-    padded = problem.horizon.time is not None and setup.rest is not None
+    padded = problem.horizon.time is not None and setup.library.rest is not None
     most = min(problem.horizon.max_trims or MOST_LASTING + 1, MOST_LASTING + int(padded))
     found: list[Word] = []
     words = 0
     status = SearchStatus.EXHAUSTED
-    reaching = np.flatnonzero(np.isin(setup.trims, sub_library(setup).trims)).tolist()
+    reaching = np.flatnonzero(np.isin(setup.library.trims, few_of(setup.library).trims)).tolist()
     for word in _words(reaching, most):
         if budget.is_over or words == problem.search.max_expansions:
             status = SearchStatus.OUT_OF_BUDGET
@@ -202,14 +204,14 @@ def _solved(
     """The word with its best times, if it reaches the goal."""
     rows = list(word)
     least = problem.horizon.min_coast
-    twists, rates = setup.twists[rows], setup.rates[rows]
+    twists, rates = setup.library.twists[rows], setup.library.rates[rows]
     floors = np.full(len(rows), least)
-    trims = setup.trims[rows]
-    if rest and setup.rest is not None:
+    trims = setup.library.trims[rows]
+    if rest and setup.library.rest is not None:
         twists = np.vstack([twists, np.zeros(4)])
-        rates = np.append(rates, setup.rest_rate)
+        rates = np.append(rates, setup.library.rest_rate)
         floors = np.append(floors, 0.0)
-        trims = np.append(trims, setup.rest)
+        trims = np.append(trims, setup.library.rest)
     longest = problem.horizon.max_time
     # Where the cheapest times are too long, the greatest time binds: it becomes a fixed one.
     for total in (problem.horizon.time,) if longest is None else (None, longest):

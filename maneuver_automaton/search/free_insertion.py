@@ -9,37 +9,36 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, prices_switches
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import _kernels_insertion
-from maneuver_automaton.search.library_arrays import (
-    UNUSED,
-    LibraryArrays,
-    corrected,
-    library_arrays,
-    with_fewer_digits,
-    within_time,
-)
 from maneuver_automaton.search.result import (
-    Found,
+    BestWords,
     InsertionTask,
     SearchResult,
     SearchStatus,
     TimedWord,
     in_order,
 )
-from maneuver_automaton.search.setup import FEW, SearchSetup, search_setup, sub_library
+from maneuver_automaton.search.setup import (
+    FEW,
+    UNUSED,
+    InsertionLibrary,
+    SearchSetup,
+    insertion_library,
+    search_setup,
+    sub_library,
+    with_fewer_digits,
+)
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.search.words import resting, search_setup_words
-from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, normal_form
 
 SEEDS = 10  # cheapest words that are improved, where the library is its own sub-library
 SEEDS_OF_MANY = 4  # the same for larger libraries: insertion makes more of them
@@ -65,41 +64,37 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     """
     problem = task.problem
     setup = search_setup(problem, task.goal)
-    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+    if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         yield resting(problem, setup)
         return
-    if not len(setup.trims):  # nothing that words are made of
+    if not len(setup.library.trims):  # nothing that words are made of
         yield SearchResult(status=SearchStatus.EXHAUSTED, solutions=())
         return
-    found = Found(problem, task.alternatives + 1, task.budget)
+    found = BestWords(problem, task.alternatives + 1, task.budget)
     exact, setup = setup.goal, with_fewer_digits(setup)
     seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
-    work = _Work(problem, setup, library_arrays(problem, setup), exact, task, seeds)
+    work = _Work(problem, setup, insertion_library(problem, setup), exact, task, seeds)
     most_time = problem.horizon.max_time
     free = _improved(work)
-    found.add(_in_time(free, most_time))
+    latest = math.inf if most_time is None else most_time + LATE
+    found.add(_in_time(free, latest))
     yield found.result()
-    late = not free.solutions or free.solutions[0].duration > _latest(most_time)
+    late = not free.solutions or free.solutions[0].duration > latest
     if most_time is not None and late and not task.budget.is_over:
-        library = within_time(work.library, most_time)
-        found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), most_time))
+        library = work.library.within_time(most_time)
+        found.add(_in_time(_improved(replace(work, library=library, limit=most_time)), latest))
         yield found.result()
 
 
-def _latest(most_time: float | None) -> float:
-    """When a plan has to end, but for rounding [s]."""
-    return math.inf if most_time is None else most_time + LATE
-
-
-def _in_time(found: SearchResult, most_time: float | None) -> SearchResult:
+def _in_time(found: SearchResult, latest: float) -> SearchResult:
     """The solutions that end in time."""
-    kept = tuple(one for one in found.solutions if one.duration <= _latest(most_time))
+    kept = tuple(one for one in found.solutions if one.duration <= latest)
     return replace(found, solutions=kept)
 
 
 def _usual_seeds(task: InsertionTask, setup: SearchSetup) -> int:
     """How many words a search starts from."""
-    few = SEEDS_OF_MANY if len(setup.trims) > FEW else SEEDS
+    few = SEEDS_OF_MANY if len(setup.library.trims) > FEW else SEEDS
     return max(few, 2 * task.alternatives + 1)
 
 
@@ -109,7 +104,7 @@ class _Work:
 
     problem: Problem
     setup: SearchSetup
-    library: LibraryArrays
+    library: InsertionLibrary
     exact: Array  # (4,) the goal with all its digits
     task: InsertionTask
     seeds: int
@@ -130,12 +125,11 @@ class _Work:
 def _improved(work: _Work) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
-    if plan is not None and len(plan.trims) <= LONGEST:
-        names = _names(automaton)
-        if all(trim.name in names for trim in plan.trims):
-            word = np.array([automaton.index_of(trim.name) for trim in plan.trims], dtype=np.int64)
-            if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
-                known.append(_in_library(work, word, plan.durations))
+    names = [] if plan is None else [trim.name for trim in plan.trims]
+    if plan is not None and len(names) <= LONGEST and set(names) <= set(automaton.trim_names):
+        word = np.array([automaton.index_of(name) for name in names], dtype=np.int64)
+        if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
+            known.append(_in_library(work, word, plan.durations))
     if work.seeds == 0:
         found = _improved_from(work, known)
         if found.solutions:
@@ -150,7 +144,7 @@ def _improved(work: _Work) -> SearchResult:
 def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
     """Solutions of some words and of what insertion makes of them, each word once."""
     problem, library, task, most = work.problem, work.library, work.task, work.most
-    many = len(work.setup.trims) > FEW
+    many = len(work.setup.library.trims) > FEW
     counts = {"expansions": 0, "insertions": 0, "seeds": 0}
     limit = problem.search.max_expansions
     words: list[TimedWord] = []
@@ -162,12 +156,14 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
             break
         words.append(_with_insertions(library, seed, most, _fitting(work, rounds), counts))
     counts["expansions"] = counts["seeds"] = len(words)
-    words = sorted((word for word in words if math.isfinite(word.cost)), key=_cost)
+    words = sorted((word for word in words if math.isfinite(word.cost)), key=attrgetter("cost"))
     for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
         if words[k].certificate < -ACCURACY * library.scale and not task.budget.is_over:
             words[k] = _with_insertions(library, words[k], most, _fitting(work, ROUNDS), counts)
     words = [_with_short_runs(library, word) for word in words]
-    binding = not words or min(words, key=_cost).certificate < -ACCURACY * library.scale
+    binding = (
+        not words or min(words, key=attrgetter("cost")).certificate < -ACCURACY * library.scale
+    )
     if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
     if prices_switches(problem.cost) and not task.budget.is_over:
@@ -185,7 +181,7 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
 
 def _fitting(work: _Work, rounds: int) -> int:
     """As many of some rounds of insertion as fit into the time left, at least one."""
-    fits = work.task.budget.left / (SECONDS_A_ROUND * len(work.library.rates))
+    fits = work.task.budget.left / (SECONDS_A_ROUND * len(work.library.problem.rates))
     return max(1, int(min(rounds, fits)))
 
 
@@ -195,7 +191,7 @@ def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
     in_turn = work.task.alternatives == 0 and not prices_switches(work.problem.cost)
     solutions: list[Word] = []
     enough = math.inf
-    for word in sorted(words, key=_cost) if in_turn or budget.is_over else words:
+    for word in sorted(words, key=attrgetter("cost")) if in_turn or budget.is_over else words:
         if word.cost > enough or (solutions and budget.is_over):
             break
         if len(word.trims) - work.library.tail <= work.most:
@@ -204,10 +200,6 @@ def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
             if solutions and in_turn:  # closing changes a cost by less
                 enough = min(enough, word.cost + CLOSING * (1.0 + abs(word.cost)))
     return solutions
-
-
-def _cost(word: TimedWord) -> float:
-    return word.cost
 
 
 def _from_longer(
@@ -221,7 +213,7 @@ def _from_longer(
         word = _with_insertions(library, seed, LONGEST, _fitting(work, ROUNDS), counts)
         grown.append(_with_short_runs(library, word))
     longer = [word for word in grown if math.isfinite(word.cost) and len(word.trims) > most]
-    for word in sorted(longer, key=_cost)[:1]:
+    for word in sorted(longer, key=attrgetter("cost"))[:1]:
         short = None if work.task.budget.is_over else shortened(library, word, most)
         if short is not None and len(short.trims) <= most:
             again = _with_insertions(library, short, most, _fitting(work, ROUNDS), counts)
@@ -230,7 +222,7 @@ def _from_longer(
 
 
 def _with_fewer_switches(
-    library: LibraryArrays, words: Sequence[TimedWord], budget: Budget
+    library: InsertionLibrary, words: Sequence[TimedWord], budget: Budget
 ) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
     if library.free_heading:
@@ -245,18 +237,15 @@ def _with_fewer_switches(
             longer = short
 
 
-@kept_by_first
-def _names(automaton: Automaton) -> frozenset[str]:
-    return frozenset(automaton.trim_names)
-
-
 def _with_insertions(
-    library: LibraryArrays, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
+    library: InsertionLibrary, word: TimedWord, most: int, rounds: int, counts: dict[str, int]
 ) -> TimedWord:
     """The word with its best times, after inserting what pays, at most `rounds` times."""
     trims, times = _with_room(word)
     size, cost, least, used = _kernels_insertion.improve_word(
-        *_seen_by_kernels(library),
+        library.problem,
+        library.n_priced,
+        library.tail,
         trims,
         times,
         len(word.trims),
@@ -268,19 +257,15 @@ def _with_insertions(
     return TimedWord(tuple(trims[:size].tolist()), times[:size], float(cost), float(least))
 
 
-def _seen_by_kernels(library: LibraryArrays) -> tuple[TimesProblem, int, int]:
-    """The library, how many of its trims are priced, and its turns of a free heading."""
-    seen = TimesProblem(library.twists, library.rates, library.rows, library.goal, library.targets)
-    return seen, library.n_priced, library.tail
-
-
-def _with_short_runs(library: LibraryArrays, word: TimedWord) -> TimedWord:
+def _with_short_runs(library: InsertionLibrary, word: TimedWord) -> TimedWord:
     """The word with its runs of two trims that alternate shortened."""
     if len(word.trims) - library.tail < RUN:
         return word
     trims, times = _with_room(word)
     size, cost, least = _kernels_insertion.word_with_short_runs(
-        *_seen_by_kernels(library),
+        library.problem,
+        library.n_priced,
+        library.tail,
         trims,
         times,
         len(word.trims),
@@ -300,12 +285,14 @@ def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
     """The solution from a word under work, closed at the exact goal; none if it cannot be."""
     problem, library = work.problem, work.library
     numbers = word.numbers
-    times = corrected(library, numbers, word.durations, work.exact)
+    times = library.corrected(numbers, word.durations, work.exact)
     if times is None:
         return
-    cost = word.cost + float(library.rates[numbers] @ (times - word.durations))
+    cost = word.cost + float(library.problem.rates[numbers] @ (times - word.durations))
     kept = slice(0, numbers.size - library.tail)
-    trims, lasting = _without_unused(library.trims[numbers[kept]], times[kept])
+    trims, lasting = library.trims[numbers[kept]], times[kept]
+    if (used := trims != UNUSED).sum() < trims.size:  # neighbours that unused time parts are one
+        trims, lasting = normal_form(trims[used], lasting[used], shortest=-math.inf)
     switching = problem.cost.switching(problem.automaton.body_velocities[trims])
     yield Word(
         trims=trims,
@@ -313,18 +300,6 @@ def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
         cost=cost + library.fixed_cost + switching,
         certificate=word.certificate,
     )
-
-
-def _without_unused(trims: IntArray, times: Array) -> tuple[IntArray, Array]:
-    """A word without unused time; neighbours that it has parted become one."""
-    if not (trims == UNUSED).any():
-        return trims, times
-    used = trims != UNUSED
-    trims, times = trims[used], times[used]
-    if not trims.size:
-        return trims, times
-    begins = np.flatnonzero(np.append(True, trims[1:] != trims[:-1]))
-    return trims[begins], np.add.reduceat(times, begins)
 
 
 def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
@@ -345,9 +320,9 @@ def _fast_words(work: _Work) -> list[TimedWord]:
     hurry = replace(work.problem, cost=Cost(time=1.0), horizon=Horizon())
     setup = search_setup(hurry, hurry.goals[0])
     setup = replace(setup, goal=work.setup.goal, free_heading=work.setup.free_heading)
-    library = library_arrays(hurry, setup)
+    library = insertion_library(hurry, setup)
     least = replace(
-        work, problem=hurry, setup=setup, library=library, exact=library.goal, limit=None
+        work, problem=hurry, setup=setup, library=library, exact=library.problem.goal, limit=None
     )
     met = []
     for seed in _words_of_few(least, hurry):
@@ -371,7 +346,9 @@ def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
     if library.free_heading:
-        turned = float(library.twists[word, 2] @ np.array(times))  # the rest is turned at 1 rad/s
-        word.append(len(library.rates) - 1)
-        times.append(float(np.remainder(library.goal[2] - turned, 2.0 * np.pi)))
+        turned = float(
+            library.problem.twists[word, 2] @ np.array(times)
+        )  # the rest is turned at 1 rad/s
+        word.append(len(library.problem.rates) - 1)
+        times.append(float(np.remainder(library.problem.goal[2] - turned, 2.0 * np.pi)))
     return TimedWord(tuple(word), np.array(times))

@@ -148,7 +148,9 @@ def _layers(
         least_coast > 0.0 or library.limits_coasts or (resolution.layered and numbered.switch > 0.0)
     )
     by_count = most_trims > 0
-    layers = len(numbered.transitions.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
+    layers = (
+        len(numbered.transitions.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
+    )
     return by_gear, by_trim, by_count, layers * (numbered.n_trims + 1 if by_trim else 1)
 
 

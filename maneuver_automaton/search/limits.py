@@ -30,15 +30,15 @@ def why_impossible(problem: Problem) -> str:
 
 def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
     """Why no word ends within the tolerance of a goal, as far as a glance proves it."""
-    if not len(setup.trims):
+    if not len(setup.library.trims):
         return "no trim of the library moves"
     turn = _turn_to(setup.goal, goal)
-    if turn > 1e-9 and not setup.twists[:, 2].any():
+    if turn > 1e-9 and not setup.library.twists[:, 2].any():
         return f"no trim of the library turns, and the goal is {turn:.6g} rad away"
     climb = abs(setup.goal[3]) - goal.tolerance_m
-    if climb > 1e-9 and not (setup.twists[:, 3] * setup.goal[3] > 0.0).any():
+    if climb > 1e-9 and not (setup.library.twists[:, 3] * setup.goal[3] > 0.0).any():
         return f"no trim of the library climbs towards the goal, {setup.goal[3]:.6g} m away"
-    directions = setup.twists / np.linalg.norm(setup.twists, axis=1, keepdims=True)
+    directions = setup.library.twists / np.linalg.norm(setup.library.twists, axis=1, keepdims=True)
     one_curve = np.linalg.matrix_rank(directions, tol=1e-9) == 1
     exact = goal.tolerance_m == goal.tolerance_rad == 0.0 and not setup.free_heading
     if one_curve and exact and _misses(directions, setup.goal):
@@ -46,8 +46,8 @@ def _impossible(problem: Problem, goal: Goal, setup: SearchSetup) -> str:
     limit = problem.horizon.time or problem.horizon.max_time
     if limit is not None:
         distance = _distance_to(setup.goal, goal)
-        speed = float(np.linalg.norm(setup.twists[:, [0, 1, 3]], axis=1).max())
-        turning = float(np.abs(setup.twists[:, 2]).max())
+        speed = float(np.linalg.norm(setup.library.twists[:, [0, 1, 3]], axis=1).max())
+        turning = float(np.abs(setup.library.twists[:, 2]).max())
         least = max(distance / speed if distance else 0.0, turn / turning if turn else 0.0)
         if least > limit * (1.0 + 1e-9):
             return (

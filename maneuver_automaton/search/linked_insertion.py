@@ -25,7 +25,7 @@ from maneuver_automaton.search.linked_words import (
     steer_linked_words,
 )
 from maneuver_automaton.search.result import (
-    Found,
+    BestWords,
     InsertionTask,
     SearchResult,
     SearchStatus,
@@ -56,7 +56,7 @@ def linked_stages(task: InsertionTask) -> Iterator[SearchResult]:
     most_seeds = SEEDS if task.seeds is None else task.seeds
     others = max(task.alternatives, most_seeds - 1)
     near = task.upper_bound * (1.0 + SEED_SLACK)
-    found, known = Found(problem, others + 1, task.budget), _known(task)
+    found, known = BestWords(problem, others + 1, task.budget), _known(task)
     found.add(SearchResult(status=SearchStatus.EXHAUSTED, solutions=known))
     found.add(
         steer_linked_words(problem, goal, alternatives=others, budget=task.budget, upper_bound=near)
@@ -94,7 +94,7 @@ def _known(task: InsertionTask) -> tuple[Word, ...]:
     return (replace(word, cost=task.problem.cost_of(plan)),)
 
 
-def _so_far(task: InsertionTask, found: Found) -> SearchResult:
+def _so_far(task: InsertionTask, found: BestWords) -> SearchResult:
     """The result so far, and whether the time is over."""
     status = SearchStatus.OUT_OF_BUDGET if task.budget.is_over else SearchStatus.EXHAUSTED
     return replace(found.result(), status=status)

@@ -124,7 +124,7 @@ class InsertionTask:
 
 
 @dataclass(slots=True, eq=False)
-class Found:
+class BestWords:
     """The cheapest motions found so far, each once, and what they took."""
 
     problem: Problem

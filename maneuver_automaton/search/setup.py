@@ -1,4 +1,9 @@
-"""A planning problem as the arrays that search kernels share, and the few trims of large ones."""
+"""A planning problem as the library that words are made of, and what they have to meet.
+
+A library is packed once, for every start and goal: the moving trims of an automaton, or a few that
+stand for them, then what fills up the time of a word, then the turn of a free heading. Whatever
+searches numbers trims by the rows of that packing, and `trims` leads from a row to the automaton.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +16,8 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.groups.chain import seen_from
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.words._kernels_times import TimesProblem
+from maneuver_automaton.words.closing import MET, EndConditions, closest_times
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims, moving_trims
 from maneuver_automaton.words.transitions import Transitions, identities
 
@@ -19,18 +26,15 @@ STILL = 1e-12  # [m, rad] start and goal that are no farther apart are one
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SearchSetup:
-    """The moving trims of a problem, and the goal seen from its start (altitude 0 in the plane)."""
+    """The trims that words are made of, and the goal seen from the start (altitude 0 in the plane).
 
-    trims: IntArray  # (M,) their indices in the automaton, of equal twists only the cheapest
-    twists: Array  # (M, 4)
-    rates: Array  # (M,) cost per second
-    periods: Array  # (M,) [s] time of a full turn, inf for straights
+    Its library has the rest that fills a fixed time, if there is one.
+    """
+
+    library: MovingTrims
     goal: Array  # (4,) relative to the start
     free_heading: bool
-    rest: int | None  # index of the cheapest rest
-    rest_rate: float
     climbs: bool  # whether altitude is a condition
-    library: MovingTrims  # where the trims come from
     transitions: Transitions  # between the classes of the automaton's trims
     start_class: int = 0  # of the trim before the word
     goal_class: int = 0  # of the trim after it
@@ -47,16 +51,10 @@ def search_setup(problem: Problem, goal: Goal) -> SearchSetup:
     library = moving_trims(problem.automaton, problem.cost)
     relative = goal_from_start(problem, goal)
     return SearchSetup(
-        trims=library.trims,
-        twists=library.twists,
-        rates=library.rates,
-        periods=library.periods,
+        library=library,
         goal=relative,
         free_heading=goal.free_heading,
-        rest=library.rest,
-        rest_rate=library.rest_rate,
         climbs=bool(library.climbs or relative[3] != 0.0),
-        library=library,
         transitions=identities(problem.automaton),
         shortest=problem.horizon.min_coast,
     )
@@ -82,16 +80,15 @@ FEW = 14  # a library of up to this many moving trims is its own sub-library
 
 
 def sub_library(setup: SearchSetup) -> SearchSetup:
-    """A few trims that reach far: extreme in eight directions, fast and cheap straights, spins."""
-    if len(setup.trims) <= FEW:
-        return setup
-    few = few_of(setup.library)
-    return replace(setup, trims=few.trims, twists=few.twists, rates=few.rates, periods=few.periods)
+    """The setup with the few trims that stand for its library."""
+    return replace(setup, library=few_of(setup.library))
 
 
 @kept_by_first
 def few_of(library: MovingTrims) -> MovingTrims:
-    """The few trims that stand for a library: the same for every start and goal."""
+    """A few trims that reach far: extreme in eight directions, fast and cheap straights, spins."""
+    if len(library.trims) <= FEW:
+        return library
     twists, rates = library.twists, library.rates
     scaled = twists / np.abs(twists).max(axis=0).clip(min=1e-300)
     chosen: list[int] = []
@@ -127,3 +124,155 @@ def few_of(library: MovingTrims) -> MovingTrims:
         speeds=library.speeds[few],
         turn_rates=library.turn_rates[few],
     )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Columns:
+    """The packing of a library: its trims, what fills up the time, the turn of a free heading."""
+
+    trims: IntArray  # (M,) their indices in the automaton, -1 for the free turn
+    twists: Array  # (M, 4)
+    rates: Array  # (M,) that of rest taken off where it pads
+    weights: Array  # (M,) 0 for the free turn, which takes no time, otherwise 1
+
+
+@kept_by_first
+def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
+    """The trims of a library, its rest where that `pads` a time, a free turn."""
+    trims, twists, rates = library.trims, library.twists, library.rates
+    if pads and library.rest is not None:
+        trims = np.append(trims, library.rest)
+        twists = np.vstack([twists, np.zeros(4)])
+        rates = np.append(rates - library.rest_rate, 0.0)
+    weights = np.ones(len(trims))
+    if free_heading:
+        trims = np.append(trims, UNUSED)
+        twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
+        rates = np.append(rates, 0.0)
+        weights = np.append(weights, 0.0)
+    # kernels are compiled for arrays that can be written
+    return Columns(
+        trims=trims, twists=np.array(twists, order="C"), rates=np.array(rates), weights=weights
+    )
+
+
+UNUSED = -1  # stands in `trims` for what is no trim of the automaton
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class InsertionLibrary:
+    """A library in which trims are priced, and what its words have to meet."""
+
+    trims: IntArray  # (M,) their indices in the automaton, UNUSED for what is none
+    number_of: IntArray  # from the automaton's indices to these, -1 where there is none
+    problem: TimesProblem  # (M,) trims
+    rest: int | None  # its number here
+    free_heading: bool
+    climbs: bool  # whether the first row is altitude
+    n_priced: int  # all but the free turn
+    fixed_cost: float  # of the whole fixed time at rest
+
+    @property
+    def tail(self) -> int:
+        """How many turns of a free heading follow every word: 0 or 1."""
+        return int(self.free_heading)
+
+    @property
+    def scale(self) -> float:
+        """Size of a typical rate."""
+        return max(1.0, float(np.abs(self.problem.rates).max()))
+
+    def within_time(self, limit: float) -> InsertionLibrary:
+        """The library with a column for unused time, so that words last at most `limit` [s].
+
+        The inequality becomes the equality "coasting times and unused time add up to `limit`".
+        Unused time has no twist and no cost; its reduced cost is the price of time, which must not
+        be negative. There must not be a condition on the time already.
+        """
+        at, known = self.n_priced, self.problem
+        weights = np.append(np.ones(at + 1), np.zeros(self.tail))
+        return replace(
+            self,
+            trims=np.insert(self.trims, at, UNUSED),
+            problem=TimesProblem(
+                twists=np.insert(known.twists, at, 0.0, axis=0),
+                rates=np.insert(known.rates, at, 0.0),
+                rows=np.vstack([np.insert(known.rows, at, 0.0, axis=1), weights]),
+                goal=known.goal,
+                targets=np.append(known.targets, limit),
+            ),
+            rest=at,
+            n_priced=at + 1,
+        )
+
+    def corrected(self, word: IntArray, times: Array, goal: Array) -> Array | None:
+        """Times (n,) near `times` with which the word ends at `goal`; None if there are none.
+
+        The smallest change: the goal is less than 1e-9 away, and less for small ones.
+        """
+        others = slice(int(self.climbs), None)  # an end's altitude is a condition anyway
+        conditions = EndConditions(
+            start=np.zeros(4),
+            twists=self.problem.twists[word],
+            goal=goal,
+            rows=self.problem.rows[others, word],
+            targets=self.problem.targets[others],
+        )
+        best, missing = closest_times(conditions, times, rank=RANK, at_least=-math.inf)
+        if not missing < MET or (best < -MET).any():
+            return None
+        return np.asarray(best.clip(min=0.0))
+
+
+def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
+    """Every trim that can be inserted, and the conditions of a problem."""
+    limit, library = problem.horizon.time, setup.library
+    pads = limit is not None and library.rest is not None
+    kept = columns(library, pads=pads, free_heading=setup.free_heading)
+    n_priced = len(kept.trims) - int(setup.free_heading)
+    number_of = np.full(len(problem.automaton), -1, dtype=np.int64)
+    number_of[kept.trims[:n_priced]] = np.arange(n_priced)
+    rows, targets = [], []
+    if setup.climbs:
+        rows.append(kept.twists[:, 3])
+        targets.append(float(setup.goal[3]))
+    if limit is not None:
+        rows.append(kept.weights)
+        targets.append(limit)
+    return InsertionLibrary(
+        trims=kept.trims,
+        number_of=number_of,
+        problem=TimesProblem(
+            twists=kept.twists,
+            rates=kept.rates,
+            rows=np.array(rows).reshape(len(rows), len(kept.rates)),
+            goal=np.array(setup.goal),
+            targets=np.array(targets, dtype=np.float64),
+        ),
+        rest=len(library.trims) if pads else None,
+        free_heading=setup.free_heading,
+        climbs=setup.climbs,
+        n_priced=n_priced,
+        fixed_cost=library.rest_rate * limit if pads and limit is not None else 0.0,
+    )
+
+
+DIGITS = 9  # of the goal that is searched for, after the point [m, rad]
+UNUSUAL = 1.7  # keeps steps in the number of digits away from the sizes people choose
+TINY = 1e-12  # [m, rad] below this start and goal are one
+RANK = 1e-11  # singular values below this, relative, count as none
+
+
+def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
+    """The setup with its goal rounded; as it is where start and goal would become one.
+
+    Start and goal seen from each other are the same for a moved problem but for rounding, and
+    rounding decides where insertion has a choice among equals. So it searches for a goal with fewer
+    digits, and its times are corrected afterwards until the goal itself is met.
+    """
+    x, y, turn, z = setup.goal.tolist()
+    size = max(abs(x), abs(y), abs(z), abs(math.remainder(turn, 2.0 * math.pi)), TINY)
+    finer = max(0, math.ceil(-math.log10(UNUSUAL * size)))
+    goal = setup.goal.round(DIGITS + finer) + 0.0  # no negative zeros
+    rounded = replace(setup, goal=goal)
+    return setup if rounded.start_is_goal else rounded

@@ -12,19 +12,21 @@ from collections.abc import Iterator
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.search.library_arrays import LibraryArrays
 from maneuver_automaton.search.result import TimedWord
+from maneuver_automaton.search.setup import InsertionLibrary
 from maneuver_automaton.words import TimesStatus, solve_switching_times
+from maneuver_automaton.words.word import normal_form
 
 AT_ONCE = 4  # of the shortest trims, how many are tried to be left out
 LAST = 2  # trims too many, from when on everything is tried
 NEAR_MEAN = 5  # trims near the mean of two that may stand for both
 NEAR = 4  # trims of similar twist that one trim is exchanged for
 SWEEPS = 3  # over all trims of a word, at most
+VANISHING = 1e-9  # [s] what lasts no longer lasts no time
 GAIN = 1e-9  # relative, by which an exchange must be cheaper
 
 
-def shortened(library: LibraryArrays, word: TimedWord, most: int) -> TimedWord | None:
+def shortened(library: InsertionLibrary, word: TimedWord, most: int) -> TimedWord | None:
     """A word of at most `most` trims, made from a longer one; None if none is found.
 
     Trims are taken out one at a time, the one whose absence costs least, and the times are solved
@@ -40,7 +42,7 @@ def shortened(library: LibraryArrays, word: TimedWord, most: int) -> TimedWord |
     return None if best is None else _exchanged(library, best)
 
 
-def _some_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | None:
+def _some_less(library: InsertionLibrary, now: TimedWord, most: int) -> TimedWord | None:
     """The word without a third of the trims too many, the shortest; None near the end."""
     many = (len(now.trims) - most) // 3
     if len(now.trims) <= most + LAST or many < 2:
@@ -50,7 +52,7 @@ def _some_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord |
     return _solved(library, now.numbers[kept], _spread(now.durations[kept], left))
 
 
-def _one_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | None:
+def _one_less(library: InsertionLibrary, now: TimedWord, most: int) -> TimedWord | None:
     """The cheapest word with one trim less: one left out, or two neighbours made one."""
     order = _by_size(now.durations)
     trials = [_without(library, now, k) for k in order[:AT_ONCE]]
@@ -62,16 +64,18 @@ def _one_less(library: LibraryArrays, now: TimedWord, most: int) -> TimedWord | 
     return min(found, key=lambda one: float(f"{one.cost:.9g}"), default=None)
 
 
-def _without(library: LibraryArrays, now: TimedWord, k: int) -> TimedWord | None:
+def _without(library: InsertionLibrary, now: TimedWord, k: int) -> TimedWord | None:
     times = _spread(np.delete(now.durations, k), now.durations[k])
     return _solved(library, np.delete(now.numbers, k), times)
 
 
-def _with_mean_trim(library: LibraryArrays, now: TimedWord, k: int) -> Iterator[TimedWord | None]:
+def _with_mean_trim(
+    library: InsertionLibrary, now: TimedWord, k: int
+) -> Iterator[TimedWord | None]:
     """Trims `k` and `k + 1` as one of the library near their mean."""
     pair = slice(k, k + 2)
     lasting = now.durations[pair].sum()
-    mean = now.durations[pair] @ library.twists[now.numbers[pair]] / lasting
+    mean = now.durations[pair] @ library.problem.twists[now.numbers[pair]] / lasting
     word, times = np.delete(now.numbers, k), np.delete(now.durations, k)
     times[k] = lasting
     for other in _similar(library, mean)[:NEAR_MEAN]:
@@ -79,10 +83,10 @@ def _with_mean_trim(library: LibraryArrays, now: TimedWord, k: int) -> Iterator[
         yield _solved(library, word.copy(), times)
 
 
-def _similar(library: LibraryArrays, twist: Array) -> IntArray:
+def _similar(library: InsertionLibrary, twist: Array) -> IntArray:
     """Trims by how far they are from a twist, the nearest first."""
-    scale = np.abs(library.twists).max(axis=0).clip(min=1e-300)
-    away = (np.abs(library.twists - twist) / scale).sum(axis=1)
+    scale = np.abs(library.problem.twists).max(axis=0).clip(min=1e-300)
+    away = (np.abs(library.problem.twists - twist) / scale).sum(axis=1)
     return _by_size(away)
 
 
@@ -96,14 +100,14 @@ def _spread(times: Array, left: float) -> Array:
     return np.asarray(times + left / max(times.size, 1))
 
 
-def _exchanged(library: LibraryArrays, now: TimedWord) -> TimedWord:
+def _exchanged(library: InsertionLibrary, now: TimedWord) -> TimedWord:
     """Each trim exchanged for one of similar twist as long as that pays."""
     for _ in range(SWEEPS):
         before = now.cost
         for k in range(len(now.trims)):
             if k >= len(now.trims):
                 break
-            for other in _similar(library, library.twists[now.trims[k]])[1 : NEAR + 1]:
+            for other in _similar(library, library.problem.twists[now.trims[k]])[1 : NEAR + 1]:
                 word = now.numbers
                 word[k] = other
                 trial = _solved(library, word, now.durations)
@@ -115,27 +119,22 @@ def _exchanged(library: LibraryArrays, now: TimedWord) -> TimedWord:
     return now
 
 
-def _solved(library: LibraryArrays, word: IntArray, times: Array) -> TimedWord | None:
+def _solved(library: InsertionLibrary, word: IntArray, times: Array) -> TimedWord | None:
     """The best times of a word; trims that last no time are left out."""
     if not word.size:
         return None
     total = None
-    if library.targets.size > int(library.climbs):
-        total = float(library.targets[-1])
+    if library.problem.targets.size > int(library.climbs):
+        total = float(library.problem.targets[-1])
     solved = solve_switching_times(
-        library.twists[word],
-        library.rates[word],
-        library.goal,
+        library.problem.twists[word],
+        library.problem.rates[word],
+        library.problem.goal,
         total=total,
         guesses=[times],
         restarts=0,
     )
     if solved.status is TimesStatus.FAILED or not math.isfinite(solved.cost):
         return None
-    used = solved.durations > 1e-9
-    kept, lasting = word[used], solved.durations[used]
-    same = np.append(False, kept[1:] == kept[:-1]) if kept.size else np.zeros(0, dtype=bool)
-    if same.any():
-        starts = np.flatnonzero(~same)
-        kept, lasting = kept[starts], np.add.reduceat(lasting, starts)
+    kept, lasting = normal_form(word, solved.durations, shortest=VANISHING)
     return TimedWord(tuple(kept.tolist()), lasting, solved.cost)

@@ -31,7 +31,7 @@ from maneuver_automaton.search._kernels_problem import (
     WordTerms,
 )
 from maneuver_automaton.search.result import TIE, TimedWord, tied
-from maneuver_automaton.search.setup import FEW, SearchSetup, few_of
+from maneuver_automaton.search.setup import Columns, SearchSetup, columns
 from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.library import FULL_TURN, MovingTrims
 from maneuver_automaton.words.transitions import Transitions
@@ -102,8 +102,10 @@ class WordScan:
         self.nodes = nodes
         self.spare = spare
         self.slack = slack
-        self.tables = tables_of(setup)
-        rows = [] if not_first is None else np.flatnonzero(setup.trims == not_first).tolist()
+        self.tables = tables(setup.library, free_heading=setup.free_heading)
+        rows = (
+            [] if not_first is None else np.flatnonzero(setup.library.trims == not_first).tolist()
+        )
         self.not_first = rows[0] if rows else -1  # a row of the search
         width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
@@ -170,7 +172,7 @@ class WordScan:
         each = SECONDS_PER_WORD if mode.kernel_problem[0].library.targets.size else SECONDS_IF_FREE
         most = min(self.most, mode.most_moving)
         numbers = range(1, most + 1)
-        seconds = math.fsum(len(self.setup.trims) ** n * each[n + tail] for n in numbers)
+        seconds = math.fsum(len(self.setup.library.trims) ** n * each[n + tail] for n in numbers)
         return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
 
     def _run_at_once(self, modes: Sequence[Mode], tail: int) -> None:
@@ -202,7 +204,7 @@ class WordScan:
     ) -> bool:
         """Scan all words of `n` trims that span the plane, or not; `chunk` at a time."""
         tail = 1 if self.setup.free_heading else 0
-        number, last = 0, len(self.setup.trims) ** n
+        number, last = 0, len(self.setup.library.trims) ** n
         # Another portion may prune other words, and count them so: it is smaller only at the end.
         pace = EvenPace(budget, most=chunk, each=SECONDS_PER_WORD[n + tail])
         while number < last:
@@ -237,15 +239,22 @@ class WordScan:
         The last one not where the cheapest trim for so long is too costly.
         """
         horizon, setup = self.problem.horizon, self.setup
+        longest = MOST_TRIMS - int(setup.free_heading)
         exact = horizon.time if horizon.time is not None else horizon.max_time
         if horizon.time is None:
-            yield Mode(self._kernel_problem(horizon.max_time, pad=False, fixed=False), self.most)
-        elif setup.rest is not None:
+            yield Mode(
+                self._kernel_problem(horizon.max_time, pad=False, fixed=False),
+                min(self.most, longest),
+            )
+        elif setup.library.rest is not None:
             # of `max_trims`, rest is one, unless the rest of the time happens to be none
-            yield Mode(self._kernel_problem(horizon.time, pad=True, fixed=False), self.most - 1)
+            yield Mode(
+                self._kernel_problem(horizon.time, pad=True, fixed=False),
+                min(self.most - 1, longest),
+            )
         if exact is not None:
-            most = min(self.most, 2 if self.spare else MOST_TRIMS - int(setup.free_heading))
-            at_least = exact * self.tables.least_rate if len(setup.rates) else math.inf
+            most = min(self.most, 2 if self.spare else longest)
+            at_least = exact * self.tables.least_rate if len(setup.library.rates) else math.inf
             if at_least > tied(float(self.found.best[-1])):
                 return
             yield Mode(self._kernel_problem(exact, pad=False, fixed=True), most, at_least)
@@ -253,7 +262,7 @@ class WordScan:
     def _kernel_problem(self, limit: float | None, *, pad: bool, fixed: bool) -> KernelProblem:
         """The kernels' problem and its transitions; of one class of trims, the identity."""
         setup, terms, tables = self.setup, terms_of(self.problem.cost), self.tables
-        rest_rate = setup.rest_rate if pad else 0.0
+        rest_rate = setup.library.rest_rate if pad else 0.0
         ends = setup.start_class, setup.goal_class
         same = _same_for_all(tables, setup.transitions, rest_rate, setup.climbs, fixed, *ends)
         targets = [float(setup.goal[3])] if setup.climbs else []
@@ -267,7 +276,7 @@ class WordScan:
         fixed_time = self.problem.horizon.time is not None
         problem = WordProblem(
             library=TimesProblem(
-                twists=tables.twists,
+                twists=tables.columns.twists,
                 rates=same.rates,
                 rows=same.rows,
                 goal=np.array(setup.goal),
@@ -279,14 +288,14 @@ class WordScan:
                 periods=tables.periods,
                 reaches=tables.reaches(setup, most=bounded),
                 parallel=tables.parallel,
-                weights=tables.weights,
+                weights=tables.columns.weights,
             ),
             size=same.size,
             fixed=np.array([0.0, 0.0, distance, turn, 0.0, 0.0, 0.0, x, y]),
             terms=WordTerms(
                 time_limit=float(bounded),
                 pad=int(pad),
-                pad_cost=float(setup.rest_rate * bounded) if pad else 0.0,
+                pad_cost=float(setup.library.rest_rate * bounded) if pad else 0.0,
                 switch=terms.switch if terms else 0.0,
                 direction_change=0.0 if linked or not terms else terms.direction_change,
                 more_turns=int((fixed_time and not self.spare) or setup.climbs),
@@ -316,14 +325,14 @@ class WordScan:
                 break
             numbers = self.found.words[k]
             size = sum(number >= 0 for number in numbers.tolist()) - int(self.setup.free_heading)
-            yield self.setup.trims[numbers[:size]], self.found.times[k, :size], costs[k]
+            yield self.setup.library.trims[numbers[:size]], self.found.times[k, :size], costs[k]
 
     def _padded(self, word: IntArray, times: Array, cost: float) -> Word:
         time_s = self.problem.horizon.time
-        if time_s is not None and self.setup.rest is not None:
+        if time_s is not None and self.setup.library.rest is not None:
             left = time_s - float(times.sum())
             if left > 1e-9:
-                word = np.array([*word.tolist(), self.setup.rest], dtype=np.int64)
+                word = np.array([*word.tolist(), self.setup.library.rest], dtype=np.int64)
                 times = np.array([*times.tolist(), left])
         if self.own_prices:
             cost += self.problem.cost.switching(self.problem.automaton.body_velocities[word])
@@ -334,12 +343,9 @@ class WordScan:
 class _Tables:
     """Tables of every trim for kernels, the turn of a free heading last."""
 
-    trims: IntArray  # (M,) or one less, by the automaton's numbers
-    twists: Array  # (M, 4)
-    rates: Array  # (M,)
+    columns: Columns
     least_rate: float  # of all trims but the free turn
     periods: Array  # (M,) [s]
-    weights: Array  # (M,) 0 for the free turn, otherwise 1
     paces: Array  # (M, 2) metres and radians per second
     parallel: BoolArray  # (M, M)
     turns: Array  # (M,) [s] of a full turn, 0 for straights
@@ -384,13 +390,13 @@ def _same_for_all(
     rates, per_unit = _rates_above(tables, rest_rate)
     rows, gains = [], []
     if climbs:
-        rows.append(tables.twists[:, 3])
+        rows.append(tables.columns.twists[:, 3])
         gains.append(known.displacement[..., 3])
     if fixed:
-        rows.append(tables.weights)
+        rows.append(tables.columns.weights)
         gains.append(known.time)
     links = Links(
-        class_of=known.class_of[tables.trims],
+        class_of=known.class_of[tables.columns.trims],
         start=start,
         goal=goal,
         displacement=np.array(known.displacement),
@@ -411,41 +417,26 @@ def _same_for_all(
 @kept_by_first
 def _rates_above(tables: _Tables, rest: float) -> tuple[Array, Array]:
     """Cost per second (M,) less a rest's; and (M, 2) per metre and per radian, inf for none."""
-    rates = tables.rates - rest * tables.weights if rest else tables.rates
+    rates = tables.columns.rates - rest * tables.columns.weights if rest else tables.columns.rates
     none = np.full(tables.paces.shape, np.inf)
     return rates, np.divide(rates[:, None], tables.paces, out=none, where=tables.paces > 0.0)
 
 
-def tables_of(setup: SearchSetup) -> _Tables:
-    """The tables of a search, which those for the whole of a library share."""
-    library = setup.library
-    if setup.trims is library.trims and setup.rates is library.rates:
-        return _tables_kept(library, setup.free_heading)
-    if len(library.trims) > FEW and setup.trims is few_of(library).trims:
-        return _tables_kept(few_of(library), setup.free_heading)
-    return _tables(setup, setup.free_heading)
-
-
-def _tables(setup: SearchSetup | MovingTrims, free_heading: bool) -> _Tables:
-    twists, rates, periods = np.array(setup.twists), np.array(setup.rates), np.array(setup.periods)
-    least = float(rates.min(initial=math.inf))
-    weights = np.ones(len(rates))
+@kept_by_first
+def tables(library: MovingTrims, *, free_heading: bool) -> _Tables:
+    """The tables of a library, for every start and goal."""
+    kept = columns(library, pads=False, free_heading=free_heading)
+    twists, periods = kept.twists, np.array(library.periods)
     if free_heading:
-        twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
-        rates = np.append(rates, 0.0)
         periods = np.append(periods, FULL_TURN)
-        weights = np.append(weights, 0.0)
     turning = twists[:, 2] != 0.0
     speeds = np.sqrt(twists[:, 0] ** 2 + twists[:, 1] ** 2)
     fastest = np.maximum(speeds, np.abs(twists[:, 3]))
     straights = np.flatnonzero(~turning & (fastest > 0.0))
     return _Tables(
-        trims=setup.trims,
-        twists=twists,
-        rates=rates,
-        least_rate=least,
+        columns=kept,
+        least_rate=float(library.rates.min(initial=math.inf)),
         periods=periods,
-        weights=weights,
         paces=np.stack([np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])], axis=1),
         parallel=_parallel(twists[:, :3].tobytes(), len(twists)),
         turns=np.where(turning, periods, 0.0),
@@ -453,9 +444,6 @@ def _tables(setup: SearchSetup | MovingTrims, free_heading: bool) -> _Tables:
         fastest=fastest[straights],
         largest=float((speeds[turning] / np.abs(twists[turning, 2])).max(initial=0.0)),
     )
-
-
-_tables_kept = kept_by_first(_tables)
 
 
 @functools.lru_cache(maxsize=4)

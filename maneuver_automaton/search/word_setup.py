@@ -27,9 +27,9 @@ from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at
 from maneuver_automaton.words.library import (
     Library,
+    MovingTrims,
     library_of,
     most_different,
-    moving_trims,
     words_of,
 )
 from maneuver_automaton.words.transitions import SWITCH
@@ -87,17 +87,23 @@ class WordSetup:
         known, relative = self.library.transitions, goal_from_start(problem, self.goal)
         waiting = _waiting_rate(problem)
         climbs = arrays.twists[rows, 3].any() or known.displacement[..., 3].any()
-        return SearchSetup(
+        twists = arrays.twists[rows]
+        library = MovingTrims(
             trims=np.array(rows, dtype=np.int64),
-            twists=arrays.twists[rows],
+            twists=twists,
             rates=arrays.rates[rows] + waiting,
             periods=arrays.periods[rows],
-            goal=relative,
-            free_heading=self.goal.free_heading,
             rest=self.pad,
             rest_rate=waiting,
+            climbs=bool(climbs),
+            speeds=np.linalg.norm(twists[:, [0, 1, 3]], axis=1),
+            turn_rates=np.abs(twists[:, 2]),
+        )
+        return SearchSetup(
+            library=library,
+            goal=relative,
+            free_heading=self.goal.free_heading,
             climbs=bool(climbs or relative[3] != 0.0),
-            library=moving_trims(problem.automaton, problem.cost),
             transitions=replace(known, cost=known.cost + waiting * known.time),
             start_class=int(known.class_of[self.start_trim]),
             goal_class=int(known.class_of[self.goal_trim]),

@@ -79,6 +79,7 @@ def search_words(
     """
     setup = search_setup(problem, goal)
     most = problem.horizon.max_trims
+    longest = MOST_TRIMS - int(setup.free_heading)  # moving trims
     limit = most_admitted(free_heading=setup.free_heading, fixed=problem.horizon.time is not None)
     if most is None:
         most = limit
@@ -86,7 +87,7 @@ def search_words(
         raise ValueError(
             f"search by words: max_trims is {most}, need at most {limit}; use insertion for more"
         )
-    if setup.start_is_goal and (problem.horizon.time is None or setup.rest is not None):
+    if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         return resting(problem, setup)
     scan_of = partial(
         WordScan,
@@ -106,6 +107,7 @@ def search_words(
         solutions = asked + tuple(
             one for one in solutions[alternatives + 1 :] if one.cost <= most_tied
         )
+    exhaustive = finished and most <= longest  # no words of more moving trims are admitted
     if solutions:
         status = SearchStatus.FOUND
     else:
@@ -113,8 +115,8 @@ def search_words(
     return SearchResult(
         status=status,
         solutions=solutions,
-        complete=alternatives is None and finished and upper_bound == math.inf,
-        exhaustive=finished and problem.horizon.max_trims is not None and most <= MOST_TRIMS,
+        complete=alternatives is None and exhaustive and upper_bound == math.inf,
+        exhaustive=exhaustive and problem.horizon.max_trims is not None,
         counts={"expansions": job.n_words, "steering_calls": job.n_steering},
     )
 
@@ -137,9 +139,9 @@ def search_setup_words(
     `spare`: where a rest pads a fixed time, words that meet it exactly have two trims at most.
     """
     conditions = 3 + int(setup.climbs)
-    padded = problem.horizon.time is not None and setup.rest is not None
+    padded = problem.horizon.time is not None and setup.library.rest is not None
     exact = problem.horizon.time is not None and not padded
-    most = min(conditions + int(exact), MOST_TRIMS)
+    most = conditions + int(exact)  # as far as so many are scanned
     job = WordScan(
         problem, setup, most + int(padded), alternatives, nodes=SEED_NODES, spare=spare and padded
     )
@@ -164,15 +166,15 @@ def _handed_over(job: WordScan, budget: Budget) -> Iterator[Word]:
 def resting(problem: Problem, setup: SearchSetup) -> SearchResult:
     """Start equal to goal: an empty word, or the whole of a fixed time at rest."""
     time_s = problem.horizon.time
-    if time_s is None or setup.rest is None:
+    if time_s is None or setup.library.rest is None:
         empty = Word(trims=np.zeros(0, dtype=np.int64), durations=np.zeros(0), cost=0.0)
         return SearchResult(
             status=SearchStatus.FOUND, solutions=(empty,), complete=False, exhaustive=True
         )
     rest = Word(
-        trims=np.array([setup.rest]),
+        trims=np.array([setup.library.rest]),
         durations=np.array([time_s]),
-        cost=setup.rest_rate * time_s,
+        cost=setup.library.rest_rate * time_s,
     )
     return SearchResult(
         status=SearchStatus.FOUND, solutions=(rest,), complete=False, exhaustive=True

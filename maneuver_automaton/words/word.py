@@ -96,6 +96,27 @@ def word_of_steps(
     return word
 
 
+def normal_form(
+    trims: IntArray, durations: Array, *, shortest: float = 0.0
+) -> tuple[IntArray, Array]:
+    """A word of trims that switch at will without what lasts no longer than `shortest` [s].
+
+    A trim that goes on is one trim.
+
+    Examples
+    --------
+    >>> trims, times = normal_form(np.array([0, 2, 0, 1]), np.array([1.0, 0.0, 0.5, 2.0]))
+    >>> trims.tolist(), times.tolist()
+    ([0, 1], [1.5, 2.0])
+    """
+    used = durations > shortest
+    trims, durations = trims[used], durations[used]
+    if not trims.size:
+        return trims, durations
+    begins = np.flatnonzero(np.append(True, trims[1:] != trims[:-1]))
+    return trims[begins], np.add.reduceat(durations, begins)
+
+
 def with_price(library: Library, word: Word) -> Word:
     """The word with its cost at the prices of a library, and the time of its maneuvers."""
     cost, lasting = _price(library, word.trims, word.durations, word.transitions)

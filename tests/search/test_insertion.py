@@ -27,9 +27,8 @@ from maneuver_automaton.search import (
 from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import insertion_stages
-from maneuver_automaton.search.library_arrays import library_arrays
 from maneuver_automaton.search.result import InsertionTask, TimedWord, plan_of
-from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.search.setup import insertion_library, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.words._kernels_times import TimesProblem
 from tests import reference
@@ -548,9 +547,27 @@ def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
     goal = reference.plain_end(climbing[1:3] + climbing[:1], [0.5, 0.4, 1.0])
     problem = Problem(library, [0, 0, 0, 0], goal)
     setup = search_setup(problem, problem.goals[0])
-    arrays = library_arrays(problem, setup)
+    arrays = insertion_library(problem, setup)
     word = arrays.number_of[[1, 2, 0]]
     short = shortened(arrays, TimedWord(tuple(word.tolist()), np.array([0.5, 0.4, 1.0])), 3)
     assert short is not None
-    end = reference.plain_end(arrays.twists[short.numbers], short.durations)
+    end = reference.plain_end(arrays.problem.twists[short.numbers], short.durations)
     np.testing.assert_allclose(end, goal, atol=1e-9)
+
+
+@compiled_only
+def test_a_climb_to_any_heading_begins_with_three_trims():
+    """Place, altitude and heading are four conditions: three trims, and the turn that is free."""
+    craft = {
+        "ahead": (1, 0, 0, 0),
+        "left": (1, 0, 1, 0),
+        "right": (1, 0, -1, 0),
+        "up": (0, 0, 0, 1),
+    }
+    model = UserModel(
+        name="craft", group=SE2xR, control_names=tuple("abcd"), velocity=lambda _, u: np.asarray(u)
+    )
+    goal = Goal(pose=[3.0, 2.0, 1.0, 2.0], free_heading=True)
+    problem = Problem(Automaton.of_controls(model, craft), [0, 0, 0, 0], goal)
+    solution = best(problem)
+    assert plan_of(problem, solution).end[[0, 1, 3]] == pytest.approx([3.0, 2.0, 2.0], abs=1e-9)

@@ -58,7 +58,7 @@ def test_a_word_is_seen_as_its_conjugation(word, free):
     setup, (problem, links) = searched(goal)
     rows = np.zeros(len(word) + free, dtype=np.int64)
     seen = looked_at(problem, links, np.array([*word, problem.tail] if free else word), rows)
-    trims = setup.as_search().trims[word].tolist()
+    trims = setup.as_search().library.trims[word].tolist()
     steps = setup.library.displacements([setup.start_trim, *trims, setup.goal_trim])[:, :3]
     own = setup.library.arrays.twists[trims, :3]
     twists, product = conjugated(np.vstack([np.zeros(3), own]), steps)
@@ -76,7 +76,7 @@ def test_a_word_is_seen_as_its_conjugation(word, free):
 
 def test_the_transitions_of_a_word_are_priced_before_it_is_seen():
     setup, (problem, links) = searched(Goal(pose=[3.0, 2.0, 1.0]))
-    trims = setup.as_search().trims[[0, 2, 1]].tolist()
+    trims = setup.as_search().library.trims[[0, 2, 1]].tolist()
     priced = price_of_transitions(links, np.array([0, 2, 1]), problem.tail)
     assert priced == pytest.approx(setup.fixed(trims)[0])
 
@@ -86,7 +86,7 @@ def test_a_word_coasts_for_no_less_than_its_first_trim_leaves_to_do(word, times)
     """To wherever these times lead: the bound holds for them, as for all that lead there."""
     one = Problem(unicycle_automaton(CONTROLS), [0.0, 0.0, 0.0], Goal(pose=[1.0, 0.0, 0.0]))
     setup = word_setup(one, one.goals[0], most_trims=99)
-    trims = setup.as_search().trims[list(word)]
+    trims = setup.as_search().library.trims[list(word)]
     end = plan_of(one, setup.word(TimedWord(tuple(trims.tolist()), np.array(times)))).end
     setup, (problem, links) = searched(Goal(pose=end))
     rows = np.zeros(3, dtype=np.int64)

@@ -1,0 +1,250 @@
+"""Fail-safe trajectories: any motion that stays free for a while, where no plan does."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.between import trims_between
+from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.planning.tracking import stands_free
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.receding_horizon import _kernels_failsafe as kernels
+from maneuver_automaton.receding_horizon.shifting import merged
+from maneuver_automaton.search._kernels_cells import EMPTY
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.scene import Scene
+
+CELL = 0.25  # of the search, in turning radii
+HEADINGS = 24
+LONGEST = 32  # shortest edge durations that a trim is held
+IMPATIENCE = 0.1  # seconds of safety that a second of driving is worth
+MOST_NODES = 2**16
+TIMELY = 16  # expansions between two looks at the clock
+MOST_EXPANSIONS = 4000
+HALVINGS = 6  # of the last coast, to leave it as soon as it is safe to stand
+WAITING = 1e6  # [s] a tick is less than that, unless no trim moves
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FailSafe:
+    """A motion that stays free as long as was found possible."""
+
+    plan: Plan
+    free_until: float  # [s] of the world's clock
+    complete: bool  # whether that is as long as was asked for
+    expansions: int
+
+
+def search_fail_safe(
+    problem: Problem,
+    *,
+    until: float,
+    budget: Budget = UNLIMITED,
+    max_expansions: int = MOST_EXPANSIONS,
+) -> FailSafe:
+    """A motion from the problem's start that is free of its obstacles until a time, if possible.
+
+    A vehicle that can rest ends at rest, as soon as it is safe there. Where no motion is free until
+    then, the one that is free for longest comes back.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its goals do not matter.
+    until : float
+        [s] of the world's clock.
+    budget : Budget
+        Its time ends the search with what it has.
+    max_expansions : int
+        Poses to go on from.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Disc, Motion, Obstacle, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "back": (-1, 0)})
+    >>> passing = Obstacle(Disc(1.0), motion=Motion([0, 4], [[2, -4, 0], [2, 4, 0]]))
+    >>> problem = Problem(robot, [2, 0, 0], [9, 0, 0], obstacles=passing)
+    >>> found = search_fail_safe(problem, until=4.0)
+    >>> found.complete, found.plan.word[-1], bool(abs(found.plan.end[0] - 2.0) > 1.0)
+    (True, 'rest', True)
+    """
+    at, rest = problem.start_time, problem.automaton.rest
+    query = lattice_query(_to_rest(problem), (0,))
+    if query.library.at_will and rest is not None and not problem.moves:
+        # where nothing moves rest is no edge of the lattice, and free for ever if it is now
+        free = stands_free(problem, problem.start, time=at, duration=until - at) > 0.0
+        trims = (problem.automaton.trims[rest],)
+        stood = Plan(problem.start, trims, durations=[until - at], start_time=at)
+        return FailSafe(plan=stood, free_until=until if free else at, complete=free, expansions=0)
+    library, scene = query.library.arrays, _scene(query)
+    task = _task(query, until)
+    search = _arrays(MOST_NODES)
+    kernels.begin(task, library, scene, search)
+    left = max_expansions
+    while left > 0 and kernels.expand(task, library, scene, search, min(TIMELY, left)):
+        left -= TIMELY
+        if budget.is_over:
+            break
+    state = search.state
+    node = int(state[kernels.BEST])
+    free_until = float(search.nodes[node, kernels.SAFE])
+    complete, plan = bool(state[kernels.FOUND] >= 0), _plan(query, task, search, node)
+    return FailSafe(
+        plan=_soonest(problem, plan) if complete and query.library.at_will else plan,
+        free_until=free_until,
+        complete=complete,
+        expansions=int(state[kernels.EXPANSIONS]),
+    )
+
+
+def _soonest(problem: Problem, plan: Plan) -> Plan:
+    """The plan, whose last coast before it rests is as short as is safe."""
+    n = len(plan.trims)
+    if problem.parts or n < 2 or not plan.trims[-1].is_rest:
+        return plan
+    until, least, most = plan.start_time + plan.duration, 0.0, float(plan.durations[-2])
+    for _ in range(HALVINGS):
+        half = 0.5 * (least + most)
+        stands = float(plan.durations[-1]) + float(plan.durations[-2]) - half
+        sooner = replace(plan, durations=np.append(plan.durations[:-2], [half, stands]))
+        pose = sooner.switching_poses[-2]
+        free = stands_free(problem, pose, time=until - stands, duration=stands)
+        if free >= stands:
+            plan, most = sooner, half
+        else:
+            least = half
+    return plan
+
+
+def _to_rest(problem: Problem) -> Problem:
+    """The problem with a rest to be reached, where maneuvers lead to one; its pose does not matter.
+
+    Otherwise trims that lead to none of the goals would be left out, the rest among them.
+    """
+    automaton = problem.automaton
+    if automaton.is_kinematic or automaton.rest is None:
+        return problem
+    first = automaton.index_of(problem.first_trim.name)
+    if first not in trims_between(automaton, first, [automaton.rest]):
+        return problem
+    rest = automaton.trims[automaton.rest].name
+    goal = replace(problem.goals[0], trim=rest, free_heading=False)
+    return replace(problem, goals=(goal,))
+
+
+def _scene(query: LatticeQuery) -> Scene:
+    """What motions are tested against; without bounds they may lead anywhere."""
+    if not (query.problem.bounds.x is None and query.problem.bounds.y is None):
+        return query.around
+    window, edge_window = query.around.window.copy(), query.around.edge_window.copy()
+    window[:4] = edge_window[:4] = [-math.inf, -math.inf, math.inf, math.inf]
+    return query.around._replace(window=window, edge_window=edge_window)
+
+
+def _task(query: LatticeQuery, until: float) -> kernels.FailSafeTask:
+    library = query.library
+    arrays = library.arrays
+    numbered = arrays.library
+    m = numbered.n_trims
+    holds = arrays.edge_durations[:, 0]
+    tick = float(holds[holds > 0.0].min(initial=math.inf))
+    if not tick < WAITING:  # only maneuvers move it
+        tick = float(np.median(arrays.edge_time)) if arrays.edge_time.size else 1.0
+    still = np.flatnonzero(~numbered.twists[:m].any(axis=1))
+    rest_of = np.full(len(numbered.transitions.cost), -1)
+    rest_of[numbered.class_of[still][::-1]] = still[::-1]  # the first of each class
+    return kernels.FailSafeTask(
+        pose=tuple(query.start.tolist()),
+        trim=max(query.start_trim, 0),
+        clock=float(query.problem.start_time),
+        until=float(until),
+        rests=bool(still.size),
+        rest_of=rest_of,
+        holds=np.where(holds < LONGEST * tick, holds, tick),
+        cell=CELL * library.radius,
+        headings=HEADINGS,
+        tick=tick,
+        longest=LONGEST * tick,
+        impatience=IMPATIENCE,
+    )
+
+
+def _arrays(n: int) -> kernels.FailSafeArrays:
+    """Room for `n` nodes, a power of two."""
+    return kernels.FailSafeArrays(
+        nodes=np.empty((n, 8)),
+        links=np.empty((n, 3), dtype=np.int64),
+        cells=np.full(4 * n, EMPTY),
+        heap_key=np.empty(n),
+        heap_node=np.empty(n, dtype=np.int64),
+        state=np.zeros(5, dtype=np.int64),
+    )
+
+
+def _plan(
+    query: LatticeQuery, task: kernels.FailSafeTask, search: kernels.FailSafeArrays, node: int
+) -> Plan:
+    """The path to a node, and rest there, or the last trim, as long as that is free."""
+    problem, automaton, library = query.problem, query.automaton, query.library
+    rows: list[int] = []
+    last = node
+    while search.links[node, kernels.PARENT] >= 0:
+        rows.append(node)
+        node = int(search.links[node, kernels.PARENT])
+    word = [] if automaton.is_kinematic else [automaton.trims[library.trims[task.trim]]]
+    times, between = [0.0] * len(word), list[Maneuver | None]()
+    for row in reversed(rows):
+        edge = int(search.links[row, kernels.EDGE])
+        if edge >= 0:
+            maneuver = automaton.maneuvers[library.edge_maneuver[edge]]
+            begin, end = (automaton.trims[automaton.index_of(name)]
+                          for name in (maneuver.source, maneuver.target))  # fmt: skip
+            if word[-1].name != begin.name:
+                word, times, between = [*word, begin], [*times, 0.0], [*between, None]
+            word, times, between = [*word, end], [*times, 0.0], [*between, maneuver]
+        else:
+            held = automaton.trims[library.trims[search.links[row, kernels.TRIM]]]
+            _coast(word, times, between, held, float(search.nodes[row, kernels.LASTING]))
+    trim = int(search.links[last, kernels.TRIM])
+    rest = int(task.rest_of[library.arrays.library.class_of[trim]])
+    goes_on = rest if task.rests else trim
+    left = float(search.nodes[last, kernels.SAFE] - search.nodes[last, kernels.CLOCK])
+    if goes_on >= 0 and (task.rests or left > 0.0):
+        _coast(word, times, between, automaton.trims[library.trims[goes_on]], left)
+    if any(between):
+        start, at = problem.start, problem.start_time
+        return Plan(start, word, durations=times, maneuvers=tuple(between), start_time=at)
+    word_, durations = merged(word, times)
+    return Plan(problem.start, word_, durations=durations, start_time=problem.start_time)
+
+
+def _coast(
+    word: list[Trim],
+    times: list[float],
+    between: list[Maneuver | None],
+    trim: Trim,
+    lasting: float,
+) -> None:
+    """Append a coast to a word, or prolong its last one."""
+    if word and word[-1].name == trim.name:
+        times[-1] += lasting
+        return
+    if word:
+        between.append(None)
+    word.append(trim)
+    times.append(lasting)
+
+
+@functools.cache
+def load_fail_safe() -> None:
+    """Have the kernels ready before the clock runs."""
+    from maneuver_automaton.search.choose import smallest_lattice_query
+
+    problem = smallest_lattice_query().problem
+    stands_free(problem, search_fail_safe(problem, until=1.0).plan.end, time=1.0, duration=1.0)
