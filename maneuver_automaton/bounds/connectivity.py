@@ -23,7 +23,7 @@ from maneuver_automaton.bounds.arrays import Cells, Grid
 from maneuver_automaton.bounds.pose_scene import TOUCHING, PoseScene
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.search.lattice_worlds import window_of
+from maneuver_automaton.search.scene import window_of
 
 HEADINGS = 8  # of the roots of the tree
 MOST_ROOTS = 4096  # in the plane: a long corridor has as small ones as a room

@@ -20,7 +20,7 @@ from maneuver_automaton.planning.needs import has_inertia, has_tolerance, uses_l
 from maneuver_automaton.planning.no_way import with_proof
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace, workspace_of
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.beginning import Begun, begin, end, prepare_bench
+from maneuver_automaton.search.beginning import Begun, begin, end, prepare_first_call
 from maneuver_automaton.search.choose import load_search
 
 
@@ -236,7 +236,7 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
 
         goals = tuple(range(len(problem.goals)))
         lattice_query(problem, goals, prepared=workspace.prepared)
-        prepare_bench(problem, workspace.prepared)
+        prepare_first_call(problem, workspace.prepared)
         load_checks(problem, workspace)
 
 
@@ -247,7 +247,7 @@ def _load(problem: Problem, workspace: Workspace) -> None:
         _load_all(problem, workspace)
         ready.add(problem.ends)
     if problem.setting is not problem and uses_lattice(problem):  # others may follow it
-        prepare_bench(problem, workspace.prepared)
+        prepare_first_call(problem, workspace.prepared)
 
 
 @kept_by_first

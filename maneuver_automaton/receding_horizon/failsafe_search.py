@@ -16,9 +16,9 @@ from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import _kernels_failsafe as kernels
 from maneuver_automaton.receding_horizon.shifting import merged
-from maneuver_automaton.search._kernels_cells import EMPTY
+from maneuver_automaton.search._kernels_nodes import EMPTY
+from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.scene import Scene
 
 CELL = 0.25  # of the search, in turning radii
 HEADINGS = 24
@@ -152,10 +152,10 @@ def _task(query: LatticeQuery, until: float) -> kernels.FailSafeTask:
     arrays = library.arrays
     numbered = arrays.library
     m = numbered.n_trims
-    holds = arrays.edge_durations[:, 0]
+    holds = arrays.coasts.durations[:, 0]
     tick = float(holds[holds > 0.0].min(initial=math.inf))
     if not tick < WAITING:  # only maneuvers move it
-        tick = float(np.median(arrays.edge_time)) if arrays.edge_time.size else 1.0
+        tick = float(np.median(arrays.edges.time)) if arrays.edges.time.size else 1.0
     still = np.flatnonzero(~numbered.twists[:m].any(axis=1))
     rest_of = np.full(len(numbered.cost), -1)
     rest_of[numbered.class_of[still][::-1]] = still[::-1]  # the first of each class
@@ -202,7 +202,7 @@ def _plan(
     for row in reversed(rows):
         edge = int(search.links[row, kernels.EDGE])
         if edge >= 0:
-            maneuver = automaton.maneuvers[library.edge_maneuver[edge]]
+            maneuver = automaton.maneuvers[library.arrays.edges.maneuver[edge]]
             begin, end = (automaton.trims[automaton.index_of(name)]
                           for name in (maneuver.source, maneuver.target))  # fmt: skip
             if word[-1].name != begin.name:

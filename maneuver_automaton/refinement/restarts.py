@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_library import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, as_wide_as_turns
 

@@ -18,12 +18,18 @@ from maneuver_automaton.collision.convex import DIGITS
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem, SearchSettings
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
-from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.lattice_worlds import Ends, Worlds, ends_of, window_of, worlds_around
+from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 from maneuver_automaton.search.prepared import RECENT, Prepared
-from maneuver_automaton.search.scene import Scene, scene_of
+from maneuver_automaton.search.scene import (
+    Ends,
+    Worlds,
+    ends_of,
+    scene_of,
+    window_of,
+    worlds_around,
+)
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.word import Word, word_of_steps
 
@@ -41,8 +47,7 @@ class LatticeQuery:
 
     problem: Problem
     library: LatticeLibrary
-    world: World  # all obstacles, whatever their heights, around the largest part
-    plane: World  # obstacles at every altitude, around the first part
+    worlds: Worlds
     around: Scene  # that motions are tested against
     start: Array  # (4,)
     start_trim: int  # NO_TRIM: any will do
@@ -62,13 +67,23 @@ class LatticeQuery:
         return self.library.priced.automaton
 
     @property
+    def world(self) -> World:
+        """All obstacles, whatever their heights, around the largest part."""
+        return self.worlds.whole
+
+    @property
+    def plane(self) -> World:
+        """Obstacles at every altitude, around the first part."""
+        return self.worlds.plane
+
+    @property
     def settings(self) -> SearchSettings:
         """Cells, headings and weight of the lattice."""
         return self.problem.search
 
     @property
     def window(self) -> Array:
-        """Window (9,) as in `_kernels_window.inside_window`."""
+        """Window (9,) as in `_kernels_coast.inside_window`."""
         return self.around.window
 
     @property
@@ -169,8 +184,7 @@ def lattice_query(
     return LatticeQuery(
         problem=problem,
         library=library,
-        world=worlds.whole,
-        plane=worlds.plane,
+        worlds=worlds,
         around=scene_of(problem, library, worlds, window, margin=margin, level=aimed.level),
         start=aimed.seen[0],
         start_trim=int(aimed.trims[0]),
