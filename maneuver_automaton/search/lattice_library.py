@@ -213,9 +213,12 @@ def library_of_trims(
     pieces, spans = motion_along(library, parts, edges, timed=waits, close=close)
     bodies, of_pose = bodies_of(parts), len(parts) * len(edges.cost)
     if len(edges.cost):
+        reach = pieces.speed * pieces.time + 2.0 * pieces.error
+        sums = np.add.reduceat(np.append(reach, 0.0), pieces.first[:-1])
+        sums = np.where(np.diff(pieces.first) > 0, sums, 0.0).reshape(len(parts) + 1, -1)
         ends = pieces.first[of_pose:-1]
         edges = edges._replace(
-            reach=_reaches(pieces, len(parts)),
+            reach=np.asarray(sums[:-1].max(axis=0)),
             low=np.minimum.reduceat(pieces.low, ends),
             high=np.maximum.reduceat(pieces.high, ends),
         )
@@ -432,14 +435,6 @@ def length_scale(twists: Array, body: Body, *, wide: bool) -> float:
         return size or 1.0
     radius = max(radius, 0.5 * size)
     return min(radius, 2.0 * size) if size and not wide else radius
-
-
-def _reaches(pieces: PieceArrays, n_parts: int) -> Array:
-    """How far any point of the vehicle moves along each edge (E,) [m]."""
-    reach = pieces.speed * pieces.time + 2.0 * pieces.error
-    sums = np.add.reduceat(np.append(reach, 0.0), pieces.first[:-1])
-    sums = np.where(np.diff(pieces.first) > 0, sums, 0.0)
-    return np.asarray(sums.reshape(n_parts + 1, -1)[:-1].max(axis=0))
 
 
 BETWEEN = 0.25  # of the change of climb from sample to sample times their spacing

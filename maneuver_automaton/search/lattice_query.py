@@ -242,7 +242,11 @@ def _ends(problem: Problem, goals: Sequence[int], library: LatticeLibrary, world
     poses = np.concatenate([problem.start[None], *rows])
     level = float(poses[1, 3]) if poses.shape[1] > 3 else 0.0
     seen = _seen(worlds.whole, poses, level)
-    trims = _end_trims(problem, library, index)
+    trims, automaton = np.full(len(seen), NO_TRIM), library.priced.automaton
+    if not automaton.is_kinematic:
+        last = [problem.last_trim(problem.goals[k]).name for k in index]
+        numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
+        trims = np.asarray(library.number_of[numbers], dtype=np.int64)
     clear = _end_clearances(problem, library, worlds, seen, trims, level)
     # The clearance at one heading says nothing of a goal at which the vehicle may turn.
     if not turns and (clear[1:] > 0.0).any():
@@ -259,16 +263,6 @@ def _seen(world: World, poses: Array, level: float) -> Array:
     if poses.shape[1] > 3:
         seen[:, 3] = np.round(poses[:, 3] - level, DIGITS)
     return seen
-
-
-def _end_trims(problem: Problem, library: LatticeLibrary, index: IntArray) -> IntArray:
-    """Trims (1 + n,) at the start, and at these goals of the problem."""
-    automaton = library.priced.automaton
-    if automaton.is_kinematic:
-        return np.full(1 + len(index), NO_TRIM)
-    last = [problem.last_trim(problem.goals[k]).name for k in index]
-    numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
-    return np.asarray(library.number_of[numbers], dtype=np.int64)
 
 
 def _end_clearances(
