@@ -11,7 +11,7 @@ The arrays are those of `arrays.WordArrays`. `now` is the word; `poses` (n, 4), 
 from __future__ import annotations
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-from maneuver_automaton.refinement.arrays import ImproveTask, Improving, Steps, WordArrays
+from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays, WordSteps
 from maneuver_automaton.search._kernels_coast import coast_free, coasted, is_still, may_stay
 from maneuver_automaton.search._kernels_connection import edge_end, edge_proven
 from maneuver_automaton.search.arrays import LatticeArrays
@@ -22,7 +22,7 @@ GAIN = 1e-9  # relative; a word that is cheaper by less is no gain
 
 
 @bare_inner_kernel
-def word_cost(lib: LatticeArrays, steps: Steps, n: int) -> float:
+def word_cost(lib: LatticeArrays, steps: WordSteps, n: int) -> float:
     """Cost of a word with the prices of its switches and maneuvers."""
     # `gear` is the sign of the last forward speed: trims without one do not change direction.
     trims, durations, edges = steps.trims, steps.durations, steps.edges

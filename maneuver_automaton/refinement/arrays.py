@@ -9,7 +9,7 @@ from maneuver_automaton.search.arrays import LatticeArrays, Scene, WordLimits
 from maneuver_automaton.words.library import Scratch
 
 
-class Steps(NamedTuple):
+class WordSteps(NamedTuple):
     """Trims one after the other; an edge leads to each, -1 for a switch."""
 
     trims: IntArray  # (n,)
@@ -35,11 +35,11 @@ class WordArrays(NamedTuple):
 
     start: Array  # (4,)
     length: IntArray  # (1,) how many of its steps count
-    now: Steps
+    now: WordSteps
     poses: Array  # (n, 4) where coasts begin
     times: Array  # (n + 1,) when they do
     ends: Array  # (n,) when they end
-    new: Steps  # of the word that may take its place
+    new: WordSteps  # of the word that may take its place
     middle_trims: IntArray  # (9,) of two connections, and the trim between them
     middle_durations: Array  # (9,) [s]
     one: Scratch  # candidates of the first connection

@@ -14,8 +14,8 @@ from maneuver_automaton.refinement.arrays import (
     ImproveTask,
     Improving,
     PointArrays,
-    Steps,
     WordArrays,
+    WordSteps,
 )
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -82,9 +82,9 @@ def improving(query: LatticeQuery, word: Word, *, points: int = 0) -> Improving:
     library, used = query.library, len(word.trims)
     n = max(256, 4 * used + 64)
 
-    def steps() -> Steps:
+    def steps() -> WordSteps:
         numbers = np.zeros(n, dtype=np.int64)
-        return Steps(numbers, np.zeros(n), np.full(n, AT_WILL))
+        return WordSteps(numbers, np.zeros(n), np.full(n, AT_WILL))
 
     arrays = WordArrays(
         start=np.array(query.start),
