@@ -24,8 +24,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.distance_grid import distance_grid
-from maneuver_automaton.search.lattice_memory import with_room
-from maneuver_automaton.search.lattice_pass import Pass, pass_of
+from maneuver_automaton.search.lattice_pass import Pass, pass_of, with_room
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import Resolution
 from tests import scenes
@@ -58,10 +57,11 @@ def places() -> Iterator[tuple[str, list[Problem]]]:
 
 def seconds(one: Pass, n: int) -> float:
     """Processor time [s] of up to `n` expansions."""
-    arrays = with_room(one.arrays, one.library.most_children * (n + 1) + len(one.task.roots) + 2)
+    search = one.search
+    most = search.library.most_children * (n + 1) + len(search.task.roots.poses) + 2
+    one.search = search = search._replace(arrays=with_room(search.arrays, most))
     began = time.process_time()
-    kernels.expand(arrays, one.task, one.library, one.scene, one.grid, one.table, n, math.inf)
-    one.arrays = arrays
+    kernels.expand(search, n, math.inf)
     return time.process_time() - began
 
 

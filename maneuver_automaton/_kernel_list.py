@@ -26,12 +26,11 @@ USES = {  # modules of kernels, by what calls them
         "words._kernels_closing",
         "words._kernels_solve",
         "words._kernels_steering",
-        "search._kernels_all_words",
         "search._kernels_polish",
         "search._kernels_price",
         "search._kernels_words",
     ),
-    "insertion": ("search._kernels_chatter", "search._kernels_insertion"),
+    "insertion": ("search._kernels_insertion",),
     "lattice": (
         "collision._kernels_advancement",
         "collision._kernels_field",

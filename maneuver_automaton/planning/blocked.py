@@ -19,8 +19,8 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.search.lattice_goals import nearest_on_lattice
-from maneuver_automaton.search.lattice_worlds import CLEARLY, ends_of, world_around
 from maneuver_automaton.search.limits import outside
+from maneuver_automaton.search.scene import CLEARLY, ends_of, world_around
 
 LEAVES = "`plan --leave`, or plan(problem, leave=True), drives out of what a start touches first"
 

@@ -35,12 +35,17 @@ from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
+from maneuver_automaton.refinement.restarts import restarts_of
+from maneuver_automaton.search.arrays import CostTable
+from maneuver_automaton.search.beginning import Begun
+from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.lattice_worlds import Ends
+from maneuver_automaton.search.scene import Ends
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.word import Word
 
@@ -133,7 +138,7 @@ class Lattice(Step):
         begun, ends = ended.begun, None
         goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
         if begun is not None:
-            ends = Ends(begun.bench.desk.seen[:, :3].copy(), begun.bench.desk.clear.copy())
+            ends = Ends(begun.call.arrays.seen[:, :3].copy(), begun.call.arrays.clear.copy())
         query = lattice_query(problem, goals, prepared=prepared, ends=ends)
         known = query.library.at_will
         self.table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
@@ -342,10 +347,10 @@ class Lattice(Step):
 
 def late_at_first(query: LatticeQuery) -> LatticeQuery:
     """The query with no longest time where cheaper is quicker: shortcuts and polishing hasten."""
-    edges, trims = query.library.arrays, query.library.arrays.library
+    edges, trims = query.library.arrays.edges, query.library.arrays.library
     rates = trims.rates[: trims.n_trims]  # the last row is the turn of a free heading
     close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
-    timed = close(rates, rates[0]) and close(edges.edge_cost, rates[0] * edges.edge_time)
+    timed = close(rates, rates[0]) and close(edges.cost, rates[0] * edges.time)
     return replace(query, most_time=math.inf) if timed else query
 
 

@@ -24,11 +24,10 @@ from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search.cost_to_go import CostTable
+from maneuver_automaton.search.arrays import CostTable
 from maneuver_automaton.search.distance_grid import distance_grid
 from maneuver_automaton.search.lattice import FirstPlan
-from maneuver_automaton.search.lattice_memory import give_back
-from maneuver_automaton.search.lattice_pass import pass_of
+from maneuver_automaton.search.lattice_pass import give_back, pass_of
 from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, back_off_of
 from maneuver_automaton.words.transitions import SWITCH

@@ -24,6 +24,7 @@ from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.steps import answer, prepare_steps, uses_lattice
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.beginning import prepare_bench
+from maneuver_automaton.search.beginning import Begun, begin, end, prepare_first_call
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.lattice_query import lattice_query
 
@@ -175,7 +176,7 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     if uses_lattice(problem):
         goals = tuple(range(len(problem.goals)))
         lattice_query(problem, goals, prepared=workspace.prepared)
-        prepare_bench(problem, workspace.prepared)
+        prepare_first_call(problem, workspace.prepared)
         load_checks(problem, workspace)
 
 
@@ -186,7 +187,7 @@ def _load(problem: Problem, workspace: Workspace) -> None:
         prepare_steps(problem, workspace)
         ready.add(problem.ends)
     if problem.setting is not problem and uses_lattice(problem):  # others may follow it
-        prepare_bench(problem, workspace.prepared)
+        prepare_first_call(problem, workspace.prepared)
 
 
 def plans(

@@ -24,8 +24,8 @@ from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.lattice_worlds import world_around
 from maneuver_automaton.search.prepared import RECENT, Prepared
+from maneuver_automaton.search.scene import world_around
 from maneuver_automaton.words.word import Word
 
 AT_ONCE = Patience(attempts=0, passes=0)

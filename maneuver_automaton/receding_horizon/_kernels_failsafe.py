@@ -29,12 +29,11 @@ import numpy as np
 
 from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.search._kernels_cells import enter
 from maneuver_automaton.search._kernels_coast import coast_inside, coast_proven, coasted
+from maneuver_automaton.search._kernels_connection import edge_end, edge_free
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
-from maneuver_automaton.search.lattice_arrays import LatticeArrays
-from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search._kernels_nodes import enter
+from maneuver_automaton.search.arrays import LatticeArrays, Scene
 
 FULL_TURN = 2.0 * math.pi
 X, Y, HEADING, Z, CLOCK, LASTING, SAFE, HOPE = range(8)
@@ -166,7 +165,7 @@ def expand(
     """
     # The times at which a trim is left double: there are at most 32 unless they grow by 2**32.
     nodes, state = search.nodes, search.state
-    room = nodes.shape[0] - 32 * lib.library.n_trims - lib.edge_cost.shape[0]
+    room = nodes.shape[0] - 32 * lib.library.n_trims - lib.edges.cost.shape[0]
     for _ in range(n):
         if state[FOUND] >= 0 or state[HEAP] == 0 or state[N_NODES] > room:
             return 0
@@ -209,10 +208,10 @@ def expand(
                 t *= 2.0
                 if state[FOUND] >= 0 and clock + t >= nodes[state[FOUND], CLOCK]:
                     break  # the one that was found is sooner
-        for edge in range(lib.first_edge[group], lib.first_edge[group + 1]):
+        for edge in range(lib.edges.first[group], lib.edges.first[group + 1]):
             if not edge_free(scene, lib, edge, pose, clock):
                 continue
-            trim, later = lib.edge_target[edge], clock + lib.edge_time[edge]
+            trim, later = lib.edges.target[edge], clock + lib.edges.time[edge]
             then = edge_end(lib, edge, pose)
             if not is_new(task, search.cells, then, later, lib.library.class_of[trim]):
                 continue

@@ -157,10 +157,10 @@ def _task(query: LatticeQuery, until: float) -> kernels.FailSafeTask:
     arrays = library.arrays
     numbered = arrays.library
     m = numbered.n_trims
-    holds = arrays.edge_durations[:, 0]
+    holds = arrays.coasts.durations[:, 0]
     tick = float(holds[holds > 0.0].min(initial=math.inf))
     if not tick < WAITING:  # only maneuvers move it
-        tick = float(np.median(arrays.edge_time)) if arrays.edge_time.size else 1.0
+        tick = float(np.median(arrays.edges.time)) if arrays.edges.time.size else 1.0
     still = np.flatnonzero(~numbered.twists[:m].any(axis=1))
     rest_of = np.full(len(numbered.transitions.cost), -1)
     rest_of[numbered.class_of[still][::-1]] = still[::-1]  # the first of each class

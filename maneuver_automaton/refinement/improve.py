@@ -21,6 +21,10 @@ from maneuver_automaton.refinement.clear_insertion import Whole
 from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
 from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays
 from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
+from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
+from maneuver_automaton.refinement.work import improving, shortcut, word_of
+from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays
+from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.lattice import distance_grids
 from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
@@ -344,9 +348,7 @@ class Improvement:
 
     def _attempted(self, word: Word, attempts: int) -> Word:
         """The word after random shortcuts and via-points."""
-        query = self.query
-        work, state = work_of(query, word)
-        task, scene = improve_task(query, word), query.scene()
+        query, one = self.query, improving(self.query, word)
         pace = Pace(self.budget, TIMELY if query.library.at_will else TIMELY_LINKED)
         done = 0
         while done < attempts:
@@ -356,8 +358,8 @@ class Improvement:
             while step := pace.take(n - first):
                 some = slice(first, first + step)
                 draws = uniform[some], normal[some]
-                attempt_all(query.library.arrays, task, scene, work, state, *draws)
+                attempt_all(one, *draws)
                 first += step
             self.attempts += first
             done += n
-        return word_of(work, state, word, query)
+        return word_of(one, word, query)

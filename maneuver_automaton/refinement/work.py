@@ -9,11 +9,17 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_points import begin_program, join_points, take_program
-from maneuver_automaton.refinement._kernels_word import AT_WILL, GAIN, LENGTH
-from maneuver_automaton.refinement.arrays import ImproveTask, Work
+from maneuver_automaton.refinement._kernels_word import AT_WILL, GAIN
+from maneuver_automaton.refinement.arrays import (
+    ImproveTask,
+    Improving,
+    PointArrays,
+    WordArrays,
+    WordSteps,
+)
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
-from maneuver_automaton.search.lattice_task import TRIES
+from maneuver_automaton.search.lattice_task import TRIES, limits_of
 from maneuver_automaton.words.library import scratch_of
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
@@ -32,18 +38,17 @@ def shortcut(
     points = len(times)
     if points < 2:
         return word
-    work, state = work_of(query, word, points=points)
-    task, scene, arrays = improve_task(query, word), query.scene(), query.library.arrays
-    cost = begin_program(arrays, work, state, times)
+    one = improving(query, word, points=points)
+    cost = begin_program(one.library, one.word, times)
     most = max(1, TIMELY_WORDS // (n_words * points))  # the last points have the most connections
     pace, first = Pace(budget, steps=most, most=most), 1
     while part := pace.take(points - first):
-        join_points(arrays, task, scene, work, first, first + part, n_words, GAIN * cost)
+        join_points(one, first, first + part, n_words, GAIN * cost)
         first += part
     if first < points:
         return word
-    take_program(arrays, task, scene, work, state, cost)
-    return word_of(work, state, word, query)
+    take_program(one, cost)
+    return word_of(one, word, query)
 
 
 def point_times(query: LatticeQuery, word: Word, cut: float) -> Array:
@@ -52,7 +57,7 @@ def point_times(query: LatticeQuery, word: Word, cut: float) -> Array:
     All but the ends lie earlier by the share `cut` of the time between two.
     """
     edges = _edges_of(query, word)
-    lasting = np.where(edges >= 0, np.append(query.library.arrays.edge_time, 0.0)[edges], 0.0)
+    lasting = np.where(edges >= 0, np.append(query.library.arrays.edges.time, 0.0)[edges], 0.0)
     steps = np.cumsum(np.column_stack([lasting, word.durations]).ravel())
     begins, ends = steps[0::2], steps[1::2]
     if not len(ends):
@@ -72,48 +77,52 @@ def _edges_of(query: LatticeQuery, word: Word) -> IntArray:
     return edges
 
 
-def work_of(query: LatticeQuery, word: Word, *, points: int = 0) -> tuple[Work, IntArray]:
-    """Arrays that hold a word, with room for so many points, and its state."""
+def improving(query: LatticeQuery, word: Word, *, points: int = 0) -> Improving:
+    """A word in arrays with room for so many points, and what is asked of it."""
     library, used = query.library, len(word.trims)
     n = max(256, 4 * used + 64)
-    work = Work(
+
+    def steps() -> WordSteps:
+        numbers = np.zeros(n, dtype=np.int64)
+        return WordSteps(numbers, np.zeros(n), np.full(n, AT_WILL))
+
+    arrays = WordArrays(
         start=np.array(query.start),
-        trims=np.zeros(n, dtype=np.int64),
-        durations=np.zeros(n),
-        edges=np.full(n, AT_WILL),
+        length=np.array([used], dtype=np.int64),
+        now=steps(),
         poses=np.zeros((n, 4)),
         times=np.zeros(n + 1),
         ends=np.zeros(n),
-        new_trims=np.zeros(n, dtype=np.int64),
-        new_durations=np.zeros(n),
-        new_edges=np.zeros(n, dtype=np.int64),
+        new=steps(),
         middle_trims=np.zeros(9, dtype=np.int64),
         middle_durations=np.zeros(9),
         one=scratch_of(library.arrays.library),
         two=scratch_of(library.arrays.library),
-        at=np.zeros((points, 5)),
-        owners=np.zeros(points, dtype=np.int64),
-        best=np.zeros(points),
-        spent=np.zeros(points),
-        back=np.zeros(points, dtype=np.int64),
-        by_trims=np.zeros((points, 4), dtype=np.int64),
-        by_durations=np.zeros((points, 4)),
-        legs=np.zeros(points, dtype=np.int64),
+        points=PointArrays(
+            at=np.zeros((points, 5)),
+            owners=np.zeros(points, dtype=np.int64),
+            best=np.zeros(points),
+            spent=np.zeros(points),
+            back=np.zeros(points, dtype=np.int64),
+            by_trims=np.zeros((points, 4), dtype=np.int64),
+            by_durations=np.zeros((points, 4)),
+            legs=np.zeros(points, dtype=np.int64),
+        ),
     )
-    work.trims[:used] = library.number_of[word.trims]
-    work.durations[:used] = word.durations
-    work.edges[:used] = _edges_of(query, word)
-    return work, np.array([used], dtype=np.int64)
+    arrays.now.trims[:used] = library.number_of[word.trims]
+    arrays.now.durations[:used] = word.durations
+    arrays.now.edges[:used] = _edges_of(query, word)
+    return Improving(arrays, library.arrays, improve_task(query, word), query.scene())
 
 
-def word_of(work: Work, state: IntArray, word: Word, query: LatticeQuery) -> Word:
+def word_of(one: Improving, word: Word, query: LatticeQuery) -> Word:
     """The word that arrays hold."""
-    n, library = int(state[LENGTH]), query.library
-    maneuvers = np.append(library.edge_maneuver, SWITCH)[work.edges[:n]]
+    n, library, now = int(one.word.length[0]), query.library, one.word.now
+    maneuvers = np.append(library.arrays.edges.maneuver, SWITCH)[now.edges[:n]]
     steps = zip(
         maneuvers.tolist(),
-        library.trims[work.trims[:n]].tolist(),
-        work.durations[:n].tolist(),
+        library.trims[now.trims[:n]].tolist(),
+        now.durations[:n].tolist(),
         strict=True,
     )
     return with_cost(word_of_steps(steps, goal=word.goal), query)
@@ -124,16 +133,13 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
     library = query.library
     twists = library.arrays.library.twists
     speed = float(np.hypot(twists[:, 0], twists[:, 1]).max())
-    steps = np.hypot(library.arrays.edge_displacement[:, 0], library.arrays.edge_displacement[:, 1])
+    edges = library.arrays.edges
+    steps = np.hypot(edges.displacement[:, 0], edges.displacement[:, 1])
     covers = steps > 0.0  # a maneuver may cover ground for less than any trim
-    least = float((library.arrays.edge_cost[covers] / steps[covers]).min(initial=math.inf))
+    least = float((edges.cost[covers] / steps[covers]).min(initial=math.inf))
     return ImproveTask(
         tries=TRIES,
-        clock=float(query.start_time),
-        most_time=float(query.most_time),
-        stay_until=float(query.stay_until),
-        most_trims=int(query.most_trims),
-        least_coast=float(query.least_coast),
+        limits=limits_of(query),
         given_ends=query.start_trim >= 0,
         per_metre=min(float(library.per_metre), least),
         radius=float(library.radius),

@@ -27,8 +27,8 @@ from maneuver_automaton.roads._kernels_costs import (
 )
 from maneuver_automaton.roads._kernels_motion import first_free_stop, free_tick, one_tick
 from maneuver_automaton.roads.arrays import BeamArrays, HorizonTask, Maneuvers, RoadArrays
-from maneuver_automaton.search._kernels_cells import EMPTY, enter
 from maneuver_automaton.search._kernels_distance import pop, push
+from maneuver_automaton.search._kernels_nodes import EMPTY, enter
 
 PARENT, MANEUVER, TRIM, NEAR = range(4)  # columns of `links`
 N_NODES, HEAP, KEPT, CHECKS, N_CHILDREN = range(5)  # places of `state`

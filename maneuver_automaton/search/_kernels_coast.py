@@ -1,23 +1,138 @@
 """Whether a vehicle that coasts in a trim, or stands, stays free: part by part, layer by layer.
 
-The world is one plane or several, one above the other. One body in one plane is the common case.
+The world is one plane or several, one above the other. One body in one plane is the common case. A
+vehicle is one rigid part or several, each with its own offset and twist in every trim. The proof is
+conservative advancement (`free_time`): what it calls free is free between the poses that it looks
+at, too.
 """
 
 from __future__ import annotations
 
 import math
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
+from maneuver_automaton.collision.arrays import WorldArrays
+from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
-from maneuver_automaton.search._kernels_parts import part_body, part_coast
-from maneuver_automaton.search._kernels_window import inside_window
-from maneuver_automaton.search.arrays import Task
-from maneuver_automaton.search.lattice_arrays import LatticeArrays
-from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search.arrays import BodyArrays, LatticeArrays, Scene
 from maneuver_automaton.words._kernels_library import NO_TRIM
+
+
+@bare_inner_kernel
+def inside_window(
+    window: Array, x: float, y: float, heading: float, twist: Array, t: float
+) -> bool:
+    """Whether a motion stays inside [low x, low y, high x, high y], seen from the bounds' frame.
+
+    `window` (9,) is those four, the frame's (x, y, cos, sin) that take a pose of the world to it,
+    and what the pose may be outside [m].
+    """
+    # a is the pose where the motion begins, seen from the frame, e the one where it ends. The box
+    # [low, high] holds both, and grows by the extreme points of the arc between them.
+    v_x, v_y, turn = twist[0], twist[1], twist[2]
+    c, s = window[6], window[7]
+    d_x, d_y = x - window[4], y - window[5]
+    a_x, a_y = c * d_x - s * d_y, s * d_x + c * d_y
+    # Most motions are too short to reach a side.
+    reach = math.sqrt(v_x * v_x + v_y * v_y) * abs(t)
+    if (
+        a_x - reach > window[0]
+        and a_y - reach > window[1]
+        and a_x + reach < window[2]
+        and a_y + reach < window[3]
+    ):
+        return True
+    a_heading = heading + math.atan2(s, c)
+    m_x, m_y, angle = coast(v_x, v_y, turn, t)
+    e_x, e_y, _ = compose(a_x, a_y, a_heading, m_x, m_y, angle)
+    low_x, high_x = min(a_x, e_x), max(a_x, e_x)
+    low_y, high_y = min(a_y, e_y), max(a_y, e_y)
+    if turn != 0.0:
+        radius_x, radius_y = -v_y / turn, v_x / turn  # from the pose to the centre of the circle
+        cos, sin = math.cos(a_heading), math.sin(a_heading)
+        m_x = a_x + cos * radius_x - sin * radius_y
+        m_y = a_y + sin * radius_x + cos * radius_y
+        radius = math.sqrt(radius_x * radius_x + radius_y * radius_y)
+        # (m_x, m_y) is the centre. The proof: along an axis an arc is extreme at its ends or at a
+        # multiple of a quarter turn, and four of these in a row are all there are.
+        begin = math.atan2(a_y - m_y, a_x - m_x)
+        end = begin + angle
+        first, last = min(begin, end), max(begin, end)
+        quarter = 0.5 * math.pi
+        k = math.ceil(first / quarter)
+        while k * quarter <= last and k <= math.ceil(first / quarter) + 4:
+            side = k % 4
+            if side == 0:
+                high_x = max(high_x, m_x + radius)
+            elif side == 1:
+                high_y = max(high_y, m_y + radius)
+            elif side == 2:
+                low_x = min(low_x, m_x - radius)
+            else:
+                low_y = min(low_y, m_y - radius)
+            k += 1
+    slack = window[8]
+    return (
+        low_x >= window[0] - slack
+        and low_y >= window[1] - slack
+        and high_x <= window[2] + slack
+        and high_y <= window[3] + slack
+    )
+
+
+@bare_inner_kernel
+def part_body(bodies: BodyArrays, p: int) -> Body:
+    """One rigid part of the vehicle, cut out of the arrays of all."""
+    # The polygons of part p are those from `piece_of[p]` to `piece_of[p + 1]`, its discs those of
+    # `disc_of`; `first` says where the edges of each polygon begin, and where the last ones end.
+    return Body(
+        bodies.edges,
+        bodies.first[bodies.piece_of[p] : bodies.piece_of[p + 1] + 1],
+        bodies.radius[bodies.piece_of[p] : bodies.piece_of[p + 1]],
+        bodies.discs[bodies.disc_of[p] : bodies.disc_of[p + 1]],
+        bodies.sizes[p, 0],
+        bodies.sizes[p, 1],
+        bodies.sizes[p, 2],
+        bodies.sizes[p, 3],
+        bodies.sizes[p, 4],
+    )
+
+
+@bare_inner_kernel
+def part_free(
+    world: WorldArrays,
+    body: Body,
+    place: tuple[float, float, float],
+    offset: Array,
+    motion: tuple[Array, float, float, float],
+    asked: tuple[float, float, float],
+) -> tuple[float, float]:
+    """How long a part with an `offset` on a vehicle at `place` is free; the last clearance.
+
+    `motion` is a constant twist, the speed of the part's fastest point, on which the proof rests,
+    when the motion begins after the vehicle was at `place`, and how long it lasts [s]; both times
+    are negative for one that is driven backwards in time. `asked` are the distance to keep, the
+    clearance beyond it that a proof needs, and the world's time at `place`.
+    """
+    twist, speed, begin, t = motion
+    keep, margin, clock = asked
+    v_x, v_y, turn = twist[0], twist[1], twist[2]
+    x, y, heading = compose(place[0], place[1], place[2], offset[0], offset[1], offset[2])
+    if begin != 0.0:
+        d_x, d_y, angle = coast(v_x, v_y, turn, begin)
+        x, y, heading = compose(x, y, heading, d_x, d_y, angle)
+    clock += begin
+    return free_time(world, body, x, y, heading, v_x, v_y, turn, speed, t, keep, margin, clock)
+
+
+@inlined_kernel
+def is_one_in_plane(scene: Scene, lib: LatticeArrays) -> bool:
+    """Whether one body moves among obstacles in one plane, without zones."""
+    return scene.layers.low.shape[0] == 1 and scene.layers.flat and lib.parts.n == 1
 
 
 @inlined_kernel
@@ -35,17 +150,17 @@ def coast_proven(
     has no sign. One body among obstacles in one plane has a line of its own: it is asked for at
     every edge, and to choose a part and a layer copies more than the proof takes.
     """
-    if scene.layers.low.shape[0] == 1 and scene.layers.flat and lib.n_parts == 1:
+    if is_one_in_plane(scene, lib):
         free, clearance = free_time(
             scene.layers.first,
-            lib.body,
+            lib.parts.body,
             pose[0],
             pose[1],
             pose[2],
             lib.library.twists[trim, 0],
             lib.library.twists[trim, 1],
             lib.library.twists[trim, 2],
-            lib.fastest[trim],
+            lib.parts.fastest[trim],
             t,
             scene.keep,
             scene.margin,
@@ -62,15 +177,15 @@ def edge_swept(
 ) -> int:
     """A solid that may be in the way of an edge of coasting, FREE for none, or UNKNOWN.
 
-    `motion` is its place in `lib.swept`. FREE is a proof, and what it calls free `coast_proven`
-    would too: no pose along the edge comes as near to a solid as it would stop at.
+    `motion` is its place in `lib.coasts.swept`. FREE is a proof, and what it calls free
+    `coast_proven` would too: no pose along the edge comes as near to a solid as it would stop at.
     """
-    if not (scene.layers.low.shape[0] == 1 and scene.layers.flat and lib.n_parts == 1):
+    if not is_one_in_plane(scene, lib):
         return UNKNOWN
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    enough = scene.keep + scene.margin
+    swept, enough = lib.coasts.swept, scene.keep + scene.margin
     return not_parted(
-        scene.layers.first, lib.body, lib.swept, motion, pose[0], pose[1], c, s, enough
+        scene.layers.first, lib.parts.body, swept, motion, pose[0], pose[1], c, s, enough
     )
 
 
@@ -79,8 +194,8 @@ def swept_end(
     lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
 ) -> tuple[float, float]:
     """Cosine and sine of the heading at the end of an edge of coasting."""
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    turn_c, turn_s = lib.swept.places[motion, 3], lib.swept.places[motion, 4]
+    c, s, places = math.cos(pose[2]), math.sin(pose[2]), lib.coasts.swept.places
+    turn_c, turn_s = places[motion, 3], places[motion, 4]
     return c * turn_c - s * turn_s, s * turn_c + c * turn_s
 
 
@@ -101,7 +216,8 @@ def coast_proven_everywhere(
     # so the least of them remains, and all of it is proven. `nearest` is the clearance at the end:
     # only layers that the vehicle is in there count.
     x, y, heading, z = pose
-    sign = 1.0 if t >= 0.0 else -1.0
+    place = (x, y, heading)
+    parts, sign = lib.parts, 1.0 if t >= 0.0 else -1.0
     length = abs(t)
     free, nearest = length, math.inf
     climb = sign * lib.library.twists[trim, 3]
@@ -110,21 +226,12 @@ def coast_proven_everywhere(
         begin, end = times_between(z, climb, scene.layers.low[k], scene.layers.high[k], length)
         if end < begin or begin > free:
             continue  # never in this layer, or only after the motion is blocked
-        world = layer_world(scene.layers, k)
-        for p in range(lib.n_parts):
+        world, asked = layer_world(scene.layers, k), (scene.keep, scene.margin, clock)
+        for p in range(parts.n):
             span = min(end, free) - begin
-            proven, clearance = part_coast(
-                world,
-                lib,
-                p,
-                trim,
-                (x, y, heading),
-                sign * begin,
-                sign * span,
-                scene.keep,
-                scene.margin,
-                clock,
-            )
+            motion = (parts.twists[p, trim], parts.speeds[p, trim], sign * begin, sign * span)
+            body = part_body(parts.bodies, p)
+            proven, clearance = part_free(world, body, place, parts.offsets[p, trim], motion, asked)
             if proven < span:
                 free = begin + proven
             elif end == length:
@@ -134,12 +241,11 @@ def coast_proven_everywhere(
             continue
         # The body keeps out of zones that do not admit the trim. Their distance is not part of the
         # clearance, since the next motion may be admitted.
-        world = layer_world(scene.layers, n_layers + k)
-        for p in range(lib.n_parts):
-            span, place = free, (x, y, heading)
-            free, _ = part_coast(
-                world, lib, p, trim, place, 0.0, sign * span, 0.0, scene.margin, clock
-            )
+        world, asked = layer_world(scene.layers, n_layers + k), (0.0, scene.margin, clock)
+        for p in range(parts.n):
+            motion = (parts.twists[p, trim], parts.speeds[p, trim], 0.0, sign * free)
+            body = part_body(parts.bodies, p)
+            free, _ = part_free(world, body, place, parts.offsets[p, trim], motion, asked)
     return free, nearest if nearest < math.inf else scene.far
 
 
@@ -148,18 +254,10 @@ def coast_inside(
     scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> bool:
     """Whether coasting a trim stays inside the window."""
-    end = pose[3] + t * lib.library.twists[trim, 3]
+    twist = lib.library.twists[trim]
+    end = pose[3] + t * twist[3]
     inside = min(pose[3], end) >= scene.lowest and max(pose[3], end) <= scene.highest
-    return inside and inside_window(
-        scene.window,
-        pose[0],
-        pose[1],
-        pose[2],
-        lib.library.twists[trim, 0],
-        lib.library.twists[trim, 1],
-        lib.library.twists[trim, 2],
-        t,
-    )
+    return inside and inside_window(scene.window, pose[0], pose[1], pose[2], twist, t)
 
 
 @inlined_kernel
@@ -208,10 +306,10 @@ def may_stay(
         if z < scene.layers.low[k] or z > scene.layers.high[k]:
             continue
         world = layer_world(scene.layers, k)
-        for p in range(lib.n_parts):
-            at = lib.offsets[p, trim]
+        for p in range(lib.parts.n):
+            at = lib.parts.offsets[p, trim]
             p_x, p_y, p_heading = compose(x, y, heading, at[0], at[1], at[2])
-            body, t = part_body(lib.bodies, p), until - clock
+            body, t = part_body(lib.parts.bodies, p), until - clock
             keep, margin = scene.keep, scene.margin
             proven, _ = free_time(
                 world, body, p_x, p_y, p_heading, 0.0, 0.0, 0.0, 0.0, t, keep, margin, clock
@@ -229,6 +327,6 @@ def is_still(lib: LatticeArrays, trim: int) -> bool:
 
 
 @inlined_kernel
-def too_short(task: Task, lib: LatticeArrays, trim: int, run: float) -> bool:
+def too_short(lib: LatticeArrays, trim: int, run: float, least_coast: float) -> bool:
     """Whether a trim that moves has begun, and does not yet last as long as it must."""
-    return trim != NO_TRIM and 0.0 < run < task.least_coast and not is_still(lib, trim)
+    return trim != NO_TRIM and 0.0 < run < least_coast and not is_still(lib, trim)

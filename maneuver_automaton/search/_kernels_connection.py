@@ -1,4 +1,7 @@
-"""Whether words of at most three trims between two poses are free, transitions included."""
+"""Whether maneuvers, and words of at most three trims between two poses, are free.
+
+A maneuver is looked at piece by piece of its course, a word with the transitions between its trims.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,118 @@ import math
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
-from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
-from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
-from maneuver_automaton.search.lattice_arrays import LatticeArrays
-from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.collision._kernels_layers import layer_world
+from maneuver_automaton.groups._kernels import compose
+from maneuver_automaton.search._kernels_coast import (
+    coast_free,
+    coast_inside,
+    coasted,
+    inside_window,
+    part_body,
+    part_free,
+)
+from maneuver_automaton.search.arrays import Joint, LatticeArrays, Scene
 from maneuver_automaton.words._kernels_library import class_of
 from maneuver_automaton.words.library import Scratch
+
+
+@bare_inner_kernel
+def edge_proven(
+    scene: Scene,
+    lib: LatticeArrays,
+    edge: int,
+    pose: tuple[float, float, float, float],
+    clock: float,
+) -> float:
+    """Least clearance at the end of a maneuver, -1 if it is not proven free.
+
+    Each piece of its course moves by one twist. The true motion deviates from it by at most
+    its `error`, which is kept in addition to `keep`: so the proof holds for the true motion.
+    A layer counts for all of a piece that is in it.
+    """
+    # Pieces of part p along an edge are those from `first[p * n_edges + edge]` to the next
+    # entry; their times add up to `time`. `nearest` is the clearance after the last of them.
+    x, y, heading, z = pose
+    place = (x, y, heading)
+    nearest = scene.far
+    layers, bodies, pieces = scene.layers, lib.parts.bodies, lib.pieces
+    n_layers, n_edges = layers.low.shape[0] - scene.zone_trims.shape[0], lib.edges.cost.shape[0]
+    low, high = z + lib.edges.low[edge], z + lib.edges.high[edge]
+    for n in range(n_layers):
+        if high < layers.low[n] or low > layers.high[n]:
+            continue
+        world = layer_world(layers, n)
+        for p in range(lib.parts.n):
+            begin, end = pieces.first[p * n_edges + edge], pieces.first[p * n_edges + edge + 1]
+            body, time = part_body(bodies, p), clock
+            for k in range(begin, end):
+                t = pieces.time[k]
+                if z + pieces.high[k] < layers.low[n] or z + pieces.low[k] > layers.high[n]:
+                    time += t
+                    continue
+                motion = (pieces.twist[k], pieces.speed[k], 0.0, t)
+                asked = (scene.keep + pieces.error[k], scene.margin, time)
+                proven, clearance = part_free(world, body, place, pieces.pose[k], motion, asked)
+                if proven < t:
+                    return -1.0
+                time += t
+                if k == end - 1:
+                    nearest = min(nearest, clearance)
+    for n in range(scene.zone_trims.shape[0]):
+        world = layer_world(layers, n_layers + n)
+        for p in range(lib.parts.n):
+            group, body = p * n_edges + edge, part_body(bodies, p)
+            for k in range(pieces.first[group], pieces.first[group + 1]):
+                if scene.zone_pieces[n, k]:
+                    continue
+                # Zones stand still, so the time does not matter.
+                motion = (pieces.twist[k], pieces.speed[k], 0.0, pieces.time[k])
+                asked = (pieces.error[k], scene.margin, clock)
+                proven, _ = part_free(world, body, place, pieces.pose[k], motion, asked)
+                if proven < pieces.time[k]:
+                    return -1.0
+    return nearest
+
+
+@bare_inner_kernel
+def edge_inside(
+    scene: Scene, lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
+) -> bool:
+    """Whether a maneuver stays inside the window."""
+    x, y, heading, z = pose
+    edges, pieces = lib.edges, lib.pieces
+    if z + edges.low[edge] < scene.lowest or z + edges.high[edge] > scene.highest:
+        return False
+    group = lib.parts.n * edges.cost.shape[0] + edge  # the pieces of the pose come last
+    for k in range(pieces.first[group], pieces.first[group + 1]):
+        at, window = pieces.pose[k], scene.edge_window
+        p_x, p_y, p_heading = compose(x, y, heading, at[0], at[1], at[2])
+        if not inside_window(window, p_x, p_y, p_heading, pieces.twist[k], pieces.time[k]):
+            return False
+    return True
+
+
+@bare_inner_kernel
+def edge_end(
+    lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Pose at the end of a maneuver."""
+    moved = lib.edges.displacement[edge]
+    x, y, heading = compose(pose[0], pose[1], pose[2], moved[0], moved[1], moved[2])
+    return x, y, heading, pose[3] + moved[3]
+
+
+@bare_inner_kernel
+def edge_free(
+    scene: Scene,
+    lib: LatticeArrays,
+    edge: int,
+    pose: tuple[float, float, float, float],
+    clock: float,
+) -> bool:
+    """Whether a maneuver from a pose stays inside and is proven free."""
+    inside = edge_inside(scene, lib, edge, pose)
+    return inside and edge_proven(scene, lib, edge, pose, clock) >= 0.0
 
 
 @bare_inner_kernel
@@ -26,12 +135,12 @@ def transition_free(
     """Whether the transition between two trims is free; then the pose and time at its end."""
     at, goal = class_of(lib.library, source), class_of(lib.library, target)
     while at != goal:  # within a class the transition is the identity
-        edge = lib.via_edge[at, goal]
+        edge = lib.edges.via[at, goal]
         if not edge_free(scene, lib, edge, pose, clock):
             return False, pose, clock
         pose = edge_end(lib, edge, pose)
-        clock += lib.edge_time[edge]
-        at = class_of(lib.library, lib.edge_target[edge])
+        clock += lib.edges.time[edge]
+        at = class_of(lib.library, lib.edges.target[edge])
     return True, pose, clock
 
 
@@ -39,22 +148,20 @@ def transition_free(
 def connection_free(
     scene: Scene,
     lib: LatticeArrays,
-    ends: tuple[tuple[float, float, float, float], int, int],
+    joint: Joint,
     word: IntArray,
     climb: int,
     times: Array,
-    clock: float,
 ) -> bool:
     """Whether a connection is free all the way: three trims, a climb, and the trim of its goal.
 
-    `ends` are the pose it begins at, the trim before it, and the trim after it (-1 for any). A trim
-    of the word that is none, or the turn in place of a free heading, is passed over.
+    A trim of the word that is none, or the turn in place of a free heading, is passed over.
     """
     # (pose, before, clock) is where, in which trim and when the word is: at first its begin. The
     # fifth trim is the one of the goal, which lasts no time: only what leads to it is tested.
-    pose, before, after = ends
+    pose, before, clock = joint.pose, joint.before, joint.clock
     for n in range(5):
-        trim, t = after, 0.0
+        trim, t = joint.after, 0.0
         if n < 3:
             trim, t = word[n], times[n]
         elif n == 3:
@@ -82,29 +189,25 @@ def free_candidate(
     scene: Scene,
     lib: LatticeArrays,
     words: IntArray,
-    ends: tuple[tuple[float, float, float, float], int, int],
+    joint: Joint,
     n: int,
-    limits: tuple[int, float, float],
-    clock: float,
     scratch: Scratch,
 ) -> int:
     """Cheapest of `n` candidates that is proven free; -1 if none of the first few is.
 
-    `ends` as in `connection_free`; `limits` are how many are tried, the cost that a candidate has
-    to undercut, and the time [s] it may last. A candidate that was tried costs inf from then on.
+    A candidate that was tried costs inf from then on.
     """
     # The least is sought anew each time: few are tried, so that sorting all would cost more.
-    tries, most_cost, most_time = limits
-    for _ in range(tries):
-        best, which = most_cost, -1
+    for _ in range(joint.tries):
+        best, which = joint.most_cost, -1
         for k in range(n):
-            if scratch.costs[k] < best and scratch.durations[k] <= most_time:
+            if scratch.costs[k] < best and scratch.durations[k] <= joint.most_time:
                 best, which = scratch.costs[k], k
         if which < 0:
             return -1
         word = words[scratch.rows[which]]
         climb, times = scratch.climbs[which], scratch.times[which]
-        if connection_free(scene, lib, ends, word, climb, times, clock):
+        if connection_free(scene, lib, joint, word, climb, times):
             return which
         scratch.costs[which] = math.inf
     return -1

@@ -79,7 +79,8 @@ def pop(keys: Array, items: IntArray, size: int) -> int:
 @bare_inner_kernel
 def centre_clearance(grid: DistanceGrid, field: Field, i: int, j: int) -> float:
     """Clearance of a point in the middle of a cell [m], negative inside a solid."""
-    f_i, f_j = i * grid.stride + grid.shift_x, j * grid.stride + grid.shift_y
+    at = grid.layout
+    f_i, f_j = i * at.stride + at.shift_x, j * at.stride + at.shift_y
     if 0 <= f_i < field.distance.shape[1] and 0 <= f_j < field.distance.shape[0]:
         return field.distance[f_j, f_i]
     return math.inf
@@ -90,7 +91,7 @@ def blocked_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
     """Whether no reference point can be anywhere in the cell: sound."""
     # `inflation` is the body's inscribed radius less half a diagonal of the cell. No point of the
     # cell is farther than that half from its middle, so its clearance is below the radius.
-    return centre_clearance(grid, field, i, j) < grid.inflation
+    return centre_clearance(grid, field, i, j) < grid.walls.inflation
 
 
 @bare_inner_kernel
@@ -107,38 +108,38 @@ def _queue(grid: DistanceGrid, key: int, item: int) -> None:
     # octile way to where the grid is aimed at, which they add to a rank, is no longer than a step
     # and the way from there. So those of the next `BUCKETS` units need no order but their number.
     # Only what is behind a thin wall is farther away than that; it waits in a binary heap.
-    state = grid.state
+    state, queue = grid.state, grid.queue
     if key - state[NOW] < BUCKETS:
-        bucket, place = key & (BUCKETS - 1), grid.items.shape[0] - 1 - state[WRITTEN]
-        grid.items[place], grid.links[place] = item, grid.heads[bucket]
-        grid.heads[bucket] = place + 1  # 0: none
+        bucket, place = key & (BUCKETS - 1), queue.items.shape[0] - 1 - state[WRITTEN]
+        queue.items[place], queue.links[place] = item, queue.heads[bucket]
+        queue.heads[bucket] = place + 1  # 0: none
         state[WRITTEN] += 1
         state[LISTED] += 1
     else:
-        push(grid.keys, grid.items, state[FAR], float(key), item)
+        push(queue.keys, queue.items, state[FAR], float(key), item)
         state[FAR] += 1
 
 
 @bare_inner_kernel
 def _next_cell(grid: DistanceGrid) -> int:
     """Take a cell of the least key out of the open list; -1 if that is empty."""
-    state, heads = grid.state, grid.heads
+    state, queue, heads = grid.state, grid.queue, grid.queue.heads
     now = state[NOW]
     if state[LISTED] > 0:
         while heads[now & (BUCKETS - 1)] == 0:
             now += 1
-    if state[FAR] > 0 and (state[LISTED] == 0 or grid.keys[0] <= now):
-        state[NOW] = int(grid.keys[0])
-        item = pop(grid.keys, grid.items, state[FAR])
+    if state[FAR] > 0 and (state[LISTED] == 0 or queue.keys[0] <= now):
+        state[NOW] = int(queue.keys[0])
+        item = pop(queue.keys, queue.items, state[FAR])
         state[FAR] -= 1
         return item
     if state[LISTED] == 0:
         return -1
     place = heads[now & (BUCKETS - 1)] - 1
-    heads[now & (BUCKETS - 1)] = grid.links[place]
+    heads[now & (BUCKETS - 1)] = queue.links[place]
     state[LISTED] -= 1
     state[NOW] = now
-    return grid.items[place]
+    return queue.items[place]
 
 
 @bare_inner_kernel
@@ -147,7 +148,7 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
 
     Cells in whose middle the vehicle cannot be count more: an estimate, not a bound. Where a wall
     may pass between the middles of two cells although neither is blocked (the body is small and
-    the wall thin), a path through costs `grid.detour` more in `rank`, by which paths are compared.
+    the wall thin), a path through costs `walls.detour` more in `rank`, by which paths are compared.
     `value` keeps the length alone: it is compared with costs, and is finite behind every gap that
     the cells cannot show. Both are whole numbers: the same whatever was asked for before.
 
@@ -159,20 +160,21 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     # far, final once the cell is settled. Neither holds anything before the mark says so: a large
     # grid of which little is used is not filled first. A cell may stand in the open list several
     # times.
-    i = math.floor((x - grid.origin_x) / grid.cell)
-    j = math.floor((y - grid.origin_y) / grid.cell)
-    if not (0 <= i < grid.columns and 0 <= j < grid.rows):
+    at, walls = grid.layout, grid.walls
+    i = math.floor((x - at.origin_x) / at.cell)
+    j = math.floor((y - at.origin_y) / at.cell)
+    if not (0 <= i < at.columns and 0 <= j < at.rows):
         return math.inf
-    wanted = j * grid.columns + i
+    wanted = j * at.columns + i
     if grid.mark[wanted] == BLOCKED:
         return math.inf
     aside = centre_clearance(grid, field, i, j)
-    if aside < grid.inflation:
+    if aside < walls.inflation:
         return math.inf
     # Whatever leads into a cell that a wall may cut makes the detour. So the path known is the best
     # one as soon as all that is open is no nearer than it is without: else all the rest of the
     # plane would come first.
-    due = _octile(i - grid.aim_i, j - grid.aim_j) - (grid.detour if aside < grid.cut else 0)
+    due = _octile(i - at.aim_i, j - at.aim_j) - (walls.detour if aside < walls.cut else 0)
     while grid.mark[wanted] != SETTLED:
         if grid.mark[wanted] == REACHED and grid.rank[wanted] + due <= grid.state[NOW]:
             break
@@ -183,33 +185,33 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
             continue
         grid.mark[here] = SETTLED
         grid.state[N_SETTLED] += 1
-        h_j, h_i = here // grid.columns, here % grid.columns
-        if h_i == 0 or h_j == 0 or h_i == grid.columns - 1 or h_j == grid.rows - 1:
+        h_j, h_i = here // at.columns, here % at.columns
+        if h_i == 0 or h_j == 0 or h_i == at.columns - 1 or h_j == at.rows - 1:
             grid.state[AT_RIM] = 1  # a path may lead around outside, which is not known
         value, rank = grid.value[here], grid.rank[here]
         for b in range(-1, 2):
             for a in range(-1, 2):
                 n_i, n_j = h_i + a, h_j + b
-                if not (0 <= n_i < grid.columns and 0 <= n_j < grid.rows):
+                if not (0 <= n_i < at.columns and 0 <= n_j < at.rows):
                     continue
-                there = n_j * grid.columns + n_i
+                there = n_j * at.columns + n_i
                 mark = grid.mark[there]
                 if mark in (BLOCKED, SETTLED):
                     continue
                 # The field is asked once for a blocked cell: then its mark says it.
                 room = centre_clearance(grid, field, n_i, n_j)
-                if room < grid.inflation:
+                if room < walls.inflation:
                     grid.mark[there] = BLOCKED
                     continue
                 step = DIAGONAL if a != 0 and b != 0 else STRAIGHT
-                if room < grid.wanted:
+                if room < walls.wanted:
                     step *= NARROW
-                ranked = rank + step + (grid.detour if room < grid.cut else 0)
+                ranked = rank + step + (walls.detour if room < walls.cut else 0)
                 if mark != REACHED or ranked < grid.rank[there]:
                     grid.mark[there] = REACHED
                     grid.rank[there], grid.value[there] = ranked, value + step
-                    _queue(grid, ranked + _octile(n_i - grid.aim_i, n_j - grid.aim_j), there)
-    return grid.value[wanted] * (grid.cell / STRAIGHT)
+                    _queue(grid, ranked + _octile(n_i - at.aim_i, n_j - at.aim_j), there)
+    return grid.value[wanted] * (at.cell / STRAIGHT)
 
 
 @bare_kernel
@@ -221,17 +223,18 @@ def seed(grid: DistanceGrid, points: Array) -> None:
 @bare_inner_kernel
 def sow(grid: DistanceGrid, points: Array) -> None:
     """The same within a kernel; `points` (n, 2 or more)."""
+    at = grid.layout
     for k in range(points.shape[0]):
-        i = math.floor((points[k, 0] - grid.origin_x) / grid.cell)
-        j = math.floor((points[k, 1] - grid.origin_y) / grid.cell)
-        if 0 <= i < grid.columns and 0 <= j < grid.rows:
-            here = j * grid.columns + i
+        i = math.floor((points[k, 0] - at.origin_x) / at.cell)
+        j = math.floor((points[k, 1] - at.origin_y) / at.cell)
+        if 0 <= i < at.columns and 0 <= j < at.rows:
+            here = j * at.columns + i
             if grid.mark[here] != REACHED:  # no seed has its cell yet
                 grid.mark[here] = REACHED
                 grid.rank[here], grid.value[here] = 0, 0
-                key = _octile(i - grid.aim_i, j - grid.aim_j)
+                key = _octile(i - at.aim_i, j - at.aim_j)
                 # Which of them is the nearest, and so the first, is not known yet.
-                push(grid.keys, grid.items, grid.state[FAR], float(key), here)
+                push(grid.queue.keys, grid.queue.items, grid.state[FAR], float(key), here)
                 grid.state[FAR] += 1
 
 
@@ -242,3 +245,82 @@ def distances(grid: DistanceGrid, field: Field, points: Array) -> Array:
     for k in range(points.shape[0]):
         out[k] = distance_at(grid, field, points[k, 0], points[k, 1])
     return out
+
+
+@bare_inner_kernel
+def open_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
+    """Whether a pose may be in a cell of the grid; beyond its rim it may."""
+    if not (0 <= i < grid.layout.columns and 0 <= j < grid.layout.rows):
+        return True
+    return not blocked_cell(grid, field, i, j)
+
+
+@kernel
+def corner_path(grid: DistanceGrid, field: Field, goals: Array, x: float, y: float) -> float:
+    """Length [m] of the shortest octile path between the corners nearest to (x, y) and a goal.
+
+    A* over corners, from the goals to the end: along an edge that an open cell touches, and across
+    open cells. Where the rim of the grid may be left, a path along it is as good as any outside.
+    """
+    at = grid.layout
+    columns, rows = at.columns + 1, at.rows + 1  # of corners
+    value = np.full(columns * rows, np.inf)  # [m] to the nearest goal, as far as known
+    settled = np.zeros(columns * rows, dtype=np.uint8)  # 1 once that is final
+    # The open list, a binary heap. A corner is expanded once and has eight neighbours, and each may
+    # be a goal: it is never pushed more than nine times.
+    keys = np.empty(9 * columns * rows)
+    items = np.empty(9 * columns * rows, dtype=np.int64)
+    end_i = min(max(round((x - at.origin_x) / at.cell), 0), columns - 1)
+    end_j = min(max(round((y - at.origin_y) / at.cell), 0), rows - 1)
+    size = 0
+    for g in range(goals.shape[0]):
+        i = min(max(round((goals[g, 0] - at.origin_x) / at.cell), 0), columns - 1)
+        j = min(max(round((goals[g, 1] - at.origin_y) / at.cell), 0), rows - 1)
+        here = j * columns + i
+        if value[here] > 0.0:
+            value[here] = 0.0
+            # No octile path is shorter than the straight line, and its length obeys the triangle
+            # inequality: so the first time that a corner is popped, its value is final.
+            key = at.cell * math.hypot(i - end_i, j - end_j)
+            push(keys, items, size, key, here)
+            size += 1
+    end = end_j * columns + end_i
+    while size > 0:
+        here = pop(keys, items, size)
+        size -= 1
+        if settled[here]:
+            continue
+        settled[here] = 1
+        if here == end:
+            return value[here]
+        j, i = here // columns, here % columns
+        for b in range(-1, 2):
+            for a in range(-1, 2):
+                n_i, n_j = i + a, j + b
+                if not (0 <= n_i < columns and 0 <= n_j < rows) or (a == 0 and b == 0):
+                    continue
+                there = n_j * columns + n_i
+                if settled[there]:
+                    continue
+                # A step across a cell needs that cell open; one along an edge needs one of the two
+                # cells beside it.
+                low_i, low_j = min(i, n_i), min(j, n_j)
+                if a != 0 and b != 0:
+                    passable = open_cell(grid, field, low_i, low_j)
+                elif b == 0:
+                    passable = open_cell(grid, field, low_i, j - 1) or open_cell(
+                        grid, field, low_i, j
+                    )
+                else:
+                    passable = open_cell(grid, field, i - 1, low_j) or open_cell(
+                        grid, field, i, low_j
+                    )
+                if not passable:
+                    continue
+                step = at.cell * (1.4142135623730951 if a != 0 and b != 0 else 1.0)
+                if value[here] + step < value[there]:
+                    value[there] = value[here] + step
+                    key = value[there] + at.cell * math.hypot(n_i - end_i, n_j - end_j)
+                    push(keys, items, size, key, there)
+                    size += 1
+    return math.inf

@@ -30,14 +30,13 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_kernel, inlined_kernel
-from maneuver_automaton.search._kernels_cells import first_slot
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.search.arrays import SearchArrays, Task
-from maneuver_automaton.search.lattice_arrays import LatticeArrays
+from maneuver_automaton.search.arrays import CellSizes, LatticeArrays, SearchArrays, Task
 from maneuver_automaton.words._kernels_library import class_of
 
 FULL_TURN = 2.0 * math.pi
+EMPTY = -1  # no key, in a set of keys
 MOST_SIDES = 1 << 15  # cells along a side that have numbers of their own
 MOST_KEYS = 1 << 62  # numbers of cells: they are signed and have 64 bits
 COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
@@ -78,25 +77,26 @@ def cells_along(cell: float, far: float, others: int) -> int:
 
 @inlined_kernel
 def cell_key(
-    task: Task, x: float, y: float, heading: float, z: float, layer: int, time: float, fine: int
+    cells: CellSizes, pose: tuple[float, float, float, float], layer: int, time: float, fine: int
 ) -> int:
-    """Number of the lattice cell a pose is in, seen from the task's own frame.
+    """Number of the lattice cell a pose is in, seen from the frame of the cells.
 
-    `task.radix` is the number of cells along a side of the window, a power of two, of headings,
+    `cells.radix` is the number of cells along a side of the window, a power of two, of headings,
     levels of altitude and ticks of the clock; the last two are 1 where they make no difference.
     """
     # The grid is fixed to the first goal, so a moved problem has the moved cells.
-    d_x, d_y = x - task.frame_x, y - task.frame_y
-    c, s = task.frame_cos, task.frame_sin
-    cell = task.fine_cell if fine else task.cell
-    n_headings = task.fine_headings if fine else task.headings
-    sides, turns, levels, ticks = task.radix
+    x, y, heading, z = pose
+    to_x, to_y, to_heading, c, s = cells.frame
+    d_x, d_y = x - to_x, y - to_y
+    cell = cells.fine_cell if fine else cells.cell
+    n_headings = cells.fine_headings if fine else cells.headings
+    sides, turns, levels, ticks = cells.radix
     i = math.floor((c * d_x + s * d_y) / cell + 0.5) & (sides - 1)
     j = math.floor((c * d_y - s * d_x) / cell + 0.5) & (sides - 1)
-    turn = (heading - task.frame_heading) / FULL_TURN
+    turn = (heading - to_heading) / FULL_TURN
     k = math.floor((turn - math.floor(turn)) * n_headings + 0.5) % n_headings
-    level = math.floor(z / task.rise + 0.5) & (levels - 1) if levels > 1 else 0
-    tick = math.floor(time / task.tick) & (ticks - 1) if task.tick > 0.0 else 0
+    level = math.floor(z / cells.rise + 0.5) & (levels - 1) if levels > 1 else 0
+    tick = math.floor(time / cells.tick) & (ticks - 1) if cells.tick > 0.0 else 0
     # Digits of one number, the least last. Cells `sides` apart along an axis share a number, as do
     # times `ticks` apart: that drops a node, and never a proof.
     above = ((layer * 2 + fine) * ticks + tick) * levels + level
@@ -104,19 +104,31 @@ def cell_key(
 
 
 @inlined_kernel
-def layer_of(task: Task, lib: LatticeArrays, trim: int, gear: int, n_trims: int) -> int:
+def layer_of(cells: CellSizes, lib: LatticeArrays, trim: int, gear: int, n_trims: int) -> int:
     """Number of a node's layer: its class, and the gear, trim and count that prices or limits need.
 
     Nodes of one pose in different layers do not replace each other.
     """
     layer = class_of(lib.library, trim)
-    if task.by_gear:
+    if cells.by_gear:
         layer = layer * 3 + gear + 1
-    if task.by_trim:
+    if cells.by_trim:
         layer = layer * (lib.library.n_trims + 1) + trim + 1
-    if task.by_count:
+    if cells.by_count:
         layer = layer * 16 + min(n_trims, 15)
     return layer
+
+
+@inlined_kernel
+def first_slot(key: int, mask: int) -> int:
+    """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin.
+
+    Source: Knuth (1998), *The art of computer programming 3*, Sec. 6.4, Fibonacci hashing.
+    """
+    # The high digits of a key (class, time, heading) are folded onto the low ones (place): cells of
+    # one place could share a row otherwise. 31 bits times 32 bits stay below the sign.
+    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
+    return ((mixed * 0x9E3779B1) >> 15) & mask
 
 
 @inlined_kernel
@@ -142,19 +154,18 @@ def node_in(table: IntArray, generation: int, slot: int) -> int:
 
 @inlined_kernel
 def add_node(
-    search: SearchArrays,
-    weight: float,
+    arrays: SearchArrays,
     slot: int,
     key: int,
     row: tuple[float, ...],
     link: tuple[int, ...],
-    estimate: float,
+    order: float,
 ) -> None:
-    """Append a node, make it the one of its cell, and push it.
+    """Append a node, make it the one of its cell, and push it, the lesser the `order` the sooner.
 
     `row` are its columns of `nodes`, `link` those of `links` but the last.
     """
-    nodes, links, state = search.nodes, search.links, search.state
+    nodes, links, state = arrays.nodes, arrays.links, arrays.state
     node = state[N_NODES]
     for k in range(9):
         nodes[node, k] = row[k]
@@ -163,21 +174,21 @@ def add_node(
     links[node, COUNT], links[node, ROOT], links[node, EDGE] = count, root, edge
     links[node, CLOSED] = 0
     state[N_NODES] = node + 1
-    search.table[slot, 0] = key
-    search.table[slot, 1] = (state[GENERATION] << 31) | node
-    push(search.heap_key, search.heap_node, state[HEAP], row[COST] + weight * estimate, node)
+    arrays.table[slot, 0] = key
+    arrays.table[slot, 1] = (state[GENERATION] << 31) | node
+    push(arrays.heap_key, arrays.heap_node, state[HEAP], order, node)
     state[HEAP] += 1
 
 
 @inlined_kernel
-def open_node(search: SearchArrays, task: Task, upper_bound: float) -> int:
+def open_node(arrays: SearchArrays, task: Task, upper_bound: float) -> int:
     """The most promising node that is open, taken from the heap; -1 if there is none."""
-    links, state = search.links, search.state
+    links, state = arrays.links, arrays.state
     # Only where the task says so does a key end the search: with a weight above 1 it is no bound.
-    most = min(upper_bound, search.found[0]) if task.ends_early else math.inf
+    most = min(upper_bound, arrays.found[0]) if task.ends_early else math.inf
     node = -1
-    while node < 0 and state[HEAP] > 0 and not search.heap_key[0] >= most:
-        node = pop(search.heap_key, search.heap_node, state[HEAP])
+    while node < 0 and state[HEAP] > 0 and not arrays.heap_key[0] >= most:
+        node = pop(arrays.heap_key, arrays.heap_node, state[HEAP])
         state[HEAP] -= 1
         if links[node, CLOSED]:
             node = -1
@@ -191,3 +202,16 @@ def rehash(table: IntArray, generation: int, wide: IntArray) -> None:
         if node_in(table, generation, k) >= 0:
             slot = slot_of(wide, generation, table[k, 0])
             wide[slot, 0], wide[slot, 1] = table[k, 0], table[k, 1]
+
+
+@bare_inner_kernel
+def enter(cells: IntArray, key: int) -> bool:
+    """Add a key to a set of keys (n,), never full; whether it is new."""
+    mask = cells.shape[0] - 1
+    slot = first_slot(key, mask)
+    while cells[slot] != EMPTY:
+        if cells[slot] == key:
+            return False
+        slot = (slot + 1) & mask
+    cells[slot] = key
+    return True

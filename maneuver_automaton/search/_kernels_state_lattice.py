@@ -36,10 +36,18 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
+from maneuver_automaton.search._kernels_connection import edge_inside, edge_proven
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.search._kernels_maneuver import edge_inside, edge_proven
 from maneuver_automaton.search._kernels_nodes import node_in, slot_of
-from maneuver_automaton.search.arrays import Aims, FreeCosts, GraphArrays, StateLattice, Tested
+from maneuver_automaton.search.arrays import (
+    Aims,
+    CostQueue,
+    FreeCosts,
+    GraphArrays,
+    GraphQuery,
+    StateLattice,
+    Tested,
+)
 
 ROW_BITS = 32  # of the number of a place; its column is above them
 ITEM_BITS = 32  # of an entry of the open list: its edge; above them its node
@@ -123,7 +131,7 @@ def clearance_at(tested: Tested, pose: tuple[float, float, float, float]) -> flo
     for n in range(layers.low.shape[0] - scene.zone_trims.shape[0]):
         if layers.low[n] <= z <= layers.high[n]:
             world = layer_world(layers, n)
-            least = min(least, static_clearance(world, lib.body, x, y, c, s) - scene.keep)
+            least = min(least, static_clearance(world, lib.parts.body, x, y, c, s) - scene.keep)
     return least
 
 
@@ -196,22 +204,15 @@ def end_of(
 
 
 @bare_kernel
-def expand_lattice(
-    search: GraphArrays,
-    lattice: StateLattice,
-    aims: Aims,
-    free: FreeCosts,
-    coarse: Tested,
-    fine: Tested,
-    weight: float,
-    n: int,
-    upper_bound: float,
-) -> int:
+def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
     """Take up to `n` motions in the order of their cost and the weighted bound of the cost to go.
 
     Returns whether it may go on: 1, or 0 once an aim is found or nothing is left that leads to a
     plan cheaper than `upper_bound`.
     """
+    search, lattice = query.arrays, query.lattice
+    aims, free = query.aims, query.free
+    coarse, fine, weight = query.coarse, query.fine, query.weight
     links, state, cell = search.links, search.state, lattice.cell
     if state[BEGUN] == 0:
         state[BEGUN] = 1
@@ -251,7 +252,7 @@ def expand_lattice(
             # No point of the body moves farther than `edge_reach`: where it has moved by t of that,
             # its clearance is at least the first less t, and the last less the rest.
             edge, first = lattice.edge[e], search.clearance[parent]
-            reach = coarse.lib.edge_reach[edge]
+            reach = coarse.lib.edges.reach[edge]
             near = max(0.5 * (first + clearance - reach), max(first, clearance) - reach)
             begin = there
             if lattice.sign > 0:
@@ -266,7 +267,7 @@ def expand_lattice(
                     search.found[0] = min(search.found[0], cost + ahead)
                 if known == UNKNOWN:
                     search.node[place, at] = REFUSED
-                    push_others(search, lattice, weight, item, column, row, at, ahead)
+                    push_others(search, lattice, item, (column, row, at), weight * ahead)
                 continue
         node = state[N_NODES]
         state[N_NODES] += 1
@@ -301,56 +302,52 @@ def expand_lattice(
 def push_others(
     search: GraphArrays,
     lattice: StateLattice,
-    weight: float,
     item: int,
-    column: int,
-    row: int,
-    at: int,
+    node: tuple[int, int, int],
     ahead: float,
 ) -> None:
-    """List all motions from nodes that were expanded to one, but for one of them."""
+    """List all motions from nodes that were expanded to `node`, but for one of them.
+
+    A node is its column, row and state; `ahead` is the weighted bound of the cost to go from it.
+    """
+    column, row, at = node
     # Some of them are listed already. To test these once more costs little.
     for k in range(lattice.into_first[at], lattice.into_first[at + 1]):
         e = lattice.into_edge[k]
         place, _, _ = place_in(search.table, column - lattice.step[e, 0], row - lattice.step[e, 1])
         if place < 0:
             continue
-        node = search.node[place, lattice.source[e]]
-        other = (node << ITEM_BITS) | e
-        if node >= 0 and other != item:
-            key = search.cost[node] + lattice.cost[e] + weight * ahead
+        before = search.node[place, lattice.source[e]]
+        other = (before << ITEM_BITS) | e
+        if before >= 0 and other != item:
+            key = search.cost[before] + lattice.cost[e] + ahead
             push(search.heap_key, search.heap_item, search.state[HEAP], key, other)
             search.state[HEAP] += 1
 
 
 @bare_kernel
-def rank_anew(
-    search: GraphArrays, lattice: StateLattice, aims: Aims, free: FreeCosts, weight: float
-) -> None:
+def rank_anew(query: GraphQuery) -> None:
     """Order the open list by another bound of the cost to go."""
+    search, lattice = query.arrays, query.lattice
     # What was expanded has its least cost by the former bound, which was consistent too.
     for k in range(search.state[HEAP]):
         item = search.heap_item[k]
         _, _, column, row, at, cost = end_of(search, lattice, item)
-        key = cost + weight * least_to_go(aims, free, lattice.cell, column, row, at)
+        ahead = least_to_go(query.aims, query.free, lattice.cell, column, row, at)
+        key = cost + query.weight * ahead
         push(search.heap_key, search.heap_item, k, key, item)  # the first k are in order
 
 
 @bare_kernel
 def grow_free_costs(
-    lattice: StateLattice,
-    free: FreeCosts,
-    heap_key: Array,
-    heap_item: IntArray,
-    state: IntArray,
-    most: float,
-    n: int,
+    lattice: StateLattice, free: FreeCosts, queue: CostQueue, most: float, n: int
 ) -> None:
     """Settle up to `n` nodes whose least cost to the sources without obstacles is at most `most`.
 
-    Dijkstra against the edges. Entries of the heap are places in `free.value`, `state` (2,) is how
-    many there are, and how many nodes are settled. The caller widens a heap that is full.
+    Dijkstra against the edges. Entries of the queue are places in `free.value`. The caller widens
+    one that is full.
     """
+    heap_key, heap_item, state = queue.keys, queue.items, queue.state
     columns, rows, states = free.value.shape
     for _ in range(n):
         if state[0] == 0 or heap_key[0] > most or state[0] + lattice.most_links > len(heap_key):

@@ -12,50 +12,44 @@ import math
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coast_proven, may_stay
 from maneuver_automaton.search._kernels_distance import pop, push
-from maneuver_automaton.search.arrays import PathArrays
-from maneuver_automaton.search.lattice_arrays import LatticeArrays
-from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search.arrays import PathArrays, PathSearch
 
 HALVINGS = 10  # of a tick, for the time at which the way is free again
 PATIENT = 16  # departures that are blocked before ticks become longer
 MOST_ASKED = 20_000  # departures tried in all
+USED, QUEUED = range(2)  # places in `path.state`
 JOINT, PARENT = range(2)  # columns of `path.links`
 ARRIVAL, UNTIL, DEPARTURE = range(3)  # columns of `path.times`; the last is that of the parent
 
 
 @bare_kernel
-def earliest_arrival(
-    lib: LatticeArrays,
-    scene: Scene,
-    clocks: tuple[float, float, float, float],
-    path: PathArrays,
-    rest: int,
-    tick: float,
-) -> int:
+def earliest_arrival(search: PathSearch) -> int:
     """The state that arrives first where the path ends; -1 if none does.
 
     Fills `path.links` (s, 2), the joint and parent of each state, and `path.times` (s, 3): when it
     is reached, until when the vehicle may stand there, and when it left its parent's joint [s since
-    the start]. `rest` is the trim that waits, -1 if none. `clocks` are the time of the world at the
-    start, the longest duration, the time of the world until which the goal is kept, and the time
-    since the start after which nothing changes any more.
+    the start].
     """
-    clock, most_time, stay_until, quiet = clocks
+    path, lib = search.path, search.library
+    scene, limits = search.scene, search.limits
+    clock, tick, quiet = limits.clock, search.tick, search.quiet
     n, asked = path.trims.shape[0], 0
-    used, queued, _ = _reach(lib, scene, path, rest, clock, quiet, 0, 0.0, -1, 0.0, 0, 0)
-    while queued > 0:
-        state = pop(path.keys, path.items, queued)
-        queued -= 1
+    path.state[USED] = path.state[QUEUED] = 0
+    _reach(search, 0, 0.0, -1, 0.0)
+    while path.state[QUEUED] > 0:
+        state = pop(path.keys, path.items, path.state[QUEUED])
+        path.state[QUEUED] -= 1
         joint, arrival = path.links[state, JOINT], path.times[state, ARRIVAL]
         pose = _pose(path, joint)
         if joint == n:
-            if may_stay(scene, lib, path.trims[n - 1], pose, clock + arrival, stay_until):
+            last = path.trims[n - 1]
+            if may_stay(scene, lib, last, pose, clock + arrival, limits.stay_until):
                 return state
             continue
         trim, t = path.trims[joint], path.durations[joint]
         # Departures are tried a tick apart; where the way is blocked for long, ever further apart.
-        leave, last, step, blocked = arrival, path.times[state, UNTIL], 0.0, 0
-        while leave <= last and leave + t <= most_time and asked < MOST_ASKED:
+        leave, until, step, blocked = arrival, path.times[state, UNTIL], 0.0, 0
+        while leave <= until and leave + t <= limits.most_time and asked < MOST_ASKED:
             asked += 1
             if not coast_free(scene, lib, trim, pose, t, clock + leave):
                 if leave > quiet:
@@ -72,58 +66,45 @@ def earliest_arrival(
                     else:
                         low = middle
                 leave = high
-            there = leave + t
-            used, queued, until = _reach(
-                lib, scene, path, rest, clock, quiet, joint + 1, there, state, leave, used, queued
-            )
-            if used < 0:
-                return -1  # no room for more
+            stands = _reach(search, joint + 1, leave + t, state, leave)
+            if stands < 0.0:
+                return -1
             if leave > quiet:
                 break
             # What arrives while it may stand there anyway is of no use.
-            leave, blocked = max(leave, until - t) + tick, 0
+            leave, blocked = max(leave, stands - t) + tick, 0
     return -1
 
 
 @bare_inner_kernel
-def _reach(
-    lib: LatticeArrays,
-    scene: Scene,
-    path: PathArrays,
-    rest: int,
-    clock: float,
-    quiet: float,
-    joint: int,
-    arrival: float,
-    parent: int,
-    left: float,
-    used: int,
-    queued: int,
-) -> tuple[int, int, float]:
+def _reach(search: PathSearch, joint: int, arrival: float, parent: int, left: float) -> float:
     """Note that a joint is reached, unless it was before, in the same stretch of time.
 
-    Returns the numbers of states and of those in the open list, and until when the vehicle may
-    stand there.
+    Returns until when the vehicle may stand there; -1 where there is no room for more states.
     """
+    path, quiet = search.path, search.quiet
     latest = path.latest[joint]
     while latest >= 0:
         if path.times[latest, ARRIVAL] <= arrival <= path.times[latest, UNTIL]:
-            return used, queued, path.times[latest, UNTIL]
+            return path.times[latest, UNTIL]
         latest = path.before[latest]
+    used = path.state[USED]
     if used == path.links.shape[0]:
-        return -1, queued, arrival
-    pose = _pose(path, joint)
+        return -1.0
     until = arrival
-    if rest >= 0:
-        lasting = max(quiet - arrival, 0.0) + 1.0
-        stands, _ = coast_proven(scene, lib, rest, pose, lasting, clock + arrival)
+    if search.rest >= 0:
+        lasting, clock = max(quiet - arrival, 0.0) + 1.0, search.limits.clock + arrival
+        pose = _pose(path, joint)
+        stands, _ = coast_proven(search.scene, search.library, search.rest, pose, lasting, clock)
         until = arrival + stands if stands < lasting else math.inf
     path.links[used, JOINT], path.links[used, PARENT] = joint, parent
     path.times[used, ARRIVAL], path.times[used, UNTIL] = arrival, until
     path.times[used, DEPARTURE] = left
     path.before[used], path.latest[joint] = path.latest[joint], used
-    push(path.keys, path.items, queued, arrival, used)
-    return used + 1, queued + 1, until
+    push(path.keys, path.items, path.state[QUEUED], arrival, used)
+    path.state[USED] += 1
+    path.state[QUEUED] += 1
+    return until
 
 
 @inlined_kernel

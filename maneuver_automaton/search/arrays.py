@@ -1,4 +1,7 @@
-"""What kernels of the searches take: grids and graphs, open lists, and what is asked."""
+"""What kernels of the searches take: the library, the scene, and what is asked and found.
+
+A record holds what changes together. `LatticeSearch` is all that a search of the lattice needs.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +11,121 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.search.lattice_arrays import LatticeArrays
-from maneuver_automaton.search.scene import Scene
-from maneuver_automaton.words.library import Scratch
+from maneuver_automaton.collision.arrays import SweptAreas
+from maneuver_automaton.collision.body import Body
+from maneuver_automaton.collision.layers import LayerArrays
+from maneuver_automaton.words.library import LibraryArrays, Scratch
+
+# The library of m trims in C classes, with E maneuvers between these, of a vehicle of P parts.
 
 
-class DistanceGrid(NamedTuple):
-    """The grid as the kernels see it; its cells coincide with those of the world's field."""
+class BodyArrays(NamedTuple):
+    """Bodies of all parts, one after the other, as in `Body`."""
 
-    value: IntArray  # (cells,) [units] length of the path that ranks first, where one is known
-    rank: IntArray  # (cells,) [units] that length with a detour for every cell a wall may cut
-    mark: NDArray[np.uint8]  # (cells,) 0 nothing is known, 1 blocked, 2 settled, 3 reached
-    keys: Array  # (8 cells + 8,) of the part of the open list that is far away, a binary heap
-    items: IntArray  # its cells; from the other end on those of the rest of the open list
+    edges: Array
+    first: IntArray
+    radius: Array
+    discs: Array
+    piece_of: IntArray  # (P + 1,) first piece of each part
+    disc_of: IntArray  # (P + 1,)
+    sizes: Array  # (P, 5) middle x, middle y, reach, inscribed, half width
+
+
+class PartArrays(NamedTuple):
+    """Rigid parts of a vehicle, and how its trims move them."""
+
+    n: int
+    body: Body  # of the first part
+    bodies: BodyArrays
+    offsets: Array  # (P, m, 3) of the parts in the trims
+    twists: Array  # (P, m, 3)
+    speeds: Array  # (P, m) [m/s] of the fastest point
+    fastest: Array  # (m,) [m/s] over the parts
+
+
+class CoastArrays(NamedTuple):
+    """Coasts of edges: how long they last, where they lead, and what the first part covers."""
+
+    durations: Array  # (m, 2) [s], 0 for none
+    moves: Array  # (m, 2, 4) poses they lead to, forwards or backwards
+    swept: SweptAreas
+
+
+class EdgeArrays(NamedTuple):
+    """Maneuvers between classes of trims, those out of one class next to each other."""
+
+    first: IntArray  # (C + 1,) where those out of each class begin
+    source: IntArray  # (E,) trims
+    target: IntArray  # (E,)
+    maneuver: IntArray  # (E,) index in the automaton
+    displacement: Array  # (E, 4)
+    cost: Array  # (E,)
+    time: Array  # (E,) [s]
+    reach: Array  # (E,) [m] that any point of the vehicle moves
+    low: Array  # (E,) [m] altitudes above where it begins
+    high: Array  # (E,)
+    via: IntArray  # (C, C) first edge of a transition between classes, -1 for none
+
+
+class PieceArrays(NamedTuple):
+    """Motions of constant twist of every part, then of the pose alone, along every edge."""
+
+    first: IntArray  # ((P + 1) E + 1,) of each part and edge; the last part is the pose
+    pose: Array  # (N, 3)
+    twist: Array  # (N, 3)
+    time: Array  # (N,) [s]
+    error: Array  # (N,) [m]
+    speed: Array  # (N,) [m/s]
+    low: Array  # (N,) [m] altitudes above where the edge begins
+    high: Array  # (N,)
+
+
+class LatticeArrays(NamedTuple):
+    """Trims and maneuvers as the kernels see them, whatever the vehicle.
+
+    One that changes between all its trims at will has one class and no edges.
+    """
+
+    library: LibraryArrays  # numbered as `Library.trims` lists them
+    parts: PartArrays
+    coasts: CoastArrays
+    edges: EdgeArrays
+    pieces: PieceArrays
+    first_trim: IntArray  # (C + 1,) where the trims of each class begin ...
+    trims_of: IntArray  # (m,) ... in this list
+    most_children: int
+
+
+# What motions are tested against, and what leads a search.
+
+
+class Scene(NamedTuple):
+    """Where a motion is free."""
+
+    layers: LayerArrays  # a planar world for every range of altitudes, then one for every zone
+    keep: float  # [m] distance kept from obstacles ...
+    margin: float  # [m] ... and the clearance beyond it that a proof needs
+    far: float  # [m] clearance where no obstacle is near
+    window: Array  # (9,) as in `_kernels_coast.inside_window`
+    edge_window: Array  # (9,) narrower by the deviation of the courses of maneuvers
+    lowest: float  # [m] altitudes within the bounds
+    highest: float
+    zone_trims: NDArray[np.bool_]  # (Z, m) trims that a zone admits
+    zone_pieces: NDArray[np.bool_]  # (Z, N) pieces of maneuvers that a zone admits
+
+
+class CellQueue(NamedTuple):
+    """The open list of a grid: near cells in buckets, those that are far away in a binary heap."""
+
+    keys: Array  # (8 cells + 8,) of the heap
+    items: IntArray  # its cells; from the other end on those in the buckets
     links: IntArray  # the places before them in their bucket, plus 1; 0: none
     heads: IntArray  # (BUCKETS,) the last place of each bucket, plus 1
-    state: IntArray  # (6,) as numbered by the kernels
+
+
+class GridLayout(NamedTuple):
+    """Where the cells of a grid are; they coincide with those of the world's field."""
+
     origin_x: float
     origin_y: float
     cell: float
@@ -32,12 +134,41 @@ class DistanceGrid(NamedTuple):
     stride: int  # field cells a cell
     shift_x: int  # field cell of cell (0, 0)
     shift_y: int
+    aim_i: int  # cell towards which it grows first
+    aim_j: int
+
+
+class GridWalls(NamedTuple):
+    """Which cells of a grid are closed, dear, or only to be reached by a detour."""
+
     inflation: float  # [m] clearance of a cell's centre below which the pose cannot be in it
     wanted: float  # [m] clearance of a cell's centre below which the vehicle cannot be there
     cut: float  # [m] clearance of a cell's centre below which a wall may cut the cell; -inf: none
     detour: int  # [units] how much longer a path is preferred to one through such a cell
-    aim_i: int  # cell towards which it grows first
-    aim_j: int
+
+
+class DistanceGrid(NamedTuple):
+    """Distances in the plane that know the obstacles, as far as they are grown."""
+
+    value: IntArray  # (cells,) [units] length of the path that ranks first, where one is known
+    rank: IntArray  # (cells,) [units] that length with a detour for every cell a wall may cut
+    mark: NDArray[np.uint8]  # (cells,) 0 nothing is known, 1 blocked, 2 settled, 3 reached
+    state: IntArray  # (6,) as numbered by the kernels
+    queue: CellQueue
+    layout: GridLayout
+    walls: GridWalls
+
+
+class CostTable(NamedTuple):
+    """Cost to go around a goal; a table of no cells where there is none."""
+
+    value: NDArray[np.float32]  # (headings, 2 half + 1, 2 half + 1), inf where not known
+    free: NDArray[np.float32]  # the same to a goal whose heading is free
+    cell: float  # [m]
+    half: int
+
+
+# One search of the lattice.
 
 
 class SearchArrays(NamedTuple):
@@ -53,21 +184,18 @@ class SearchArrays(NamedTuple):
     scratch: Scratch
 
 
-class Task(NamedTuple):
-    """One search from one end, as the kernels see it."""
+class EndArrays(NamedTuple):
+    """Poses at one end of a search: where it begins, or where it leads."""
 
-    sign: float  # 1: along time, -1: against it
-    roots: Array  # (R, 4)
-    root_trims: IntArray  # (R,) -1 where any will do
-    aims: Array  # (A, 4)
-    aim_trims: IntArray  # (A,)
-    aim_free: NDArray[np.bool_]  # (A,) whether any heading will do
-    lag: Array  # (m + 1,) least surplus of maneuvers from a trim to an aim's; the last of no trim
-    frame_x: float
-    frame_y: float
-    frame_heading: float
-    frame_cos: float
-    frame_sin: float
+    poses: Array  # (n, 4)
+    trims: IntArray  # (n,) -1 where any will do
+    free: NDArray[np.bool_]  # (n,) whether any heading will do
+
+
+class CellSizes(NamedTuple):
+    """How poses are told apart: the cells of a lattice, seen from a frame."""
+
+    frame: tuple[float, float, float, float, float]  # x, y, heading, its cosine and sine
     cell: float  # [m]
     headings: int
     fine_cell: float  # of truncated edges
@@ -75,33 +203,99 @@ class Task(NamedTuple):
     rise: float  # [m] of altitude that makes another cell
     tick: float  # [s] of the clock that makes another cell, 0 where it makes none
     radix: tuple[int, int, int, int]  # cells along a side, headings, levels, ticks
-    weight: float  # of the estimate in the open list
-    per_metre: float  # least cost per metre
-    per_climb: float  # least cost per metre of altitude
-    per_interval: float  # cost to go for each expansion between two analytic expansions
-    least_interval: float  # expansions between two of them, at least ...
-    most_interval: float  # ... and at most
-    connection_factor: float  # a connection may cost so many times the estimate ...
-    connection_slack: float  # ... and so much more
-    tries: int  # candidates of one connection that are proven, at most
-    stop_at_first: bool  # connection
-    ends_early: bool  # when the most promising node is not below the upper bound
-    truncated: bool  # whether the part of an edge before a contact is kept
-    back_off: float  # [m]
-    shortest_truncated: float  # [m]
-    clock: float  # [s] time of the world at the start
-    most_time: float  # [s]
-    stay_until: float  # [s] time of the world until which the goal is kept
-    most_trims: int  # 0: no limit
-    least_coast: float  # [s]
-    checks_words: bool  # whether connections have limits of single words to keep
     by_gear: bool  # whether cells know the gear, ...
     by_trim: bool  # the trim, ...
     by_count: bool  # and the number of trims
 
 
-class Desk(NamedTuple):
-    """Where a query lays down its poses, and where its call leaves what it has found out."""
+class Estimates(NamedTuple):
+    """What the way to an aim costs at least, as the search takes it."""
+
+    weight: float  # of the estimate in the open list
+    per_metre: float  # least cost per metre
+    per_climb: float  # least cost per metre of altitude
+    surplus: Array  # (m + 1,) of maneuvers from a trim to an aim's, the least; the last of no trim
+
+
+class Connecting(NamedTuple):
+    """When a node is joined with the other end by a word, and what that may cost."""
+
+    per_interval: float  # cost to go for each expansion between two connections
+    least_interval: float  # expansions between two of them, at least ...
+    most_interval: float  # ... and at most
+    factor: float  # a connection may cost so many times the estimate ...
+    slack: float  # ... and so much more
+    tries: int  # candidates of one connection that are proven, at most
+    checks_words: bool  # whether connections have limits of single words to keep
+
+
+class Truncation(NamedTuple):
+    """What is left of an edge that meets an obstacle."""
+
+    kept: bool  # whether the part before the contact is
+    back_off: float  # [m] before it
+    shortest: float  # [m]
+
+
+class WordLimits(NamedTuple):
+    """What a plan has to keep, from a start at a time of the world."""
+
+    clock: float  # [s] that time
+    most_time: float  # [s]
+    stay_until: float  # [s] time of the world until which the goal is kept
+    most_trims: int  # 0: no limit
+    least_coast: float  # [s]
+
+
+class Task(NamedTuple):
+    """What one search is asked, from one end."""
+
+    sign: float  # 1: along time, -1: against it
+    roots: EndArrays
+    aims: EndArrays
+    cells: CellSizes
+    estimates: Estimates
+    connecting: Connecting
+    truncation: Truncation
+    limits: WordLimits
+    stop_at_first: bool  # connection
+    ends_early: bool  # when the most promising node is not below the upper bound
+
+
+class LatticeSearch(NamedTuple):
+    """A search of the lattice: what is known, what is asked, of which vehicle, among what."""
+
+    arrays: SearchArrays
+    task: Task
+    library: LatticeArrays
+    scene: Scene
+    grid: DistanceGrid
+    table: CostTable
+
+
+class Joint(NamedTuple):
+    """Two ends that a word shall join, and what it may cost."""
+
+    pose: tuple[float, float, float, float]  # where it begins
+    before: int  # trim there, -1 for any
+    after: int  # trim at its end, -1 for any
+    clock: float  # [s] time of the world at its begin
+    tries: int  # words that are proven, at most
+    most_cost: float  # that it has to undercut
+    most_time: float  # [s] that it may last
+
+
+class Margins(NamedTuple):
+    """Clearances [m] that a query needs."""
+
+    clearly: float  # of ends, beyond what is kept, that leaves no doubt
+    usual: float  # proven clearance, if the ends allow it
+    least: float
+    back_off: float  # as in `Truncation`, as far as the margin does not ask for more
+
+
+class FirstCallArrays(NamedTuple):
+    """Where a query lays down its poses, and where its first call leaves what it has found out."""
 
     poses: Array  # (1 + n, 3) start and goals as the problem sees them
     seen: Array  # (1 + n, 4) as the search does
@@ -113,19 +307,16 @@ class Desk(NamedTuple):
     box: tuple[float, float, float, float]  # of what stands
     pad: float  # [m] around it and the ends
     bounded: bool  # whether the window is that of the bounds
-    low_x: float  # bounds of the pose [m]
-    low_y: float
-    high_x: float
-    high_y: float
-    clearly: float  # [m]
-    usual: float  # [m] proven clearance, if the ends allow it
-    least: float  # [m]
-    back_off: float  # [m] as in the task, as far as the margin does not ask for more
+    bounds: tuple[float, float, float, float]  # of the pose [m]: low x, low y, high x, high y
+    margins: Margins
     others: int  # numbers that layers, headings and so on of cells need
 
 
+# A path among movers.
+
+
 class PathArrays(NamedTuple):
-    """Pieces of a path and the states along it, as the kernel sees them."""
+    """Pieces of a path and the states along it."""
 
     trims: IntArray  # (n,)
     durations: Array  # (n,)
@@ -136,6 +327,22 @@ class PathArrays(NamedTuple):
     latest: IntArray  # (n + 1,) the state of each joint that was found last, -1 for none
     keys: Array  # (s,) of the open list
     items: IntArray  # (s,)
+    state: IntArray  # (2,) states in use, and those in the open list
+
+
+class PathSearch(NamedTuple):
+    """When to drive along a path: what is known, of which vehicle, among what."""
+
+    path: PathArrays
+    library: LatticeArrays
+    scene: Scene
+    limits: WordLimits
+    quiet: float  # [s] since the start, after which nothing changes any more
+    rest: int  # trim that waits, -1 if none
+    tick: float  # [s] between departures that are tried
+
+
+# A library on a lattice, which is a graph of S states and E edges.
 
 
 class FreeCosts(NamedTuple):
@@ -148,7 +355,7 @@ class FreeCosts(NamedTuple):
 
 
 class StateLattice(NamedTuple):
-    """The graph of a library with S states and E edges, along time or against it."""
+    """The graph, along time or against it."""
 
     cell: float  # [m]
     frame: tuple[float, float, float, float, float]  # x, y, heading, cos, sin in the world's frame
@@ -197,3 +404,26 @@ class Tested(NamedTuple):
 
     lib: LatticeArrays
     scene: Scene
+
+
+class GraphQuery(NamedTuple):
+    """A search of a state lattice: what is known, where it leads, and what motions are tested with.
+
+    Those of `coarse` are fewer and prove most edges free, those of `fine` decide.
+    """
+
+    arrays: GraphArrays
+    lattice: StateLattice
+    aims: Aims
+    free: FreeCosts
+    coarse: Tested
+    fine: Tested
+    weight: float  # of the bound of the cost to go
+
+
+class CostQueue(NamedTuple):
+    """A binary heap of places in a table of costs."""
+
+    keys: Array
+    items: IntArray
+    state: IntArray  # (2,) entries, and nodes that are settled

@@ -18,11 +18,16 @@ from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
-from maneuver_automaton.search.arrays import Desk, DistanceGrid, SearchArrays, Task
+from maneuver_automaton.search.arrays import FirstCallArrays, LatticeSearch, Margins
 from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.distance_grid import laid_grid, with_cells
-from maneuver_automaton.search.lattice_memory import search_arrays, with_room
-from maneuver_automaton.search.lattice_pass import Pass, first_steps, first_takes
+from maneuver_automaton.search.lattice_pass import (
+    Pass,
+    first_steps,
+    first_takes,
+    search_arrays,
+    with_room,
+)
 from maneuver_automaton.search.lattice_query import (
     LEAST_MARGIN,
     LatticeQuery,
@@ -36,26 +41,22 @@ from maneuver_automaton.search.lattice_task import (
     numbers_of_cells,
     task_of,
 )
-from maneuver_automaton.search.lattice_worlds import CLEARLY, pad_around
 from maneuver_automaton.search.prepared import Prepared
-from maneuver_automaton.search.scene import Scene
+from maneuver_automaton.search.scene import CLEARLY, pad_around
 
 SPARE = 1.5  # times the cells of the first query, of which there is memory
 MOST_CELLS = 1 << 18  # of which there is memory: on larger maps nobody waits for the begin
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Bench:
+class FirstCall:
     """The arguments of the first call, for queries of one setting and of the same kinds of ends."""
 
-    desk: Desk
-    call: Callable[[], int]
-    search: SearchArrays
-    task: Task
-    scene: Scene
-    grid: DistanceGrid
+    arrays: FirstCallArrays
+    search: LatticeSearch
+    run: Callable[[], int]
     resolution: Resolution
-    steps: int  # expansions of a first call
+    steps: int  # expansions
     takes: float  # [s] about, the first of them
 
 
@@ -63,137 +64,120 @@ class Bench:
 class Begun:
     """A query whose first expansions are done; its ends are clearly free."""
 
-    bench: Bench
+    call: FirstCall
     may_go_on: bool
 
     @property
     def is_found(self) -> bool:
         """Whether a connection was found."""
-        return bool(self.bench.search.state[layout.FOUND])
+        return bool(self.call.search.arrays.state[layout.FOUND])
 
     def search_of(self, query: LatticeQuery) -> Pass:
         """The search that was begun, ready to go on."""
-        bench, task, scene, grid = self.bench, self.bench.task, self.bench.scene, self.bench.grid
+        call, search = self.call, self.call.search
         if not self.is_found:
-            task, scene = task_of(query, bench.resolution), query.scene()
-            coarse = bench.resolution.coarse
+            coarse, grid = call.resolution.coarse, search.grid
             grid = laid_grid(query.plane, query.box, query.start, coarse=coarse, like=grid)
+            task = task_of(query, call.resolution)
+            search = search._replace(task=task, scene=query.scene(), grid=grid)
         return Pass(
             query=query,
-            resolution=bench.resolution,
-            task=task,
-            scene=scene,
-            grid=grid,
-            table=NO_TABLE,
-            arrays=bench.search,
-            library=query.library.arrays,
-            pace=Pace(UNLIMITED, steps=bench.steps),
+            resolution=call.resolution,
+            search=search._replace(library=query.library.arrays),
+            pace=Pace(UNLIMITED, steps=call.steps),
             alive=self.may_go_on,
-            untold=int(bench.search.state[layout.EXPANSIONS]),
+            begun_with=int(search.arrays.state[layout.EXPANSIONS]),
         )
 
 
 @dataclass(slots=True, eq=False)
-class _Benches:
+class _FirstCalls:
     """Those that nobody uses now."""
 
-    free: list[Bench] = field(default_factory=list)
+    free: list[FirstCall] = field(default_factory=list)
     is_made: bool = False  # whether one was made, or found to be impossible
 
 
-def _benches(problem: Problem, prepared: Prepared) -> _Benches:
+def _first_calls(problem: Problem, prepared: Prepared) -> _FirstCalls:
     """Those for queries of the same setting and kinds of ends."""
-    return kept_with(problem.setting, (problem.ends, prepared), _Benches)
+    return kept_with(problem.setting, (problem.ends, prepared), _FirstCalls)
 
 
-def prepare_bench(problem: Problem, prepared: Prepared) -> None:
-    """Have a bench ready for queries like this one, where they can begin so."""
-    benches = _benches(problem, prepared)
-    if not benches.is_made:
-        benches.is_made = True
-        bench = _bench(problem, prepared)
-        if bench is not None:
-            benches.free.append(bench)
+def prepare_first_call(problem: Problem, prepared: Prepared) -> None:
+    """Have the first call ready for queries like this one, where they can begin so."""
+    calls = _first_calls(problem, prepared)
+    if not calls.is_made:
+        calls.is_made = True
+        call = _first_call(problem, prepared)
+        if call is not None:
+            calls.free.append(call)
 
 
 def begin(problem: Problem, prepared: Prepared, budget: Budget) -> Begun | None:
-    """See the ends of a query and begin its search, in one call; None where it has no bench.
+    """See the ends of a query and begin its search, in one call; None where none is ready.
 
     Nor is it begun where its ends are not clearly free, or where it would be late.
     """
-    free = _benches(problem, prepared).free
+    free = _first_calls(problem, prepared).free
     try:
-        bench = free.pop()
+        call = free.pop()
     except IndexError:  # asked for before, another thread might take the last one
         return None
-    if budget.left < bench.takes:
-        free.append(bench)
+    if budget.left < call.takes:
+        free.append(call)
         return None
-    desk = bench.desk
-    desk.poses[0] = problem.start
+    arrays, most = call.arrays, problem.search.max_expansions
+    arrays.poses[0] = problem.start
     for k, goal in enumerate(problem.goals):
-        desk.poses[1 + k] = goal.pose
-    most = problem.search.max_expansions
-    desk.asked[0] = bench.steps if most is None else min(bench.steps, most)
-    said = bench.call()
+        arrays.poses[1 + k] = goal.pose
+    arrays.asked[0] = call.steps if most is None else min(call.steps, most)
+    said = call.run()
     if said == kernels.NOT_BEGUN:
-        free.append(bench)
+        free.append(call)
         return None
-    return Begun(bench=bench, may_go_on=bool(said))
+    return Begun(call=call, may_go_on=bool(said))
 
 
 def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
-    """Leave the bench to the next query."""
-    _benches(problem, prepared).free.append(begun.bench)
+    """Leave the call to the next query."""
+    _first_calls(problem, prepared).free.append(begun.call)
 
 
-def _bench(problem: Problem, prepared: Prepared) -> Bench | None:
-    """A bench for queries like this one; None where its kernel does not look at all of them."""
+def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
+    """The call of queries like this one; None where its kernel does not look at all of them."""
     bounds, automaton = problem.bounds, problem.automaton
     if not automaton.is_kinematic or automaton.lattice is not None or problem.start.size != 3:
         return None
     if problem.parts or problem.moves or problem.zones or (bounds.x is None) != (bounds.y is None):
         return None
     query = lattice_query(problem, tuple(range(len(problem.goals))), prepared=prepared)
-    library = query.library
+    library, world = query.library, query.world
     first = first_resolutions(library, query.settings)[0]
     plain = first.durations == 1.0 and query.least_coast == 0.0 and first.margin == 1.0
     if not (library.at_will and plain and query.plane.arrays.field.distance.size):
         return None
-    task, scene = task_of(query, first), query.scene()
+    task = task_of(query, first)
     grid = laid_grid(query.plane, query.box, query.start, coarse=first.coarse)
-    cells = int(SPARE * grid.columns * grid.rows)
+    cells = int(SPARE * grid.layout.columns * grid.layout.rows)
     if cells > MOST_CELLS:
         return None
-    grid = with_cells(grid, cells)
     steps = first_steps(library.arrays, task)
-    arrays = search_arrays(library.arrays.library)
-    arrays = with_room(arrays, library.arrays.most_children * (steps + 1) + 2 + len(task.roots))
-    desk = _desk(query, task, first)
-    args = (desk, arrays, task, library.arrays, scene, grid, NO_TABLE)
-    return Bench(
-        desk=desk,
-        call=bound(kernels.begin_search, *args),
-        search=arrays,
+    most = library.arrays.most_children * (steps + 1) + 2 + len(task.roots.poses)
+    search = LatticeSearch(
+        arrays=with_room(search_arrays(library.arrays.library), most),
         task=task,
-        scene=scene,
-        grid=grid,
-        resolution=first,
-        steps=steps,
-        takes=first_takes(library.arrays, task),
+        library=library.arrays,
+        scene=query.scene(),
+        grid=with_cells(grid, cells),
+        table=NO_TABLE,
     )
-
-
-def _desk(query: LatticeQuery, task: Task, first: Resolution) -> Desk:
-    """The desk of queries like this one."""
-    problem, world = query.problem, query.world
     n = 1 + len(query.goals)
     to_x, to_y, turn = world.frame.tolist()
     low_x, low_y, high_x, high_y = world.box.tolist()
     (least_x, most_x), (least_y, most_y) = (
-        pair or (-math.inf, math.inf) for pair in (problem.bounds.x, problem.bounds.y)
+        pair or (-math.inf, math.inf) for pair in (bounds.x, bounds.y)
     )
-    return Desk(
+    arrays = FirstCallArrays(
         poses=np.zeros((n, 3)),
         seen=np.zeros((n, 4)),
         clear=np.zeros(n),
@@ -202,15 +186,22 @@ def _desk(query: LatticeQuery, task: Task, first: Resolution) -> Desk:
         asked=np.zeros(1, dtype=np.int64),
         frame=(to_x, to_y, turn, float(np.cos(-turn)), float(np.sin(-turn))),
         box=(low_x, low_y, high_x, high_y),
-        pad=float(pad_around(world, query.library.radius)),
-        bounded=problem.bounds.x is not None,
-        low_x=float(least_x),
-        low_y=float(least_y),
-        high_x=float(most_x),
-        high_y=float(most_y),
-        clearly=CLEARLY,
-        usual=float(usual_margin(query.library, world)),
-        least=LEAST_MARGIN,
-        back_off=float(back_off_of(query.library)),
+        pad=float(pad_around(world, library.radius)),
+        bounded=bounds.x is not None,
+        bounds=(float(least_x), float(least_y), float(most_x), float(most_y)),
+        margins=Margins(
+            clearly=CLEARLY,
+            usual=float(usual_margin(library, world)),
+            least=LEAST_MARGIN,
+            back_off=float(back_off_of(library)),
+        ),
         others=numbers_of_cells(query, task, first),
+    )
+    return FirstCall(
+        arrays=arrays,
+        search=search,
+        run=bound(kernels.begin_search, arrays, search),
+        resolution=first,
+        steps=steps,
+        takes=first_takes(library.arrays, task),
     )

@@ -9,7 +9,6 @@ import contextlib
 import hashlib
 import math
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +17,10 @@ from maneuver_automaton._cache_files import keep_within, read_checked, used_now,
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_folders import user_cache_folder
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search import _kernels_table
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
-from maneuver_automaton.search.lattice_library import lattice_library
+from maneuver_automaton.search._kernels_estimate import fill_table
+from maneuver_automaton.search.arrays import CostTable
+from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
+from maneuver_automaton.search.lattice_trims import is_mirrored
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 FOLDER = "cost_to_go"  # of the user's cache folder
@@ -30,15 +30,6 @@ REACH = 3.0  # [turning radii] from the middle to the rim, where nothing else is
 SHAPE = (HEADINGS, 2 * HALF + 1, 2 * HALF + 1)
 MOST_BYTES = 500_000_000  # of all tables that are kept on disk
 SCALES = (0.09, 0.18, 0.36)  # lengths of the program's edges, in those of the lattice's longest
-
-
-class CostTable(NamedTuple):
-    """Cost to go around a goal; a table of no cells where there is none."""
-
-    value: NDArray[np.float32]  # (headings, 2 half + 1, 2 half + 1), inf where not known
-    free: NDArray[np.float32]  # the same to a goal whose heading is free
-    cell: float  # [m]
-    half: int
 
 
 NOTHING = np.zeros((0, 1, 1), dtype=np.float32)
@@ -86,7 +77,7 @@ def _made_from(library: LatticeLibrary, reach: float) -> tuple[bytes, bytes, byt
     m = arrays.n_trims
     moving = arrays.twists[:m].any(axis=1)
     twists, rates = arrays.twists[:m][moving, :3].copy(), arrays.rates[:m][moving].copy()
-    longest = library.arrays.edge_durations[moving].max(axis=1)
+    longest = library.arrays.coasts.durations[moving].max(axis=1)
     edge_durations = np.multiply.outer(longest, SCALES)
     cell = reach / HALF
     smallest = np.where(arrays.twists[:m][moving, :2].any(axis=1), cell, 0.0)
@@ -94,7 +85,8 @@ def _made_from(library: LatticeLibrary, reach: float) -> tuple[bytes, bytes, byt
     with np.errstate(divide="ignore", invalid="ignore"):
         least = np.where(speed > 0.0, smallest / speed, 0.0)
     edge_durations = np.maximum(edge_durations, np.multiply.outer(least, [1.0, 2.0, 4.0]))
-    return twists.tobytes(), rates.tobytes(), edge_durations.tobytes(), reach, library.mirrored
+    mirrored = is_mirrored(arrays.twists[:m, :3], arrays.rates[:m])
+    return twists.tobytes(), rates.tobytes(), edge_durations.tobytes(), reach, mirrored
 
 
 def _kept(
@@ -112,13 +104,12 @@ def _kept(
     path = (folder or user_cache_folder() / FOLDER) / f"{digest.hexdigest()[:24]}.table"
     value = _load(path)
     if value is None:
-        value = _kernels_table.fill_table(
+        value = fill_table(
             np.frombuffer(twists).reshape(-1, 3).copy(),
             np.frombuffer(rates).copy(),
             np.frombuffer(edge_durations).reshape(-1, len(SCALES)).copy(),
             cell,
-            HALF,
-            HEADINGS,
+            (HEADINGS, HALF),
             mirrored,
         )
         _save(value, path)

@@ -11,7 +11,7 @@ from maneuver_automaton._compile import plain
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
 from maneuver_automaton.search._kernels_distance import BUCKETS
-from maneuver_automaton.search.arrays import DistanceGrid
+from maneuver_automaton.search.arrays import CellQueue, DistanceGrid, GridLayout, GridWalls
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
@@ -19,6 +19,19 @@ OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over 
 COARSER = 3  # field cells along a side of a coarse cell
 TOUCHING = 1e-6  # [m] what is less deep in an obstacle may pass: checks and places are rounded
 COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed radius, at most
+
+
+# A grid without cells, where no obstacle is static: the straight line is as good.
+NONE = np.zeros(0, dtype=np.int64)
+NO_GRID = DistanceGrid(
+    value=NONE,
+    rank=NONE,
+    mark=np.zeros(0, dtype=np.uint8),
+    state=np.zeros(6, dtype=np.int64),
+    queue=CellQueue(np.zeros(0), NONE, NONE, NONE),
+    layout=GridLayout(0.0, 0.0, 1.0, 0, 0, 1, 0, 0, 0, 0),
+    walls=GridWalls(0.0, 0.0, -math.inf, 0),
+)
 
 
 def distance_grid(
@@ -45,9 +58,9 @@ def distance_grid(
     pose outside its body blocks no cell. Where the field is capped nothing is blocked.
     """
     if not world.arrays.field.distance.size:
-        return _none()
+        return NO_GRID
     grid = laid_grid(world, box, aim, coarse=coarse)
-    n = grid.columns * grid.rows
+    n = grid.layout.columns * grid.layout.rows
     most = 8 * n + 8  # each cell is reached once from each of its neighbours at most
     memory = prepared.room(2 * n + 3 * most, np.int64)
     keys, items, links = (memory[2 * n + k * most : 2 * n + (k + 1) * most] for k in range(3))
@@ -55,11 +68,8 @@ def distance_grid(
         value=memory[:n],
         rank=memory[n : 2 * n],
         mark=np.zeros(n, dtype=np.uint8),
-        keys=keys.view(np.float64),
-        items=items,
-        links=links,
-        heads=np.zeros(BUCKETS, dtype=np.int64),
         state=np.zeros(6, dtype=np.int64),
+        queue=CellQueue(keys.view(np.float64), items, links, np.zeros(BUCKETS, dtype=np.int64)),
     )
     _kernels_distance.seed(grid, np.ascontiguousarray(seeds[:, :2]))
     return grid
@@ -77,26 +87,30 @@ def laid_grid(
     if coarse and COARSER * field.cell * math.sqrt(0.5) <= COARSEST * world.body.inscribed:
         stride = max(stride, COARSER)
     cell = stride * field.cell
-    layout = plain(_kernels_distance.grid_layout)
-    first_i, columns, start_x = layout(field.origin_x, low_x, high_x, cell, field.cell, stride)
-    first_j, rows, start_y = layout(field.origin_y, low_y, high_y, cell, field.cell, stride)
+    along = plain(_kernels_distance.grid_layout)
+    first_i, columns, start_x = along(field.origin_x, low_x, high_x, cell, field.cell, stride)
+    first_j, rows, start_y = along(field.origin_y, low_y, high_y, cell, field.cell, stride)
     half_diagonal, inscribed = cell * math.sqrt(0.5), world.body.inscribed
     aim_x, aim_y = aim[:2].tolist()
-    return (like or _none())._replace(
-        origin_x=start_x,
-        origin_y=start_y,
-        cell=cell,
-        columns=columns,
-        rows=rows,
-        stride=stride,
-        shift_x=first_i * stride,
-        shift_y=first_j * stride,
-        inflation=min(inscribed - half_diagonal - TOUCHING, field.outside),
-        wanted=min(max(inscribed, 0.0), field.outside),
-        cut=min(half_diagonal, field.outside) if inscribed < 2.0 * half_diagonal else -math.inf,
-        detour=plain(_kernels_distance.detour_of)(columns, rows),
-        aim_i=math.floor((aim_x - start_x) / cell),
-        aim_j=math.floor((aim_y - start_y) / cell),
+    return (like or NO_GRID)._replace(
+        layout=GridLayout(
+            origin_x=start_x,
+            origin_y=start_y,
+            cell=cell,
+            columns=columns,
+            rows=rows,
+            stride=stride,
+            shift_x=first_i * stride,
+            shift_y=first_j * stride,
+            aim_i=math.floor((aim_x - start_x) / cell),
+            aim_j=math.floor((aim_y - start_y) / cell),
+        ),
+        walls=GridWalls(
+            inflation=min(inscribed - half_diagonal - TOUCHING, field.outside),
+            wanted=min(max(inscribed, 0.0), field.outside),
+            cut=min(half_diagonal, field.outside) if inscribed < 2.0 * half_diagonal else -math.inf,
+            detour=plain(_kernels_distance.detour_of)(columns, rows),
+        ),
     )
 
 
@@ -107,11 +121,13 @@ def with_cells(grid: DistanceGrid, n: int) -> DistanceGrid:
         value=np.zeros(n, dtype=np.int64),
         rank=np.zeros(n, dtype=np.int64),
         mark=np.zeros(n, dtype=np.uint8),
-        keys=np.zeros(most),
-        items=np.zeros(most, dtype=np.int64),
-        links=np.zeros(most, dtype=np.int64),
-        heads=np.zeros(BUCKETS, dtype=np.int64),
         state=np.zeros(6, dtype=np.int64),
+        queue=CellQueue(
+            keys=np.zeros(most),
+            items=np.zeros(most, dtype=np.int64),
+            links=np.zeros(most, dtype=np.int64),
+            heads=np.zeros(BUCKETS, dtype=np.int64),
+        ),
     )
 
 
@@ -130,32 +146,3 @@ def stride_of(area: float, cell: float) -> int:
     while area / (stride * cell) ** 2 > MOST_CELLS:
         stride += 2
     return stride
-
-
-def _none() -> DistanceGrid:
-    """A grid without cells, where no obstacle is static: the straight line is as good."""
-    none = np.zeros(0, dtype=np.int64)
-    return DistanceGrid(
-        value=none,
-        rank=none,
-        mark=np.zeros(0, dtype=np.uint8),
-        keys=np.zeros(0),
-        items=none,
-        links=none,
-        heads=none,
-        state=np.zeros(6, dtype=np.int64),
-        origin_x=0.0,
-        origin_y=0.0,
-        cell=1.0,
-        columns=0,
-        rows=0,
-        stride=1,
-        shift_x=0,
-        shift_y=0,
-        inflation=0.0,
-        wanted=0.0,
-        cut=-math.inf,
-        detour=0,
-        aim_i=0,
-        aim_j=0,
-    )

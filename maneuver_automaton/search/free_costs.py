@@ -12,17 +12,13 @@ from __future__ import annotations
 
 import math
 import threading
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from maneuver_automaton._arrays import IntArray
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.search import _kernels_state_lattice as kernels
-from maneuver_automaton.search.arrays import FreeCosts
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.arrays import StateLattice
+from maneuver_automaton.search.arrays import CostQueue, FreeCosts, StateLattice
 
 BEYOND = 1.25  # times the cost from the start, up to which costs are known
 WIDER = 1.5  # times the cost looked up to, where the start was not met
@@ -117,9 +113,8 @@ class FreeTable:
             if self._state[0] + self._lattice.most_links > len(self._key):
                 self._key = np.append(self._key, np.zeros_like(self._key))
                 self._item = np.append(self._item, np.zeros_like(self._item))
-            kernels.grow_free_costs(
-                self._lattice, self._as_far_as(0.0, np.zeros(2, dtype=np.int64)), self._key,
-                self._item, self._state, float(most), room,
-            )  # fmt: skip
+            known = self._as_far_as(0.0, np.zeros(2, dtype=np.int64))
+            queue = CostQueue(self._key, self._item, self._state)
+            kernels.grow_free_costs(self._lattice, known, queue, float(most), room)
             late = budget.is_over
         return min(most, self._limits.get(n, math.inf))

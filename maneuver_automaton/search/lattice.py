@@ -21,15 +21,13 @@ from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.search import _kernels_nodes as layout
-from maneuver_automaton.search import _kernels_plane
-from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays
+from maneuver_automaton.search._kernels_distance import AT_RIM, corner_path, distances
+from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays
 from maneuver_automaton.search.beginning import Begun
-from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
+from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.distance_grid import OCTILE, distance_grid
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
-from maneuver_automaton.search.lattice_library import Carried, library_of_trims
-from maneuver_automaton.search.lattice_memory import give_back
-from maneuver_automaton.search.lattice_pass import Pass, pass_of, with_cost
+from maneuver_automaton.search.lattice_library import Carried, LatticeLibrary, library_of_trims
+from maneuver_automaton.search.lattice_pass import Pass, give_back, pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import (
     Resolution,
@@ -85,7 +83,7 @@ def first_plan(
     if begun is not None:
         turns[0].begun = begun.search_of(query)
         if not begun.is_found:
-            guides.coarse_grids[turns[0].sign] = turns[0].begun.grid
+            guides.coarse_grids[turns[0].sign] = turns[0].begun.search.grid
     word, proof, total, left_out, other = None, "", 0, False, None
     while word is None:
         due = room if aside is None else min(room, ASIDE)
@@ -94,7 +92,7 @@ def first_plan(
                 continue
             search = one.begun or one.begin()
             search.is_late = budget.left < search.first_takes  # nothing is begun that would be late
-            before = search.expansions - search.untold
+            before = search.expansions - search.begun_with
             word = search.run(min(one.chunk, due - total), math.inf, budget=budget)
             total += search.expansions - before
             one.chunk = min(2 * one.chunk, schedule.most_chunk)
@@ -139,7 +137,9 @@ def first_plan(
         else None,
     )
     for search in passes:
-        if begun is None or search is not turns[0].begun:  # whose arrays are those of the bench
+        if (
+            begun is None or search is not turns[0].begun
+        ):  # whose arrays are those of the first call
             give_back(query.prepared, search.query.library, search.arrays)
     return found
 
@@ -245,13 +245,11 @@ def _enclosed(query: LatticeQuery, grids: Grids) -> str:
     goals = enumerate(query.problem.goals)
     if any(goal.free_heading and k not in asked for k, goal in goals):
         return ""
-    from maneuver_automaton.search._kernels_distance import AT_RIM, distances
-
     for grid, name, far in (
         (grids[0], "goal", query.start[None]),
         (grids[1], "start", query.goals),
     ):
-        if not grid.columns:
+        if not grid.layout.columns:
             continue
         lengths = distances(grid, query.plane.arrays.field, np.ascontiguousarray(far[:, :2]))
         if np.isinf(lengths).all() and (query.bounded or not grid.state[AT_RIM]):
@@ -290,9 +288,9 @@ def plane_bound(query: LatticeQuery) -> float:
     placement on path length*.
     """
     grid = distance_grid(query.plane, query.box, query.goals, query.start, prepared=query.prepared)
-    if not grid.columns:
+    if not grid.layout.columns:
         return 0.0
-    length: float = _kernels_plane.corner_path(
+    length: float = corner_path(
         grid,
         query.plane.arrays.field,
         np.ascontiguousarray(query.goals[:, :2]),
@@ -302,7 +300,7 @@ def plane_bound(query: LatticeQuery) -> float:
     if not np.isfinite(length):
         return 0.0
     beside = max(query.problem.goals[k].tolerance_m for k in query.goal_index)
-    return max(0.0, length / OCTILE - grid.cell * float(np.sqrt(2.0)) - beside)
+    return max(0.0, length / OCTILE - grid.layout.cell * float(np.sqrt(2.0)) - beside)
 
 
 SECONDS_A_MANEUVER, SECONDS_A_WORD = 1e-3, 2e-6  # measured, generous

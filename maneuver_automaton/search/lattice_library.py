@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,26 +14,23 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import part_between
 from maneuver_automaton.collision import Shape
-from maneuver_automaton.collision.body import body_of
+from maneuver_automaton.collision.body import Body, body_of
+from maneuver_automaton.collision.swept_areas import swept_areas
 from maneuver_automaton.costs import StageCost
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice_arrays import (
-    CELL,
+from maneuver_automaton.search.arrays import (
+    CoastArrays,
     EdgeArrays,
-    LatticeLibrary,
-    MotionArrays,
-    coasts_of,
-    edge_durations_of,
-    lattice_arrays,
-    length_scale,
-    tightest_turn,
+    LatticeArrays,
+    PartArrays,
+    PieceArrays,
 )
 from maneuver_automaton.search.lattice_trims import (
     TURN,
     Chosen,
     PricedTrims,
-    is_mirrored,
     priced_library,
     trims_at_will,
     trims_of,
@@ -39,6 +39,7 @@ from maneuver_automaton.search.part_motion import (
     CLOSE,
     Part,
     bodies_of,
+    body_arrays,
     carried_twists,
     course_of,
     fastest_of,
@@ -49,8 +50,85 @@ from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.transitions import SWITCH, transitions_of
 
+DURATIONS = (0.17, 0.5)  # of the coasts of edges, in the time a length scale takes
+SPINS = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot
+CELL = 0.122  # side of a cell at the first resolution, in length scales
 OF_A_LATTICE = 0.7  # of its resolution: a cell's diagonal is shorter than the step between poses
 Carried = tuple[tuple[str, tuple[Shape, ...]], ...]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LatticeLibrary:
+    """The arrays, and the values that the wrapper needs beside them."""
+
+    arrays: LatticeArrays
+    priced: Library  # its trims and maneuvers, with their costs
+    parts: tuple[Part, ...]  # rigid parts of the vehicle, posed in these trims
+    radius: float  # [m] length scale: the tightest turn, or the size of the body
+    cell: float  # [m] side of a cell at the first resolution
+    turns: float  # radius of the tightest turn, in length scales; 1 for none
+    per_metre: float  # least cost per metre
+    per_climb: float  # least cost per metre of altitude
+    per_turn: float  # cost of the cheapest full turn
+    surplus: Array  # (C, C) least cost of maneuvers between classes beyond that of their path
+    spans: IntArray  # (N, 2) samples of its course between which each piece of a part lies
+    rest: int | None  # index in the automaton of the rest that pads
+    rest_rate: float
+    interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
+    at_will: bool  # whether plans begin and end in any trim, and may end with a turn on the spot
+
+    @property
+    def trims(self) -> IntArray:
+        """Indices in the automaton (m,) of its trims."""
+        return self.priced.trims
+
+    @property
+    def number_of(self) -> IntArray:
+        """Number of each trim of the automaton among these, -1 for those left out."""
+        return self.priced.number_of
+
+    @functools.cached_property
+    def backwards(self) -> LatticeArrays:
+        """The arrays with coasts that lead against time."""
+        arrays = self.arrays
+        twists, durations = arrays.library.twists[:-1], arrays.coasts.durations
+        return arrays._replace(coasts=coasts_of(twists, -durations, arrays.parts.body, durations))
+
+    @functools.cached_property
+    def worst_error(self) -> float:
+        """How far the pose may be from any piece of a course [m]."""
+        pieces = self.arrays.pieces
+        of_pose = pieces.first[self.arrays.parts.n * len(self.arrays.edges.cost)]
+        return float(pieces.error[of_pose:].max(initial=0.0))
+
+    @functools.cached_property
+    def half_width(self) -> float:
+        """Half the width of the narrowest part [m]."""
+        return min(body_of(part.shapes).half_width for part in self.parts)
+
+    @functools.cached_property
+    def drives(self) -> bool:
+        """Whether a trim moves."""
+        numbered = self.arrays.library
+        return bool(numbered.twists[: numbered.n_trims].any())
+
+    @functools.cached_property
+    def climbs(self) -> bool:
+        """Whether a trim or a maneuver leads up or down."""
+        arrays = self.arrays
+        return bool(arrays.library.twists[:, 3].any() or arrays.edges.displacement[:, 3].any())
+
+    @functools.cached_property
+    def limits_coasts(self) -> bool:
+        """Whether a trim has a longest time."""
+        numbered = self.arrays.library
+        return bool(np.isfinite(numbered.longest[: numbered.n_trims]).any())
+
+    def edges_of(self, maneuvers: IntArray) -> IntArray:
+        """Edges of maneuvers of the automaton."""
+        order = np.argsort(self.arrays.edges.maneuver)
+        places = np.searchsorted(self.arrays.edges.maneuver, maneuvers, sorter=order)
+        return np.asarray(order[places], dtype=np.int64)
 
 
 def lattice_library(
@@ -128,37 +206,56 @@ def library_of_trims(
 
     Courses are followed as closely as `motion_along` says.
     """
-    library, arrays = priced.library, priced.library.arrays
-    lattice = library.automaton.lattice
-    twists, rates = arrays.twists[: arrays.n_trims], arrays.rates[: arrays.n_trims]
+    library, numbered = priced.library, priced.library.arrays
+    lattice, m = library.automaton.lattice, numbered.n_trims
+    twists, rates, classes = numbered.twists[:m], numbered.rates[:m], numbered.class_of[:m]
     edges = edges_of(library)
-    motion, spans = motion_along(library, parts, edges, timed=waits, close=close)
-    edge_of = np.full(len(library.maneuver_costs) + 1, SWITCH)  # the last is that of none
-    edge_of[edges.maneuver] = np.arange(len(edges.maneuver))
+    pieces, spans = motion_along(library, parts, edges, timed=waits, close=close)
+    bodies, of_pose = bodies_of(parts), len(parts) * len(edges.cost)
+    if len(edges.cost):
+        reach = pieces.speed * pieces.time + 2.0 * pieces.error
+        sums = np.add.reduceat(np.append(reach, 0.0), pieces.first[:-1])
+        sums = np.where(np.diff(pieces.first) > 0, sums, 0.0).reshape(len(parts) + 1, -1)
+        ends = pieces.first[of_pose:-1]
+        edges = edges._replace(
+            reach=np.asarray(sums[:-1].max(axis=0)),
+            low=np.minimum.reduceat(pieces.low, ends),
+            high=np.maximum.reduceat(pieces.high, ends),
+        )
     radius = length_scale(twists, body_of(parts[0].shapes), wide=priced.wide)
     speed = np.hypot(twists[:, 0], twists[:, 1])
     lengths = np.array([path_length(library.automaton, k) for k in edges.maneuver])
     # where no trim moves, only maneuvers cover ground
     per_metre = _least(rates, speed) if speed.any() else _least(edges.cost, lengths)
-    surplus = np.maximum(edges.cost - per_metre * lengths, 0.0)
-    pose_rows = motion.first_piece[len(parts) * len(edges.cost)]
+    by_maneuver = np.zeros(len(library.maneuver_costs))
+    by_maneuver[edges.maneuver] = np.maximum(edges.cost - per_metre * lengths, 0.0)
+    offsets = np.array([part.trim_poses for part in parts])
+    turned = np.array([carried_twists(twists, poses) for poses in offsets])
+    speeds = np.array([fastest_of(b, t) for b, t in zip(bodies, turned, strict=True)])
     durations = edge_durations_of(twists, radius, waits=waits)
-    made = lattice_arrays(
-        arrays,
-        parts,
-        edges,
-        motion,
-        edge_durations=durations,
-        via_edge=np.asarray(edge_of[library.transitions.first], dtype=np.int64),
-    )
+    in_class = np.bincount(classes, minlength=len(numbered.transitions.cost))
+    children = in_class * durations.shape[1] + np.diff(edges.first)
     return LatticeLibrary(
-        arrays=made,
-        backwards=made._replace(**coasts_of(twists, -durations, made.body)._asdict()),
+        arrays=LatticeArrays(
+            library=numbered,
+            parts=PartArrays(
+                n=len(parts),
+                body=bodies[0],
+                bodies=body_arrays(bodies),
+                offsets=offsets,
+                twists=turned,
+                speeds=speeds,
+                fastest=speeds.max(axis=0),
+            ),
+            coasts=coasts_of(twists, durations, bodies[0]),
+            edges=edges,
+            pieces=pieces,
+            first_trim=np.concatenate([[0], np.cumsum(in_class)]),
+            trims_of=np.argsort(classes, kind="stable"),
+            most_children=int(children.max(initial=0)),
+        ),
         priced=library,
         parts=parts,
-        trims=library.trims,
-        number_of=library.number_of,
-        edge_maneuver=edges.maneuver,
         radius=radius,
         # poses of a lattice must not share a cell, since each has to be reached
         cell=CELL * radius if lattice is None else OF_A_LATTICE * lattice.resolution,
@@ -166,14 +263,12 @@ def library_of_trims(
         per_metre=per_metre,
         per_climb=_least(rates, np.abs(twists[:, 3])),
         per_turn=TURN * radius * per_metre if priced.per_turn is None else priced.per_turn,
-        lag=lags(library, surplus, edges),
-        worst_error=float(motion.piece_error[pose_rows:].max(initial=0.0)),
+        surplus=transitions_of(library.automaton, by_maneuver).cost,
         spans=spans,
         rest=priced.rest,
         rest_rate=priced.rest_rate,
         interval=priced.interval,
         at_will=priced.at_will,
-        mirrored=is_mirrored(twists[:, :3], rates),
     )
 
 
@@ -184,20 +279,33 @@ def _least(rates: Array, speed: Array) -> float:
 
 
 def edges_of(library: Library) -> EdgeArrays:
-    """The maneuvers, sorted by the class they lead out of, then as the automaton lists them."""
+    """The maneuvers, sorted by the class they lead out of, then as the automaton lists them.
+
+    Where they lead to on their way follows from their pieces, and is 0 here.
+    """
     automaton, transitions = library.automaton, library.transitions
-    order = np.argsort(transitions.class_of[transitions.sources], kind="stable")
+    leaves = transitions.class_of[transitions.sources]
+    order = np.argsort(leaves, kind="stable")
+    edge_of = np.full(len(order) + 1, SWITCH)  # the last is that of none
+    edge_of[order] = np.arange(len(order))
+    counts = np.bincount(leaves, minlength=len(library.arrays.cost))
+    none = np.zeros(len(order))
     displacement, time = np.zeros((len(order), 4)), np.zeros(len(order))
     for e, k in enumerate(order.tolist()):
         displacement[e, : automaton.model.group.dof] = automaton.maneuvers[k].displacement
         time[e] = automaton.maneuvers[k].duration
     return EdgeArrays(
+        first=np.concatenate([[0], np.cumsum(counts)]),
         source=transitions.sources[order],
         target=transitions.targets[order],
         maneuver=order,
         displacement=displacement,
         cost=library.maneuver_costs[order],
         time=time,
+        reach=none,
+        low=none,
+        high=none,
+        via=np.asarray(edge_of[transitions.first], dtype=np.int64),
     )
 
 
@@ -208,7 +316,7 @@ def motion_along(
     *,
     timed: bool,
     close: float = CLOSE,
-) -> tuple[MotionArrays, IntArray]:
+) -> tuple[PieceArrays, IntArray]:
     """Pieces of every part, then of the pose alone, along every edge; samples of the parts.
 
     `timed`: obstacles move, so that it matters when the vehicle is where. Pieces follow the course
@@ -216,7 +324,7 @@ def motion_along(
     """
     if not edges.maneuver.size:
         first, rows, none = np.zeros(1, dtype=np.int64), np.zeros((0, 3)), np.zeros(0)
-        return MotionArrays(first, rows, rows, *[none] * 7), np.zeros((0, 2), dtype=np.int64)
+        return PieceArrays(first, rows, rows, *[none] * 5), np.zeros((0, 2), dtype=np.int64)
     automaton, bodies = library.automaton, bodies_of(parts)
     trim_twists = library.arrays.twists[: library.arrays.n_trims]
     twists = [carried_twists(trim_twists, part.trim_poses) for part in parts]
@@ -256,28 +364,17 @@ def motion_along(
         flat = np.hypot(pieces.twist[:, 0], pieces.twist[:, 1])
         speeds.append(flat if body is None else fastest_of(body, pieces.twist))
         heights.append(altitude_ranges(chosen, ends, pieces.begin, pieces.end))
-    low = np.minimum.reduceat(heights[-1][0], pieces.first[:-1])
-    high = np.maximum.reduceat(heights[-1][1], pieces.first[:-1])
-    motion = MotionArrays(
-        first_piece=np.cumsum(np.concatenate(counts)),
-        piece_pose=np.concatenate([row.pose for row in found]),
-        piece_twist=np.concatenate([row.twist for row in found]),
-        piece_time=np.concatenate([row.time for row in found]),
-        piece_error=np.concatenate([row.error for row in found]),
-        piece_speed=np.concatenate(speeds),
-        piece_low=np.concatenate([row for row, _ in heights]),
-        piece_high=np.concatenate([row for _, row in heights]),
-        edge_low=low,
-        edge_high=high,
+    motion = PieceArrays(
+        first=np.cumsum(np.concatenate(counts)),
+        pose=np.concatenate([row.pose for row in found]),
+        twist=np.concatenate([row.twist for row in found]),
+        time=np.concatenate([row.time for row in found]),
+        error=np.concatenate([row.error for row in found]),
+        speed=np.concatenate(speeds),
+        low=np.concatenate([row for row, _ in heights]),
+        high=np.concatenate([row for _, row in heights]),
     )
     return motion, np.concatenate(spans)
-
-
-def lags(library: Library, surplus: Array, edges: EdgeArrays) -> Array:
-    """Least surplus (C, C) of chains of maneuvers over the price of the path they make."""
-    by_maneuver = np.zeros(len(library.maneuver_costs))
-    by_maneuver[edges.maneuver] = surplus
-    return transitions_of(library.automaton, by_maneuver).cost
 
 
 def path_length(automaton: Automaton, k: int) -> float:
@@ -286,6 +383,58 @@ def path_length(automaton: Automaton, k: int) -> float:
     if maneuver.course is None:
         return float(np.hypot(*maneuver.displacement[:2]))
     return float(np.hypot(*np.diff(maneuver.course.pose[:, :2], axis=0).T).sum())
+
+
+def coasts_of(
+    twists: Array, times: Array, body: Body, durations: Array | None = None
+) -> CoastArrays:
+    """Coasts by twists (m, 4) for times (m, k) [s], negative ones backwards; what they last."""
+    steps = times[..., None] * twists[:, None, :]
+    moves = np.concatenate([SE2.exp(steps[..., :3]).pose, steps[..., 3:]], axis=-1)
+    return CoastArrays(
+        times if durations is None else durations, moves, swept_areas(body, twists, times)
+    )
+
+
+def edge_durations_of(twists: Array, radius: float, *, waits: bool) -> Array:
+    """Coasting times (m, 2) of edges [s]; none for rest unless it waits.
+
+    A trim that moves makes a share of the length scale, one that turns on the spot a share of a
+    turn; one that only climbs, or rests, goes on for as long as the fastest takes for its share.
+    """
+    speed, turn = np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])
+    fastest = max(float(speed.max(initial=0.0)), 1e-9)
+    columns = []
+    for share, angle in zip(DURATIONS, SPINS, strict=True):
+        with np.errstate(divide="ignore"):
+            straight = np.where(speed > 0.0, share * radius / speed, np.inf)
+            turning = np.where(turn > 0.0, angle / turn, np.inf)
+        t = np.where(speed > 0.1 * turn * radius, straight, turning)
+        waiting = share * radius / fastest if waits else 0.0
+        still = (speed == 0.0) & (turn == 0.0)
+        climbing = share * radius / np.maximum(np.abs(twists[:, 3]), 1e-9)
+        columns.append(np.where(still, np.where(twists[:, 3] != 0.0, climbing, waiting), t))
+    return np.stack(columns, axis=1)
+
+
+def tightest_turn(twists: Array) -> float:
+    """Radius of the tightest turn that drives [m]; 0 if none does."""
+    speed, turn = np.hypot(twists[:, 0], twists[:, 1]), np.abs(twists[:, 2])
+    turns = (turn > 0.0) & (speed > 0.0)
+    return float((speed[turns] / turn[turns]).min()) if turns.any() else 0.0
+
+
+def length_scale(twists: Array, body: Body, *, wide: bool) -> float:
+    """Radius of the tightest turn that drives; a few widths of the body where there is none.
+
+    Unless turns may be `wide`, it is at most that: a vehicle that can turn without driving a
+    circle decides on the scale of its body.
+    """
+    radius, size = tightest_turn(twists), 4.0 * body.half_width or 4.0 * body.reach
+    if radius == 0.0:
+        return size or 1.0
+    radius = max(radius, 0.5 * size)
+    return min(radius, 2.0 * size) if size and not wide else radius
 
 
 BETWEEN = 0.25  # of the change of climb from sample to sample times their spacing

@@ -13,21 +13,27 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
-from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays, Task
-from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
-from maneuver_automaton.search.lattice_arrays import LatticeArrays, coasts_of
-from maneuver_automaton.search.lattice_memory import (
-    GROWN_S,
-    arrays_for,
-    with_room,
+from maneuver_automaton.search.arrays import (
+    CostTable,
+    DistanceGrid,
+    LatticeArrays,
+    LatticeSearch,
+    SearchArrays,
+    Task,
 )
+from maneuver_automaton.search.cost_to_go import NO_TABLE
+from maneuver_automaton.search.lattice_library import LatticeLibrary, coasts_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import SAMPLED_HEADINGS, Resolution, task_of
-from maneuver_automaton.search.scene import Scene
-from maneuver_automaton.words.library import NO_TRIM
+from maneuver_automaton.search.prepared import Prepared
+from maneuver_automaton.words.library import NO_TRIM, LibraryArrays, scratch_of
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, plan_of, with_price
 
+SMALLEST = 2048  # nodes
+MOST_SPARE = 4  # searches of one library whose arrays are kept
+LARGEST_SPARE = 1 << 15  # nodes of such a search, some 5 MB
+GROWN_S = 2.5e-7  # [s] that room for one node takes, what there is moved there
 FIRST_CHUNK = 64  # expansions
 TIMELY = 256  # expansions between two looks at what was found
 AT_FIRST = 200_000  # words steered at the first expansion for which one is a portion of its own
@@ -44,17 +50,17 @@ class Pass:
 
     query: LatticeQuery
     resolution: Resolution
-    task: Task
-    scene: Scene
-    grid: DistanceGrid
-    table: CostTable
-    arrays: SearchArrays
-    library: LatticeArrays
+    search: LatticeSearch
     pace: Pace
     chunk: int = FIRST_CHUNK
     alive: bool = True
     is_late: bool = False  # no time is left to make room for more nodes
-    untold: int = 0  # expansions that were done before it was asked to run
+    begun_with: int = 0  # expansions that were done before it was asked to run
+
+    @property
+    def arrays(self) -> SearchArrays:
+        """What is known so far."""
+        return self.search.arrays
 
     @property
     def expansions(self) -> int:
@@ -70,7 +76,7 @@ class Pass:
     def first_takes(self) -> float:
         """About how long the first expansion takes, which nobody can stop [s]."""
         begun = self.arrays.state[layout.BEGUN]
-        return 0.0 if begun else first_takes(self.library, self.task)
+        return 0.0 if begun else first_takes(self.search.library, self.search.task)
 
     @property
     def queries(self) -> int:
@@ -90,7 +96,8 @@ class Pass:
         """
         poses = self.arrays.nodes[: int(self.arrays.state[layout.N_NODES]), :3]
         best = (math.inf, math.inf)
-        for aim, free in zip(self.task.aims, self.task.aim_free, strict=True):
+        aims = self.search.task.aims
+        for aim, free in zip(aims.poses, aims.free, strict=True):
             if len(poses):
                 off = np.hypot(*(poses[:, :2] - aim[:2]).T)
                 near = off <= off.min() + SAME_PLACE
@@ -100,40 +107,29 @@ class Pass:
 
     def run(self, n: int, upper_bound: float, *, budget: Budget = UNLIMITED) -> Word | None:
         """Expand up to `n` more nodes; a plan, if one was found that costs less than the bound."""
-        left, self.untold = self.expansions - self.untold + n, 0
+        left, self.begun_with = self.expansions - self.begun_with + n, 0
         self.pace.go_on(budget)
         while self.may_expand and self.expansions < left and not budget.is_over:
-            if self.task.stop_at_first and self.arrays.state[layout.FOUND]:
+            if self.search.task.stop_at_first and self.arrays.state[layout.FOUND]:
                 break
             self._expand(min(left - self.expansions, TIMELY), upper_bound)
-            if self.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
+            if self.search.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
                 break
         return _word(self) if self.arrays.state[layout.FOUND] else None
 
     def _expand(self, n: int, upper_bound: float) -> None:
         """Expand up to `n` more nodes, a few at a time."""
-        left, stops = self.expansions + n, self.task.stop_at_first
+        left, stops = self.expansions + n, self.search.task.stop_at_first
         while self.alive and (step := self.pace.take(left - self.expansions)):
             used = int(self.arrays.state[layout.N_NODES])
-            most = used + self.library.most_children * (step + 1) + 2
+            most = used + self.search.library.most_children * (step + 1) + 2
             room = len(self.arrays.nodes)
             takes = GROWN_S * max(most, 2 * room)  # [s], to copy what there is
             self.is_late = most > room and takes > self.pace.budget.left
             if self.is_late:
                 return
-            self.arrays = with_room(self.arrays, most)
-            self.alive = bool(
-                kernels.expand(
-                    self.arrays,
-                    self.task,
-                    self.library,
-                    self.scene,
-                    self.grid,
-                    self.table,
-                    step,
-                    upper_bound,
-                )
-            )
+            self.search = self.search._replace(arrays=with_room(self.arrays, most))
+            self.alive = bool(kernels.expand(self.search, step, upper_bound))
             if self.expansions >= left or (stops and self.arrays.state[layout.FOUND]):
                 return
 
@@ -151,9 +147,9 @@ def pass_of(
     scaled = _with_coasts(query, resolution, sign)
     task = task_of(query, resolution, sign=sign)
     scene = query.scene(query.margin * resolution.margin)
-    room = arrays_for(query.prepared, query.library, len(task.roots) + 4, arrays)
-    pace = Pace(UNLIMITED, steps=first_steps(scaled, task))
-    return Pass(query, resolution, task, scene, grid, table, room, scaled, pace)
+    room = arrays_for(query.prepared, query.library, len(task.roots.poses) + 4, arrays)
+    search = LatticeSearch(room, task, scaled, scene, grid, table)
+    return Pass(query, resolution, search, Pace(UNLIMITED, steps=first_steps(scaled, task)))
 
 
 def first_steps(library: LatticeArrays, task: Task) -> int:
@@ -169,7 +165,7 @@ def first_takes(library: LatticeArrays, task: Task) -> float:
 def _steered(library: LatticeArrays, task: Task) -> int:
     """Words that are steered at the first expansion."""
     known = library.library
-    return max(len(known.tried.words) * (1 + len(known.tried.climbs)) * len(task.aims), 1)
+    return max(len(known.tried.words) * (1 + len(known.tried.climbs)) * len(task.aims.poses), 1)
 
 
 def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> LatticeArrays:
@@ -178,18 +174,18 @@ def _with_coasts(query: LatticeQuery, resolution: Resolution, sign: float) -> La
     if resolution.durations == 1.0 and query.least_coast == 0.0:
         return library
     twists = library.library.twists[: library.library.n_trims]
-    durations = library.edge_durations * resolution.durations
+    durations = library.coasts.durations * resolution.durations
     if query.least_coast > 0.0:  # no coast that would have to be gone on with
         lasting = np.asarray(twists.any(axis=1))[:, None] & (durations > 0.0)
         least = query.least_coast * np.array([1.0, LONGER])
         durations = np.where(lasting, np.maximum(durations, least), durations)
-    coasts = coasts_of(twists, sign * durations, library.body)
-    return library._replace(edge_durations=durations, **coasts._asdict())
+    coasts = coasts_of(twists, sign * durations, library.parts.body, durations)
+    return library._replace(coasts=coasts)
 
 
 def _word(one: Pass) -> Word:
     """The word that a search has found, from start to goal, at the prices of its library."""
-    arrays, library, query = one.arrays, one.library, one.query
+    arrays, library, query = one.arrays, one.search.library, one.query
     state, links = arrays.state.tolist(), arrays.links
     numbered = library.library
     words = numbered.tried.free_words if state[layout.FREE] else numbered.tried.words
@@ -208,11 +204,11 @@ def _word(one: Pass) -> Word:
         node = link[layout.PARENT]
         link = links[node].tolist()
     goal = state[layout.GOAL]
-    if one.task.sign < 0.0:
+    if one.search.task.sign < 0.0:
         roots = np.cumsum(np.where(query.free_heading, SAMPLED_HEADINGS, 1))
         goal = int(np.searchsorted(roots, link[layout.ROOT], side="right"))
         return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)
-    end = int(one.task.aim_trims[goal])
+    end = int(one.search.task.aims.trims[goal])
     return query.word_of(_with_maneuvers(query, path[::-1] + connection, end), goal)
 
 
@@ -226,11 +222,11 @@ def _with_maneuvers(
     last = [(NO_EDGE, end, 0.0)] if end >= 0 else []
     for n, (edge, trim, t) in enumerate([*steps, *last]):
         for link in [edge] if edge >= 0 else _edges_between(library.arrays, at, trim):
-            source = int(library.arrays.edge_source[link])
+            source = int(library.arrays.edges.source[link])
             if source != at:
                 found.append((SWITCH, int(library.trims[source]), 0.0))
-            at = int(library.arrays.edge_target[link])
-            found.append((int(library.edge_maneuver[link]), int(library.trims[at]), 0.0))
+            at = int(library.arrays.edges.target[link])
+            found.append((int(library.arrays.edges.maneuver[link]), int(library.trims[at]), 0.0))
         if t > 0.0 or (n == len(steps) and trim != at):
             found.append((SWITCH, int(library.trims[trim]), t))
             at = trim
@@ -239,13 +235,13 @@ def _with_maneuvers(
 
 def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int]:
     """Edges of the transition between two trims; none within a class, or where there is no trim."""
-    if min(source, target) < 0 or not len(library.edge_cost):
+    if min(source, target) < 0 or not len(library.edges.cost):
         return []
     edges: list[int] = []
     at, goal = (int(library.library.class_of[trim]) for trim in (source, target))
     while at != goal:
-        edges.append(int(library.via_edge[at, goal]))
-        at = int(library.library.class_of[library.edge_target[edges[-1]]])
+        edges.append(int(library.edges.via[at, goal]))
+        at = int(library.library.class_of[library.edges.target[edges[-1]]])
     return edges
 
 
@@ -277,4 +273,73 @@ def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
         plan,
         trims=(*plan.trims, problem.automaton.trims[rest]),
         durations=np.append(plan.durations, fixed - plan.duration),
+    )
+
+
+def search_arrays(library: LibraryArrays) -> SearchArrays:
+    """Room for a small search."""
+    n = SMALLEST
+    return SearchArrays(
+        nodes=np.empty((n, 9)),
+        links=np.empty((n, 7), dtype=np.int32),
+        table=np.zeros((4 * n, 2), dtype=np.int64),
+        heap_key=np.empty(n),
+        heap_node=np.empty(n, dtype=np.int64),
+        state=np.zeros(13, dtype=np.int64),
+        found=np.zeros(5),
+        scratch=scratch_of(library),
+    )
+
+
+def _spare(library: LatticeLibrary) -> list[SearchArrays]:
+    del library  # whoever asks keeps one list for each
+    return []
+
+
+def arrays_for(
+    prepared: Prepared, library: LatticeLibrary, nodes: int, known: SearchArrays | None = None
+) -> SearchArrays:
+    """Arrays in which nothing is searched, with room: `known` ones, or an earlier search's."""
+    if known is None:
+        try:
+            known = prepared.once(_spare, library).pop()
+        except IndexError:  # asked for before, another thread might take the last one
+            known = search_arrays(library.arrays.library)
+    search = with_room(known, nodes)
+    generation = search.state[layout.GENERATION] + 1  # frees all rows of the hash table at once
+    search.state[:] = 0
+    search.state[layout.GENERATION] = generation
+    search.found[0] = math.inf
+    return search
+
+
+def give_back(prepared: Prepared, library: LatticeLibrary, arrays: SearchArrays) -> None:
+    """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
+    spare = prepared.once(_spare, library)
+    if len(spare) < MOST_SPARE and len(arrays.nodes) <= LARGEST_SPARE:
+        spare.append(arrays)
+
+
+def with_room(search: SearchArrays, nodes: int) -> SearchArrays:
+    """A copy of a search in arrays that hold at least so many nodes; itself if it has room."""
+    n = len(search.nodes)
+    if nodes <= n:
+        return search
+    while n < nodes:
+        n *= 2
+    used = int(search.state[layout.N_NODES])
+    wide_nodes = np.empty((n, search.nodes.shape[1]))
+    wide_links = np.empty((n, search.links.shape[1]), dtype=np.int32)
+    wide_nodes[:used], wide_links[:used] = search.nodes[:used], search.links[:used]
+    queued = int(search.state[layout.HEAP])
+    heap_key, heap_node = np.empty(n), np.empty(n, dtype=np.int64)
+    heap_key[:queued], heap_node[:queued] = search.heap_key[:queued], search.heap_node[:queued]
+    table = np.zeros((4 * n, 2), dtype=np.int64)
+    layout.rehash(search.table, int(search.state[layout.GENERATION]), table)
+    return search._replace(
+        nodes=wide_nodes,
+        links=wide_links,
+        table=table,
+        heap_key=heap_key,
+        heap_node=heap_node,
     )

@@ -18,12 +18,18 @@ from maneuver_automaton.collision.convex import DIGITS
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem, SearchSettings
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
-from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.lattice_worlds import Ends, Worlds, ends_of, window_of, worlds_around
+from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 from maneuver_automaton.search.prepared import RECENT, Prepared
-from maneuver_automaton.search.scene import Scene, scene_of
+from maneuver_automaton.search.scene import (
+    Ends,
+    Worlds,
+    ends_of,
+    scene_of,
+    window_of,
+    worlds_around,
+)
 from maneuver_automaton.words.library import NO_TRIM
 from maneuver_automaton.words.word import Word, word_of_steps
 
@@ -41,8 +47,7 @@ class LatticeQuery:
 
     problem: Problem
     library: LatticeLibrary
-    world: World  # all obstacles, whatever their heights, around the largest part
-    plane: World  # obstacles at every altitude, around the first part
+    worlds: Worlds
     around: Scene  # that motions are tested against
     start: Array  # (4,)
     start_trim: int  # NO_TRIM: any will do
@@ -62,13 +67,23 @@ class LatticeQuery:
         return self.library.priced.automaton
 
     @property
+    def world(self) -> World:
+        """All obstacles, whatever their heights, around the largest part."""
+        return self.worlds.whole
+
+    @property
+    def plane(self) -> World:
+        """Obstacles at every altitude, around the first part."""
+        return self.worlds.plane
+
+    @property
     def settings(self) -> SearchSettings:
         """Cells, headings and weight of the lattice."""
         return self.problem.search
 
     @property
     def window(self) -> Array:
-        """Window (9,) as in `_kernels_window.inside_window`."""
+        """Window (9,) as in `_kernels_coast.inside_window`."""
         return self.around.window
 
     @property
@@ -169,8 +184,7 @@ def lattice_query(
     return LatticeQuery(
         problem=problem,
         library=library,
-        world=worlds.whole,
-        plane=worlds.plane,
+        worlds=worlds,
         around=scene_of(problem, library, worlds, window, margin=margin, level=aimed.level),
         start=aimed.seen[0],
         start_trim=int(aimed.trims[0]),
@@ -228,7 +242,11 @@ def _ends(problem: Problem, goals: Sequence[int], library: LatticeLibrary, world
     poses = np.concatenate([problem.start[None], *rows])
     level = float(poses[1, 3]) if poses.shape[1] > 3 else 0.0
     seen = _seen(worlds.whole, poses, level)
-    trims = _end_trims(problem, library, index)
+    trims, automaton = np.full(len(seen), NO_TRIM), library.priced.automaton
+    if not automaton.is_kinematic:
+        last = [problem.last_trim(problem.goals[k]).name for k in index]
+        numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
+        trims = np.asarray(library.number_of[numbers], dtype=np.int64)
     clear = _end_clearances(problem, library, worlds, seen, trims, level)
     # The clearance at one heading says nothing of a goal at which the vehicle may turn.
     if not turns and (clear[1:] > 0.0).any():
@@ -245,16 +263,6 @@ def _seen(world: World, poses: Array, level: float) -> Array:
     if poses.shape[1] > 3:
         seen[:, 3] = np.round(poses[:, 3] - level, DIGITS)
     return seen
-
-
-def _end_trims(problem: Problem, library: LatticeLibrary, index: IntArray) -> IntArray:
-    """Trims (1 + n,) at the start, and at these goals of the problem."""
-    automaton = library.priced.automaton
-    if automaton.is_kinematic:
-        return np.full(1 + len(index), NO_TRIM)
-    last = [problem.last_trim(problem.goals[k]).name for k in index]
-    numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
-    return np.asarray(library.number_of[numbers], dtype=np.int64)
 
 
 def _end_clearances(

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import plain
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import SearchSettings
 from maneuver_automaton.search._kernels_nodes import cells_along
-from maneuver_automaton.search.arrays import Task
+from maneuver_automaton.search.arrays import (
+    CellSizes,
+    Connecting,
+    EndArrays,
+    Estimates,
+    Task,
+    Truncation,
+    WordLimits,
+)
 from maneuver_automaton.search.distance_grid import OCTILE
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_library import LatticeLibrary
 from maneuver_automaton.search.lattice_query import LatticeQuery
 
 HEADINGS = 72
@@ -57,39 +64,46 @@ class Resolution:
     straight: bool = False  # whether estimates in the open are no longer than straight lines
 
 
+def limits_of(query: LatticeQuery) -> WordLimits:
+    """What a plan of a query has to keep."""
+    return WordLimits(
+        clock=float(query.start_time),
+        most_time=float(query.most_time),
+        stay_until=float(query.stay_until),
+        most_trims=int(query.most_trims),
+        least_coast=float(query.least_coast),
+    )
+
+
 def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -> Task:
     """Limits and sizes of a search, as the kernels see them."""
     x, y, heading, _ = query.goals[0].tolist()
-    start, goals = _ends(query)
-    aims, aim_trims, aim_free = goals if sign > 0.0 else start
-    roots, root_trims = start[:2] if sign > 0.0 else goal_roots(query)
+    none, start_trim = np.zeros(1, dtype=np.bool_), np.array([query.start_trim], dtype=np.int64)
+    start = EndArrays(np.array(query.start)[None], start_trim, none)
+    goal_trims = np.array(query.goal_trims, dtype=np.int64)
+    goals = EndArrays(np.array(query.goals), goal_trims, np.array(query.free_heading))
+    aims, roots = (goals, start) if sign > 0.0 else (start, goal_roots(query))
     timed = query.moves or math.isfinite(query.most_time)
     known, layers = _sizes(
         query.library, query.settings, resolution, timed, query.most_trims, query.least_coast
     )
+    cells, limits = known.cells, limits_of(query)
+    cells = cells._replace(frame=(x, y, heading, math.cos(heading), math.sin(heading)))
     least, most = query.interval
-    return Task(
-        **known,
+    back_off = float(max(back_off_of(query.library), 2.0 * query.margin))
+    return known._replace(
         sign=sign,
         roots=roots,
-        root_trims=root_trims,
         aims=aims,
-        aim_trims=aim_trims,
-        aim_free=aim_free,
-        lag=_lag(query.library, aim_trims),
-        frame_x=x,
-        frame_y=y,
-        frame_heading=heading,
-        frame_cos=math.cos(heading),
-        frame_sin=math.sin(heading),
-        radix=_radix(query, known, layers),
-        least_interval=least,
-        most_interval=most,
-        back_off=float(max(back_off_of(query.library), 2.0 * query.margin)),
-        clock=float(query.start_time),
-        most_time=float(query.most_time),
-        stay_until=float(query.stay_until),
+        cells=cells._replace(radix=_radix(query, cells, layers)),
+        estimates=known.estimates._replace(surplus=_surplus(query.library, aims.trims)),
+        connecting=known.connecting._replace(least_interval=least, most_interval=most),
+        truncation=known.truncation._replace(back_off=back_off),
+        limits=limits._replace(least_coast=limits.least_coast * (1.0 - ROUNDING)),
     )
+
+
+NO_ENDS = EndArrays(np.zeros((0, 4)), np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.bool_))
 
 
 @kept_by_first
@@ -100,40 +114,57 @@ def _sizes(
     timed: bool,
     most_trims: int,
     least_coast: float,
-) -> tuple[dict[str, Any], int]:
-    """What tasks of all queries share, by name, and the layers of their cells."""
+) -> tuple[Task, int]:
+    """What tasks of all queries share, their own values left open; the layers of their cells."""
     cell = resolution.scale * (settings.cell or library.cell)
     interval = FIRST_INTERVAL if resolution.coarse else INTERVAL
     sharp = interval * library.radius * library.per_metre
     by_gear, by_trim, by_count, layers = _layers(library, resolution, most_trims, least_coast)
-    lasting = library.arrays.edge_durations[library.arrays.edge_durations > 0.0]
+    durations = library.arrays.coasts.durations
+    lasting = durations[durations > 0.0]
     tick = resolution.durations * float(lasting.min()) if lasting.size else 1.0
-    task = dict[str, Any](
-        cell=float(cell),
-        headings=int(settings.headings or HEADINGS),
-        fine_cell=float(resolution.fine * cell),
-        fine_headings=FINE_HEADINGS,
-        rise=float(resolution.scale * RISE * library.radius),
-        tick=tick if timed else 0.0,  # of two nodes of a cell the costlier may be in time
-        weight=float(resolution.weight),
-        per_metre=float(library.per_metre) / (OCTILE if resolution.straight else 1.0),
-        per_climb=float(library.per_climb),
-        # The path to the goal says how long to wait, unless no trim moves: then nothing is solved
-        # for, and the node that ends at the goal must not be missed.
-        per_interval=(float(sharp) or 1.0) if library.drives else math.inf,
-        connection_factor=CONNECTION_FACTOR,
-        connection_slack=_slack(library),
-        tries=TRIES,
+    task = Task(
+        sign=1.0,
+        roots=NO_ENDS,
+        aims=NO_ENDS,
+        cells=CellSizes(
+            frame=(0.0, 0.0, 0.0, 1.0, 0.0),
+            cell=float(cell),
+            headings=int(settings.headings or HEADINGS),
+            fine_cell=float(resolution.fine * cell),
+            fine_headings=FINE_HEADINGS,
+            rise=float(resolution.scale * RISE * library.radius),
+            tick=tick if timed else 0.0,  # of two nodes of a cell the costlier may be in time
+            radix=(1, 1, 1, 1),
+            by_gear=by_gear,
+            by_trim=by_trim,
+            by_count=by_count,
+        ),
+        estimates=Estimates(
+            weight=float(resolution.weight),
+            per_metre=float(library.per_metre) / (OCTILE if resolution.straight else 1.0),
+            per_climb=float(library.per_climb),
+            surplus=np.zeros(0),
+        ),
+        connecting=Connecting(
+            # The path to the goal says how long to wait, unless no trim moves: then nothing is
+            # solved for, and the node that ends at the goal must not be missed.
+            per_interval=(float(sharp) or 1.0) if library.drives else math.inf,
+            least_interval=0.0,
+            most_interval=math.inf,
+            factor=CONNECTION_FACTOR,
+            slack=_slack(library),
+            tries=TRIES,
+            checks_words=bool(most_trims > 0 or least_coast > 0.0 or library.limits_coasts),
+        ),
+        truncation=Truncation(
+            kept=resolution.truncated,
+            back_off=0.0,
+            shortest=float(SHORTEST_TRUNCATED * _size(library)),
+        ),
+        limits=WordLimits(0.0, math.inf, -math.inf, 0, 0.0),
         stop_at_first=bool(resolution.stop),
         ends_early=bool(resolution.ends_early),
-        truncated=resolution.truncated,
-        shortest_truncated=float(SHORTEST_TRUNCATED * _size(library)),
-        most_trims=int(most_trims),
-        least_coast=float(least_coast * (1.0 - ROUNDING)),
-        checks_words=bool(most_trims > 0 or least_coast > 0.0 or library.limits_coasts),
-        by_gear=by_gear,
-        by_trim=by_trim,
-        by_count=by_count,
     )
     return task, layers
 
@@ -154,35 +185,28 @@ def _layers(
     return by_gear, by_trim, by_count, layers * (numbered.n_trims + 1 if by_trim else 1)
 
 
-def goal_roots(query: LatticeQuery) -> tuple[Array, IntArray]:
+def goal_roots(query: LatticeQuery) -> EndArrays:
     """Poses (R, 4) at the goals, a few headings where any will do, and their trims."""
+    none = np.zeros(len(query.goals), dtype=np.bool_)
     if not query.free_heading.any():
-        return np.array(query.goals), np.array(query.goal_trims, dtype=np.int64)
-    rows, trims = [], []
+        trims = np.array(query.goal_trims, dtype=np.int64)
+        return EndArrays(np.array(query.goals), trims, none)
+    rows, numbers = [], []
     for goal, free, trim in zip(query.goals, query.free_heading, query.goal_trims, strict=True):
         turns = np.arange(SAMPLED_HEADINGS if free else 1) * (2.0 * np.pi / SAMPLED_HEADINGS)
         rows += [goal + np.array([0.0, 0.0, turn, 0.0]) for turn in turns]
-        trims += [int(trim)] * len(turns)
-    return np.array(rows), np.array(trims, dtype=np.int64)
+        numbers += [int(trim)] * len(turns)
+    none = np.zeros(len(rows), dtype=np.bool_)
+    return EndArrays(np.array(rows), np.array(numbers, dtype=np.int64), none)
 
 
-_End = tuple[Array, IntArray, NDArray[np.bool_]]
-
-
-def _ends(query: LatticeQuery) -> tuple[_End, _End]:
-    """Poses, trims, and whether any heading will do, at the start and at the goals."""
-    start = np.array(query.start)[None], np.array([query.start_trim], dtype=np.int64)
-    goals = np.array(query.goals), np.array(query.goal_trims, dtype=np.int64)
-    return (*start, np.zeros(1, dtype=np.bool_)), (*goals, np.array(query.free_heading))
-
-
-def _lag(library: LatticeLibrary, aim_trims: IntArray) -> Array:
+def _surplus(library: LatticeLibrary, aim_trims: IntArray) -> Array:
     """Least surplus (m + 1,) of maneuvers from each trim, and from none, to an aim's trim."""
     numbered = library.arrays.library
     classes = numbered.class_of
-    if not library.lags:
+    if not library.surplus.any():
         return np.zeros(1 + numbered.n_trims)
-    to_aims = library.lag[:, classes[aim_trims]].min(axis=1)
+    to_aims = library.surplus[:, classes[aim_trims]].min(axis=1)
     return np.append(to_aims[classes[: numbered.n_trims]], to_aims[0])
 
 
@@ -194,21 +218,21 @@ def _slack(library: LatticeLibrary) -> float:
     return float(path + prices) if path > 0.0 else math.inf
 
 
-def _radix(query: LatticeQuery, task: dict[str, Any], layers: int) -> tuple[int, int, int, int]:
+def _radix(query: LatticeQuery, cells: CellSizes, layers: int) -> tuple[int, int, int, int]:
     """Numbers that coordinates of cells need; far cells may share one, which drops no proof."""
     low_x, low_y, high_x, high_y = query.box.tolist()
     far = max(high_x - low_x, high_y - low_y)  # no pose of the window is farther from the frame
-    turns = max(task["headings"], task["fine_headings"]) + 1
+    turns = max(cells.headings, cells.fine_headings) + 1
     levels = MOST_LEVELS if query.library.climbs else 1
-    ticks = MOST_TICKS if task["tick"] > 0.0 else 1
+    ticks = MOST_TICKS if cells.tick > 0.0 else 1
     others = layers * 2 * ticks * levels * turns  # two: truncated edges have cells of their own
-    return plain(cells_along)(task["fine_cell"], far, others), turns, levels, ticks
+    return plain(cells_along)(cells.fine_cell, far, others), turns, levels, ticks
 
 
 def numbers_of_cells(query: LatticeQuery, task: Task, resolution: Resolution) -> int:
     """How many numbers the cells of one place need: the `others` of `cells_along`."""
     *_, layers = _layers(query.library, resolution, query.most_trims, query.least_coast)
-    _, turns, levels, ticks = task.radix
+    _, turns, levels, ticks = task.cells.radix
     return layers * 2 * ticks * levels * turns
 
 

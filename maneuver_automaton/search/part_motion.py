@@ -18,6 +18,7 @@ from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.body import Body, body_of, fastest_points
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver
+from maneuver_automaton.search.arrays import BodyArrays
 
 CLOSE = 0.02  # [half widths of the body] that a piece of constant twist may be off
 BETWEEN = 0.25  # of the change of twist from sample to sample times their spacing
@@ -30,18 +31,6 @@ class Part:
     shapes: tuple[Shape, ...]  # in the frame of the part
     trim_poses: Array  # (m, 3) seen from the vehicle, in every trim
     course_poses: tuple[Array, ...]  # (n, 3) each, at the samples of every maneuver's course
-
-
-class BodyArrays(NamedTuple):
-    """Bodies of all parts, one after the other, as in `Body`."""
-
-    edges: Array
-    first: IntArray
-    radius: Array
-    discs: Array
-    piece_of: IntArray  # (P + 1,) first piece of each part
-    disc_of: IntArray  # (P + 1,)
-    sizes: Array  # (P, 5) middle x, middle y, reach, inscribed, half width
 
 
 class Pieces(NamedTuple):

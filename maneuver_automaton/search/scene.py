@@ -1,8 +1,9 @@
-"""The scene that motions of a search are tested against: obstacles, zones, and the window."""
+"""What motions of a search are tested against: the worlds of a map, zones, and the window."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,29 +11,178 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_by_first
-from maneuver_automaton.collision import Zone
+from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
+from maneuver_automaton.collision.advancement import clearances
+from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.convex import DIGITS
-from maneuver_automaton.collision.layers import ROUNDED, LayerArrays, layer_arrays
+from maneuver_automaton.collision.heights import Layer
+from maneuver_automaton.collision.layers import (
+    ROUNDED,
+    LayerArrays,
+    always,
+    bands_of,
+    layer_arrays,
+)
+from maneuver_automaton.collision.world import World, frame_at_first, world_of
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
-from maneuver_automaton.search.lattice_worlds import Worlds
+from maneuver_automaton.problem import Bounds, Problem
+from maneuver_automaton.search.arrays import Scene
+from maneuver_automaton.search.lattice_library import LatticeLibrary
+from maneuver_automaton.search.part_motion import Part
+from maneuver_automaton.search.prepared import RECENT, Prepared
+
+CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
+_Shapes = tuple[Shape, ...]
 
 
-class Scene(NamedTuple):
-    """Where a motion is free, as the kernels see it."""
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Worlds:
+    """A map around the largest part of a vehicle, in one frame."""
 
-    layers: LayerArrays  # a planar world for every range of altitudes, then one for every zone
-    keep: float  # [m] distance kept from obstacles ...
-    margin: float  # [m] ... and the clearance beyond it that a proof needs
-    far: float  # [m] clearance where no obstacle is near
-    window: Array  # (9,) as in `_kernels_window.inside_window`
-    edge_window: Array  # (9,) narrower by the deviation of the courses of maneuvers
-    lowest: float  # [m] altitudes within the bounds
-    highest: float
-    zone_trims: NDArray[np.bool_]  # (Z, m) trims that a zone admits
-    zone_pieces: NDArray[np.bool_]  # (Z, N) pieces of maneuvers that a zone admits
+    whole: World  # all obstacles, whatever their heights
+    plane: World  # obstacles at every altitude within the bounds, around the first part
+    bands: tuple[Layer, ...]  # obstacles between neighbouring heights, in the problem's altitudes
+    between: tuple[World, ...]  # the worlds of these
+    zones: tuple[World, ...]  # every zone as if it were an obstacle
+    outer: World  # all obstacles and all zones, so that paths lead round them
+    flat: LayerArrays | None  # they as arrays, where heights do not matter
+
+
+class Ends(NamedTuple):
+    """Start and goals of a problem in the plane, as the world around its body sees them."""
+
+    poses: Array  # (1 + n, 3) seen from the world's frame [m, m, rad]
+    clearances: Array  # (1 + n,) to what stands there, a lower bound as in `clearances` [m]
+
+
+@kept_by_first
+def ends_of(problem: Problem) -> Ends:
+    """Start and goals of a problem in the plane; nothing of it moves, and no part is carried."""
+    world = world_around(problem)
+    poses = world.into(np.array([problem.start, *(goal.pose for goal in problem.goals)]))
+    return Ends(poses, clearances(world, poses))
+
+
+def world_around(problem: Problem) -> World:
+    """The obstacles of a problem around its footprint, prepared once for a map."""
+    return _world(problem.setting, _frame(problem))
+
+
+@kept_by_first
+def _world(setting: Problem, frame: tuple[float, ...]) -> World:
+    return world_of(setting.obstacles, setting.footprint, frame, keep=setting.margin)
+
+
+def _frame(problem: Problem) -> tuple[float, ...]:
+    """The frame of the worlds of a problem."""
+    return _frame_on(problem.setting) or tuple(problem.goals[0].pose[:3].tolist())
+
+
+@kept_by_first
+def _frame_on(setting: Problem) -> tuple[float, ...]:
+    return frame_at_first(setting.obstacles)
+
+
+def worlds_around(
+    problem: Problem, parts: tuple[Part, ...], *, prepared: Prepared = RECENT
+) -> Worlds:
+    """The obstacles and zones of a problem around the parts of its vehicle."""
+    return _worlds_on(problem.setting, parts, _frame(problem), prepared)
+
+
+@kept_by_first
+def _worlds_on(
+    setting: Problem, parts: tuple[Part, ...], frame: tuple[float, ...], prepared: Prepared
+) -> Worlds:
+    low, high = setting.bounds.z or (-math.inf, math.inf)
+    below, above = setting.body_height
+    return prepared.once(
+        _worlds,
+        setting.obstacles,
+        setting.zones,
+        tuple(part.shapes for part in parts),
+        frame,
+        (low + below, high + above) if setting.start.size > 3 else None,
+        keep=setting.margin,
+    )
+
+
+def _worlds(
+    obstacles: tuple[AnyObstacle, ...],
+    zones: tuple[Zone, ...],
+    bodies: tuple[_Shapes, ...],
+    frame: tuple[float, ...],
+    heights: tuple[float, float] | None,
+    *,
+    keep: float,
+) -> Worlds:
+    """`heights` [m]: lowest and highest point of the vehicle within the bounds; None in a plane."""
+    largest = max(bodies, key=lambda shapes: body_of(shapes).reach)
+
+    def around(these: tuple[AnyObstacle, ...]) -> World:
+        return world_of(these, largest, frame, keep=keep)
+
+    bands = bands_of(obstacles, in_space=heights is not None)
+    whole = around(obstacles)
+    plane = whole if heights is None else around(always(obstacles, low=heights[0], high=heights[1]))
+    plane = replace(plane, body=body_of(bodies[0]))
+    solid = tuple(Obstacle(zone.shape) for zone in zones)
+    between = tuple(around(band.obstacles) for band in bands)
+    beside = tuple(around((one,)) for one in solid)
+    everywhere = np.full(len(between) + len(beside), np.inf)
+    return Worlds(
+        whole=whole,
+        plane=plane,
+        bands=bands,
+        between=between,
+        zones=beside,
+        outer=around((*obstacles, *solid)) if solid else whole,
+        flat=None
+        if heights is not None
+        else layer_arrays([*between, *beside], low=-everywhere, high=everywhere, plane=plane),
+    )
+
+
+def pad_around(world: World, radius: float) -> float:
+    """How far [m] a window without bounds goes beyond all that stands, and the ends."""
+    return 4.0 * radius + 4.0 * world.body.reach
+
+
+def window_of(
+    bounds: Bounds, world: World, poses: Array, *, radius: float
+) -> tuple[Array, Array, bool]:
+    """The window to search: the bounds, and where there are none, a box around everything.
+
+    A box (4,) in the world's frame, a window as in `_kernels_coast.inside_window`, and whether
+    the window's rim is a wall on every side. `poses` (n, 3 or more) lie inside.
+    """
+    pad = pad_around(world, radius)
+    # Plain numbers: arrays of two take longer than a first plan may.
+    low_x, low_y, high_x, high_y = world.box.tolist()
+    xs, ys = poses[:, 0].tolist(), poses[:, 1].tolist()
+    low_x, low_y = min(low_x, *xs) - pad, min(low_y, *ys) - pad
+    high_x, high_y = max(high_x, *xs) + pad, max(high_y, *ys) + pad
+    if bounds.x is None and bounds.y is None:
+        window = np.array([low_x, low_y, high_x, high_y, 0.0, 0.0, 1.0, 0.0, 0.0])
+        return window[:4], window, False
+    low, high = np.array([low_x, low_y]), np.array([high_x, high_y])
+    turn = float(world.frame[2])
+    c, s = math.cos(turn), math.sin(turn)
+    corners = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    seen = corners @ np.array([[c, s], [-s, c]])  # along the axes of the problem
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    for axis, pair in enumerate((bounds.x, bounds.y)):
+        if pair is not None:
+            low[axis], high[axis] = pair[0] - world.frame[axis], pair[1] - world.frame[axis]
+    slack = 1e-9 * (1.0 + float(np.abs(np.append(low, high)).max()))
+    window = np.array([low[0], low[1], high[0], high[1], 0.0, 0.0, c, s, slack])
+    inner = np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
+    back = np.asarray(SE2(np.array([0.0, 0.0, -turn])).act(inner))
+    # What lies on a bound is inside of it, wherever its place is rounded to.
+    box = np.concatenate([back.min(axis=0) - slack, back.max(axis=0) + slack])
+    return box, window, bounds.x is not None and bounds.y is not None
 
 
 def scene_of(
@@ -107,11 +257,11 @@ def _layers(problem: Problem, worlds: Worlds, pad: float, level: float) -> Layer
 def _admitted_pieces(problem: Problem, library: LatticeLibrary) -> NDArray[np.bool_]:
     """Which pieces of the motion of each part along edges each zone admits, (Z, N)."""
     automaton, spans = library.priced.automaton, library.spans
-    first, n_parts = library.arrays.first_piece, library.arrays.n_parts
-    n_edges = len(library.edge_maneuver)
+    first, n_parts = library.arrays.pieces.first, library.arrays.parts.n
+    n_edges = len(library.arrays.edges.maneuver)
     admitted = np.zeros((len(problem.zones), len(spans)), dtype=np.bool_)
     for z, zone in enumerate(problem.zones):
-        for edge, k in enumerate(library.edge_maneuver.tolist()):
+        for edge, k in enumerate(library.arrays.edges.maneuver.tolist()):
             maneuver = automaton.maneuvers[k]
             if maneuver.course is None:
                 continue

@@ -25,12 +25,18 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_state_lattice as kernels
-from maneuver_automaton.search.arrays import Aims, FreeCosts, GraphArrays, StateLattice, Tested
+from maneuver_automaton.search.arrays import (
+    Aims,
+    FreeCosts,
+    GraphArrays,
+    GraphQuery,
+    StateLattice,
+    Tested,
+)
 from maneuver_automaton.search.free_costs import UNKNOWN, FreeTable
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
 from maneuver_automaton.search.lattice_goals import EXACT, at_headings, cells_within, facing
-from maneuver_automaton.search.lattice_library import library_of_trims
-from maneuver_automaton.search.lattice_memory import GROWN_S
+from maneuver_automaton.search.lattice_library import LatticeLibrary, library_of_trims
+from maneuver_automaton.search.lattice_pass import GROWN_S
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.prepared import Prepared
@@ -196,21 +202,21 @@ def _states(
     assert model is not None
     assert cost is not None
     heading = np.array([model.heading(automaton.trims[k].reduced_state) for k in library.trims])
-    source, target = arrays.edge_source, arrays.edge_target
-    ends = (SE2(facing(heading[source])) @ SE2(arrays.edge_displacement[:, :3])).pose
+    source, target = arrays.edges.source, arrays.edges.target
+    ends = (SE2(facing(heading[source])) @ SE2(arrays.edges.displacement[:, :3])).pose
     step = np.round(ends[:, :2] / model.resolution)
     off = np.abs(ends[:, :2] - step * model.resolution).max(initial=0.0)
     turned = np.abs(wrapped(ends[:, 2] - heading[target])).max(initial=0.0)
     directed = 3 if cost.direction_change > 0.0 else 1
     exact = max(off, turned) <= EXACT and directed * len(heading) <= MOST_STATES
-    if not exact or not np.array_equal(fine.edge_maneuver, library.edge_maneuver):
+    if not exact or not np.array_equal(fine.arrays.edges.maneuver, arrays.edges.maneuver):
         return None
     rows = []  # state, target, edge, cost
-    for e, k in enumerate(library.edge_maneuver.tolist()):
+    for e, k in enumerate(arrays.edges.maneuver.tolist()):
         driven = problem.velocities_along(automaton.maneuvers[k])
         signs = np.sign(driven[:, 0])
         signs = signs[signs != 0.0].astype(int)
-        price = float(arrays.edge_cost[e]) + cost.switching(driven) + cost.switch
+        price = float(arrays.edges.cost[e]) + cost.switching(driven) + cost.switch
         for gear in range(directed):
             before, after = (0, 1, -1)[gear], gear
             if len(signs) and directed > 1:
@@ -224,9 +230,9 @@ def _states(
     begins, targets, edges = np.array([row[:3] for row in rows], dtype=np.int64).reshape(-1, 3).T
     first, _ = _by_state(begins, directed * len(heading))
     into_first, into_edge = _by_state(targets, directed * len(heading))
-    along = fine.arrays
-    lengths = along.piece_speed * along.piece_time + 2.0 * along.piece_error
-    pose_pieces = along.first_piece[along.n_parts * len(along.edge_cost) : -1]
+    along = fine.arrays.pieces
+    lengths = along.speed * along.time + 2.0 * along.error
+    pose_pieces = along.first[fine.arrays.parts.n * len(fine.arrays.edges.cost) : -1]
     lattice = StateLattice(
         cell=float(model.resolution),
         frame=(0.0, 0.0, 0.0, 1.0, 0.0),
@@ -438,18 +444,14 @@ class GraphSearch:
             if not step or not self._makes_room():
                 return
             self.alive = bool(
-                kernels.expand_lattice(
-                    self.arrays,
-                    graph.lattice,
-                    graph.aims,
-                    self.free,
-                    graph.coarse,
-                    graph.fine,
-                    self.weight,
-                    step,
-                    upper_bound + graph.surcharge,
-                )
+                kernels.expand_lattice(self._asked, step, upper_bound + graph.surcharge)
             )
+
+    @property
+    def _asked(self) -> GraphQuery:
+        graph, free, weight = self.graph, self.free, self.weight
+        tested = graph.coarse, graph.fine
+        return GraphQuery(self.arrays, graph.lattice, graph.aims, free, *tested, weight)
 
     def look_ahead(self, budget: Budget) -> None:
         """Find more of the costs without obstacles, and order the open list by them."""
@@ -471,7 +473,7 @@ class GraphSearch:
         roots = graph.lattice.roots.copy()
         roots[:, :2] -= base
         self.free = graph.tables[key].around(roots, base, most, budget)
-        kernels.rank_anew(self.arrays, graph.lattice, graph.aims, self.free, self.weight)
+        kernels.rank_anew(self._asked)
 
     def _makes_room(self) -> bool:
         """Widen the arrays that are full; whether there is time to do so."""
@@ -508,6 +510,6 @@ class GraphSearch:
         at = graph.query.start_trim
         steps = [(SWITCH, int(library.trims[at]), 0.0)]
         for edge in edges[::-1] if forwards else edges:
-            trim = int(library.trims[library.arrays.edge_target[edge]])
-            steps.append((int(library.edge_maneuver[edge]), trim, 0.0))
+            trim = int(library.trims[library.arrays.edges.target[edge]])
+            steps.append((int(library.arrays.edges.maneuver[edge]), trim, 0.0))
         return graph.query.word_of(steps, 0), graph.goal_index[aim]

@@ -8,9 +8,10 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.chain import coasted
 from maneuver_automaton.search import _kernels_waiting as kernels
-from maneuver_automaton.search.arrays import PathArrays
+from maneuver_automaton.search.arrays import PathArrays, PathSearch
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
+from maneuver_automaton.search.lattice_task import limits_of
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
@@ -108,16 +109,16 @@ def _path_of(
         latest=np.full(len(trims) + 1, -1, dtype=np.int64),
         keys=np.empty(states),
         items=np.empty(states, dtype=np.int64),
+        state=np.zeros(2, dtype=np.int64),
     )
 
 
 def _arrival(query: LatticeQuery, path: PathArrays, rest: int) -> int:
     """The state in which a path ends first, if it may wait in the trim `rest`; -1 for none."""
     quiet = max(query.world.last_event - query.problem.start_time, 0.0)
-    clock, most, stay = float(query.start_time), float(query.most_time), float(query.stay_until)
-    clocks = clock, most, stay, quiet
-    state = kernels.earliest_arrival(query.library.arrays, query.scene(), clocks, path, rest, TICK)
-    return int(state)
+    library, limits = query.library.arrays, limits_of(query)
+    search = PathSearch(path, library, query.scene(), limits, quiet, rest, TICK)
+    return int(kernels.earliest_arrival(search))
 
 
 def _inside(window: Array, poses: Array, twists: Array, durations: Array) -> bool:

@@ -145,8 +145,8 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
     settings = SearchSettings(cell=0.31, headings=36, weight=1.3)
     query = lattice_query(posed(search=settings), (0,))
     first = task_of(query, Resolution())
-    assert (first.cell, first.headings) == (0.31, 36)
-    assert task_of(query, Resolution(scale=0.5)).cell == 0.155
+    assert (first.cells.cell, first.cells.headings) == (0.31, 36)
+    assert task_of(query, Resolution(scale=0.5)).cells.cell == 0.155
     weights = []
     monkeypatch.setattr(
         lattice, "pass_of", lambda *a, **k: weights.append(a[1].weight) or pass_of(*a, **k)

@@ -15,7 +15,7 @@ from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import Planner, plan, result
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import cost_to_go, lattice_library, lattice_worlds, prepared
+from maneuver_automaton.search import cost_to_go, lattice_library, prepared, scene
 from tests import inertia, scenes
 from tests.search.cases import TABLE_2, robot
 
@@ -73,7 +73,7 @@ def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
         (result, "FclChecker"),
         (result, "surroundings_around"),
         (lattice_library, "_library"),
-        (lattice_worlds, "_worlds"),
+        (scene, "_worlds"),
         (cost_to_go, "_kept"),
     )
     for kind in kinds:

@@ -11,7 +11,7 @@ from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
-from maneuver_automaton.search._kernels_maneuver import edge_end, edge_free
+from maneuver_automaton.search._kernels_connection import edge_end, edge_free
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.result import SearchStatus
 from maneuver_automaton.words.transitions import SWITCH
@@ -95,7 +95,7 @@ def word_free(scene, lib, start, edges, trims, durations, clock):
             if not edge_free(scene, lib, edges[k], pose, clock):
                 return False
             pose = edge_end(lib, edges[k], pose)
-            clock += lib.edge_time[edges[k]]
+            clock += lib.edges.time[edges[k]]
         if durations[k] > 0.0:
             trim, t = trims[k], durations[k]
             if not coast_inside(scene, lib, trim, pose, t):

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from maneuver_automaton.search._kernels_cells import EMPTY, enter, first_slot
+from maneuver_automaton.search._kernels_nodes import EMPTY, enter, first_slot
 
 enter_one = getattr(enter, "py_func", enter)
 begin = getattr(first_slot, "py_func", first_slot)

@@ -19,7 +19,7 @@ from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario.automata import TABLE_2
 from maneuver_automaton.search import cost_to_go
-from maneuver_automaton.search._kernels_table import fill_table
+from maneuver_automaton.search._kernels_estimate import fill_table
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.prepared import RECENT
@@ -38,7 +38,7 @@ SIX = np.array([[v, 0.0, v * w] for v in (1.0, -1.0) for w in (1.0, 0.0, -1.0)])
 
 @pytest.mark.parametrize("n", [1, 2, 4])
 def test_the_table_is_that_of_a_dictionary(n):
-    got = fill_table(ODD[:n], RATES[:n], EDGE_DURATIONS[:n], CELL, HALF, HEADINGS, False)
+    got = fill_table(ODD[:n], RATES[:n], EDGE_DURATIONS[:n], CELL, (HEADINGS, HALF), False)
     slow = cost_table(ODD[:n], RATES[:n], EDGE_DURATIONS[:n], CELL, HALF, HEADINGS)
     assert np.array_equal(np.isinf(got), np.isinf(slow))
     known = np.isfinite(slow)
@@ -51,7 +51,7 @@ def test_mirrored_and_whole_agree():
     edge_durations = np.tile([0.15, 0.31, 0.62], (6, 1))
     rates = np.full(6, 1.0)
     half = 16
-    shared = (SIX, rates, edge_durations, 0.15, half, 36)
+    shared = (SIX, rates, edge_durations, 0.15, (36, half))
     whole, mirrored = fill_table(*shared, False), fill_table(*shared, True)
     image = mirrored[(36 - np.arange(36)) % 36, ::-1]
     assert np.array_equal(mirrored, image)

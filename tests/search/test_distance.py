@@ -29,13 +29,15 @@ def grid_and_world(footprint, obstacles, seeds, aim, *, pad=3.0):
 
 
 def centres(grid):
-    x = grid.origin_x + (np.arange(grid.columns) + 0.5) * grid.cell
-    y = grid.origin_y + (np.arange(grid.rows) + 0.5) * grid.cell
+    x = grid.layout.origin_x + (np.arange(grid.layout.columns) + 0.5) * grid.layout.cell
+    y = grid.layout.origin_y + (np.arange(grid.layout.rows) + 0.5) * grid.layout.cell
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
 
 def cells_of(grid, places):
-    at = np.floor((places[:, :2] - [grid.origin_x, grid.origin_y]) / grid.cell).astype(int)
+    at = np.floor(
+        (places[:, :2] - [grid.layout.origin_x, grid.layout.origin_y]) / grid.layout.cell
+    ).astype(int)
     return [(int(j), int(i)) for i, j in at]
 
 
@@ -50,7 +52,7 @@ def test_asked_in_any_order_it_is_dijkstra(seed):
     clear = centre_clearances(grid, field)
     price = np.where(clear < world.body.inscribed, NARROW, 1.0)
     open_, begins = cells_open(grid, field), cells_of(grid, seeds)
-    expected = grid_distances(open_, price, grid.cell, begins).ravel()
+    expected = grid_distances(open_, price, grid.layout.cell, begins).ravel()
     assert np.isinf(expected).any()
     some = rng.permutation(len(expected))
     for batch in np.array_split(some, 5):
@@ -70,7 +72,7 @@ def test_little_is_looked_at_where_little_is_asked():
                                     [10.0, 0.0, 0.0], pad=20.0)  # fmt: skip
     here = world.into(np.array([[10.0, 0.0, 0.0]]))[:, :2]
     (way,) = distances(grid, world.arrays.field, np.ascontiguousarray(here))
-    assert 10.0 - 2 * grid.cell <= way <= 11.0
+    assert 10.0 - 2 * grid.layout.cell <= way <= 11.0
     assert grid.state[1] < 0.2 * grid.value.size
 
 
@@ -85,7 +87,7 @@ def test_beside_a_wall_no_more_is_looked_at_and_the_value_is_that_of_all():
 
     grid, world, _ = fresh()
     field = world.arrays.field
-    cut = np.flatnonzero(centre_clearances(grid, field).ravel() < grid.cut)
+    cut = np.flatnonzero(centre_clearances(grid, field).ravel() < grid.walls.cut)
     asked = rng.permutation(cut)[:40]
     one_by_one, looked_at = [], []
     for place in centres(grid)[asked]:
@@ -112,8 +114,8 @@ def test_no_free_pose_is_in_a_blocked_cell(name):
         some = closed[rng.integers(len(closed), size=300)]
         inside = rng.uniform(0.0, 1.0, (300, 2))
         inside[:80] = rng.integers(0, 2, (80, 2))  # corners of cells
-        origin = np.array([grid.origin_x, grid.origin_y])
-        places = origin + grid.cell * (some[:, ::-1] + inside)
+        origin = np.array([grid.layout.origin_x, grid.layout.origin_y])
+        places = origin + grid.layout.cell * (some[:, ::-1] + inside)
         turns = rng.uniform(-math.pi, math.pi, 300)
         poses = (SE2(world.frame) @ SE2(np.column_stack([places, turns]))).pose
         assert shapely_world(footprint, obstacles).clearance(poses).max() <= 1e-9
@@ -123,13 +125,13 @@ def test_no_free_pose_is_in_a_blocked_cell(name):
 def test_a_point_is_in_no_cell_deep_inside():
     grid, world, _ = grid_and_world((), [Obstacle(Box([4.0, 4.0]))], [9, 0, 0], [-9, 0, 0])
     closed = ~cells_open(grid, world.arrays.field)
-    assert closed.sum() * grid.cell**2 == pytest.approx(16.0, rel=0.25)
+    assert closed.sum() * grid.layout.cell**2 == pytest.approx(16.0, rel=0.25)
 
 
 def test_without_obstacles_there_is_no_grid():
     world = world_around(CAR, [])
     grid = distance_grid(world, np.array([-9.0, -9.0, 9.0, 9.0]), np.zeros((1, 3)), np.ones(3))
-    assert (grid.columns, grid.rows) == (0, 0)
+    assert (grid.layout.columns, grid.layout.rows) == (0, 0)
 
 
 def test_a_closed_ring_lets_nothing_out_and_an_open_one_does():
@@ -150,10 +152,10 @@ def test_many_cells_are_made_larger():
     posts = [Obstacle(Disc(0.05, [x, y])) for x, y in ((0, 0), (0, 400), (400, 0), (400, 400))]
     grid, world, _ = grid_and_world((Disc(0.2),), posts, [10, 10, 0], [390, 390, 0])
     assert grid.value.size <= 1_200_000
-    assert grid.stride % 2 == 1
+    assert grid.layout.stride % 2 == 1
     field = world.arrays.field
     # centres of cells are centres of cells of the field
-    off = (grid.origin_x + 0.5 * grid.cell - field.origin_x) / field.cell - 0.5
+    off = (grid.layout.origin_x + 0.5 * grid.layout.cell - field.origin_x) / field.cell - 0.5
     assert off == pytest.approx(round(off), abs=1e-6)
 
 
@@ -194,7 +196,7 @@ def test_a_small_body_is_not_led_through_a_thin_wall(radius):
     places = world.into(np.array([start, [50.0, 51.0, 0.0]]))[:, :2]
     far, near = distances(grid, world.arrays.field, np.ascontiguousarray(places))
     assert far > 100.0  # round the wall; straight through it are 7 m
-    assert near == pytest.approx(1.0, abs=2.0 * grid.cell)
+    assert near == pytest.approx(1.0, abs=2.0 * grid.layout.cell)
 
 
 def test_a_gap_that_the_cells_cannot_show_is_no_wall():
@@ -204,6 +206,6 @@ def test_a_gap_that_the_cells_cannot_show_is_no_wall():
     grid, world, _ = grid_and_world(
         (Disc(0.02),), [*gap, *ring, *floor], np.array([0.0, 10.0, 0.0]), np.zeros(3)
     )
-    assert grid.cell > 0.2  # the gap is 0.1 m wide
+    assert grid.layout.cell > 0.2  # the gap is 0.1 m wide
     (way,) = distances(grid, world.arrays.field, world.into(np.zeros((1, 3)))[:, :2].copy())
     assert np.isfinite(way)  # what is not proven to be closed may be open

@@ -20,13 +20,14 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.lattice import distance_grids, first_plan
-from maneuver_automaton.search.lattice_memory import (
+from maneuver_automaton.search.lattice_pass import (
     GROWN_S,
     SMALLEST,
+    pass_of,
     search_arrays,
+    with_cost,
     with_room,
 )
-from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import AT_WILL, Resolution, task_of
 from maneuver_automaton.words.transitions import SWITCH
@@ -269,7 +270,7 @@ def test_arrays_grow_and_forget_nothing():
     assert len(wide.nodes) >= 5 * len(one.arrays.nodes)
     assert np.array_equal(wide.nodes[:used], nodes)
     assert np.array_equal(wide.links[:used], links)
-    one.arrays = wide
+    one.search = one.search._replace(arrays=wide)
     one.run(20, math.inf)
     other, _, _ = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400) + 20)
     more = int(wide.state[layout.N_NODES])
@@ -332,12 +333,13 @@ def test_cells_have_numbers_of_64_bits_however_many_there_are():
         search=SearchSettings(headings=5000),
     )
     task = task_of(query_of(wide), Resolution(layered=True))
-    sides, turns, levels, ticks = task.radix
+    sides, turns, levels, ticks = task.cells.radix
     layers = 3 * (len(ROBOT) + 1) * 16
     assert layers * 2 * ticks * levels * turns * sides**2 <= 2**62
-    assert (task.by_gear, task.by_trim, task.by_count) == (True, True, True)
+    assert (task.cells.by_gear, task.cells.by_trim, task.cells.by_count) == (True, True, True)
     near = task_of(query_of(PROBLEMS["car"]), Resolution())
-    assert near.radix[0] * near.fine_cell > 2.0 * 4.5  # no two cells of the scene share a number
+    # no two cells of the scene share a number
+    assert near.cells.radix[0] * near.cells.fine_cell > 2.0 * 4.5
 
 
 def test_time_is_up():
@@ -348,7 +350,8 @@ def test_time_is_up():
 def test_settings_are_heeded():
     coarse = replace(BASE, search=SearchSettings(cell=1.5, headings=8, weight=1.0))
     one, nodes, _ = grown(coarse)
-    assert (one.task.cell, one.task.headings, one.task.weight) == (1.5, 8, 2.0)
+    task = one.search.task
+    assert (task.cells.cell, task.cells.headings, task.estimates.weight) == (1.5, 8, 2.0)
     fine = grown(BASE)[1]
     assert len(nodes) < len(fine)
     found = first_plan(query_of(coarse), budget=replace(UNLIMITED, expansions=EXPANSIONS))
