@@ -27,7 +27,7 @@ from maneuver_automaton.bounds.pose_scene import TOUCHING, PoseScene, lasting_ob
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
-from maneuver_automaton.search.lattice_worlds import window_of
+from maneuver_automaton.search.scene import window_of
 
 HEADINGS = 8  # of the roots of the tree
 MOST_ROOTS = 4096  # in the plane: a long corridor has as small ones as a room

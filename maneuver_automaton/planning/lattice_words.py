@@ -32,19 +32,14 @@ from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whol
 from maneuver_automaton.refinement.improve import Improved, Patience, improve, restarts_of
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
-from maneuver_automaton.search.beginning import Begun
-from maneuver_automaton.refinement.restarts import restarts_of
-from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable, cost_to_go_table
 from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.arrays import CostTable
-from maneuver_automaton.search.beginning import Begun
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import stands_for_more
-from maneuver_automaton.search.lattice_worlds import Ends
 from maneuver_automaton.search.scene import Ends
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.word import Word

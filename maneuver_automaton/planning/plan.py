@@ -23,8 +23,7 @@ from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace, workspace_of
 from maneuver_automaton.planning.steps import answer, prepare_steps, uses_lattice
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.beginning import prepare_bench
-from maneuver_automaton.search.beginning import Begun, begin, end, prepare_first_call
+from maneuver_automaton.search.beginning import prepare_first_call
 from maneuver_automaton.search.choose import load_search
 from maneuver_automaton.search.lattice_query import lattice_query
 

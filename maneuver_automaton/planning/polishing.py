@@ -26,9 +26,6 @@ from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casad
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import BodyPart, Guard
-from maneuver_automaton.planning.incumbents import Incumbents
-from maneuver_automaton.optimal_control.problem import Components, RunningCost
-from maneuver_automaton.optimal_control.separation import BodyPart
 from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,

@@ -21,9 +21,9 @@ from maneuver_automaton.receding_horizon.candidates import allowed
 from maneuver_automaton.receding_horizon.log import first_part
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, merged
 from maneuver_automaton.receding_horizon.settings import Settings
-from maneuver_automaton.search._kernels_cells import EMPTY
+from maneuver_automaton.search._kernels_nodes import EMPTY
+from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.scene import Scene
 
 CELL = 0.25  # of the search, in turning radii
 HEADINGS = 24

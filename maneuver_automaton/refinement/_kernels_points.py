@@ -80,7 +80,11 @@ def price_along(lib: LatticeArrays, word: WordArrays, j: int) -> float:
 @inlined_kernel
 def trim_at(lib: LatticeArrays, word: WordArrays, j: int) -> tuple[int, int]:
     """Trim at a point, as the search for connections is told: any where all are of one class."""
-    trim = word.now.trims[word.points.owners[j]] if lib.library.transitions.cost.shape[0] > 1 else NO_TRIM
+    trim = (
+        word.now.trims[word.points.owners[j]]
+        if lib.library.transitions.cost.shape[0] > 1
+        else NO_TRIM
+    )
     return trim_and_gear(trim, 0)
 
 
@@ -125,7 +129,9 @@ def unwound(lib: LatticeArrays, task: ImproveTask, word: WordArrays, n: int, poi
         word.points.legs[n_legs] = j
         n_legs += 1
         j = word.points.back[j] if word.points.back[j] >= 0 else j - 1
-    passed = lib.library.transitions.cost.shape[0] > 1  # trims that last no time, too, are passed through
+    passed = (
+        lib.library.transitions.cost.shape[0] > 1
+    )  # trims that last no time, too, are passed through
     size = begun(task, word)
     for leg in range(n_legs - 1, -1, -1):
         j = word.points.legs[leg]

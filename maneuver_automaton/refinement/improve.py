@@ -18,9 +18,6 @@ import numpy as np
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_improve import attempt_all
 from maneuver_automaton.refinement.clear_insertion import Whole
-from maneuver_automaton.refinement.work import improve_task, shortcut, word_of, work_of
-from maneuver_automaton.search.arrays import DistanceGrid, SearchArrays
-from maneuver_automaton.search.cost_to_go import NO_TABLE, CostTable
 from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improving, shortcut, word_of
 from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays

@@ -14,8 +14,8 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import part_between
 from maneuver_automaton.collision import Shape
+from maneuver_automaton.collision.advancement import swept_areas
 from maneuver_automaton.collision.body import Body, body_of
-from maneuver_automaton.collision.swept_areas import swept_areas
 from maneuver_automaton.costs import StageCost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver

@@ -15,9 +15,9 @@ from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.convex import DIGITS
-from maneuver_automaton.collision.heights import Layer
 from maneuver_automaton.collision.layers import (
     ROUNDED,
+    Layer,
     LayerArrays,
     always,
     bands_of,
