@@ -71,20 +71,20 @@ def overlapped(body: AuditedBody, around: Surroundings, places: SpanPlaces) -> i
     corners, place, turn = places.corners[0, :, 0], places.place[0, 0], places.turn[0, 0]
     here = _Here(corners, place + turn * body.outline.firsts, place, turn)
     edge = _overlapped_still(body, around, here)
-    if edge >= 0 or not around.motions:
+    if edge >= 0 or not around.movers.motions:
         return edge
     now = body.clock + body.frames.times_at(places.spans.element[:1], places.spans.begin[:1])
     frames = frames_at(around, now)[:, 0]
     away = np.abs(corners - points_of(frames)[:, None]).min(axis=1)
-    away[(now < around.present[:, 0]) | (now > around.present[:, 1])] = np.inf
-    for number in np.flatnonzero(away <= around.reaches + 2.0 * body.outline.size).tolist():
-        first = around.firsts[number]
-        if body.in_space and np.isfinite(around.heights[around.moving[first]]).all():
+    away[(now < around.movers.present[:, 0]) | (now > around.movers.present[:, 1])] = np.inf
+    for number in np.flatnonzero(away <= around.movers.reaches + 2.0 * body.outline.size).tolist():
+        first = around.movers.firsts[number]
+        if body.in_space and np.isfinite(around.heights[around.movers.edges[first]]).all():
             continue
         seen = here.seen_from(points_of(frames[number]), directions(frames[number, 2]))
-        held = _held(body, seen, around.groups[number])
+        held = _held(body, seen, around.movers.groups[number])
         if held.any():
-            return int(around.moving[first + np.argmax(held)])
+            return int(around.movers.edges[first + np.argmax(held)])
     return -1
 
 
@@ -141,13 +141,13 @@ def _crosses(body: AuditedBody, here: _Here, one: Outline) -> NDArray[np.bool_]:
 
 def instant(body: AuditedBody, around: Surroundings, time: float) -> EdgePairs:
     """All edges that are there at a time [s] since the start."""
-    first, last = around.present.T - body.clock
-    there = ((first <= time) & (time <= last))[around.motion_of_edge[around.moving]]
-    moving = around.moving[there]
+    first, last = around.movers.present.T - body.clock
+    there = ((first <= time) & (time <= last))[around.motion_of_edge[around.movers.edges]]
+    moving = around.movers.edges[there]
     edge = np.concatenate([around.still, moving])
     places = places_of(body, spans_within(body, time, time))
     frames = np.zeros((edge.size, 2, 3))
-    if around.motions:
+    if around.movers.motions:
         now = frames_at(around, np.array([body.clock + time]))
         frames[around.still.size :] = now[around.motion_of_edge[moving]]
     return EdgePairs(places, np.zeros_like(edge), edge, frames)
@@ -283,15 +283,15 @@ def moving_pairs(
         return
     spans, clock = _cut_where_motions_change(body, around, near, places.spans)
     places = places_of(body, spans)
-    every = around.knots.at(near[:, None], clock.ravel()).reshape(near.size, 2, -1, 3)
+    every = around.movers.knots.at(near[:, None], clock.ravel()).reshape(near.size, 2, -1, 3)
     middles = places.place + places.turn * body.outline.middle
     away = middles - points_of(every)
     apart = np.sqrt(point_apart(np.zeros(1), away[:, 0], away[:, 1]))
-    reach = body.outline.size + around.reaches[near, None]
+    reach = body.outline.size + around.movers.reaches[near, None]
     bound = apart - reach - _off_chords(body, places)
-    bound -= 0.125 * places.lasts**2 * around.bends[near, None]
+    bound -= 0.125 * places.lasts**2 * around.movers.bends[near, None]
     bound = np.maximum(bound, 0.0)
-    middle, present = 0.5 * (clock[0] + clock[1]), around.present[near]
+    middle, present = 0.5 * (clock[0] + clock[1]), around.movers.present[near]
     bound[(middle < present[:, :1]) | (middle > present[:, 1:])] = np.inf
     order = np.argsort(bound, axis=None, kind="stable")
     order = order[np.isfinite(bound.flat[order])]
@@ -305,7 +305,7 @@ def _near_motions(
     body: AuditedBody, around: Surroundings, places: SpanPlaces, known: float
 ) -> IntArray:
     """Motions, by number, that may come nearer than a distance known [m], and than others do."""
-    if not around.motions:
+    if not around.movers.motions:
         return np.zeros(0, dtype=np.int64)
     spans = places.spans
     ends = body.clock + np.stack(
@@ -314,15 +314,15 @@ def _near_motions(
     frames = frames_at(around, ends.ravel()).reshape(-1, 2, ends.shape[1], 3)
     middles = places.place + places.turn * body.outline.middle
     apart = np.abs(middles - points_of(frames))
-    sizes = body.outline.size + around.reaches[:, None]
-    first, last = around.present[:, :, None].swapaxes(0, 1)
+    sizes = body.outline.size + around.movers.reaches[:, None]
+    first, last = around.movers.present[:, :, None].swapaxes(0, 1)
     if not body.in_space:  # what flies may be far above
         there = (first[:, None] <= ends) & (ends <= last[:, None])
         known = min(known, float((apart + sizes[:, None])[there].min(initial=np.inf)))
     # The middles come nearer until the half of a stretch at most.
     element = spans.element
     own = body.frames.speed[element] + abs(body.outline.middle) * body.frames.turn[element]
-    closer = 0.5 * places.lasts * (own + around.fastest[:, None])
+    closer = 0.5 * places.lasts * (own + around.movers.fastest[:, None])
     least = apart.min(axis=1) - closer - sizes - SPARE
     least[(ends[1] < first) | (ends[0] > last)] = np.inf
     return np.flatnonzero(least.min(axis=1) <= known)
@@ -333,11 +333,11 @@ def _expanded(
 ) -> EdgePairs:
     """Pairs of all edges of some pairs (k,) of motions and stretches, numbered in that order."""
     number, span = np.divmod(chosen, places.lasts.size)
-    first = around.firsts[near[number]]
-    count = around.firsts[near[number] + 1] - first
+    first = around.movers.firsts[near[number]]
+    count = around.movers.firsts[near[number] + 1] - first
     rows = np.repeat(np.arange(chosen.size), count)
     place = np.arange(rows.size) - (np.cumsum(count) - count - first)[rows]
-    return EdgePairs(places, span[rows], around.moving[place], frames[number, :, span][rows])
+    return EdgePairs(places, span[rows], around.movers.edges[place], frames[number, :, span][rows])
 
 
 def _cut_where_motions_change(
@@ -346,8 +346,11 @@ def _cut_where_motions_change(
     """Stretches within which some motions run evenly, and their ends (2, m) on the clock [s]."""
     begin = body.frames.times_at(spans.element, spans.begin)
     end = body.frames.times_at(spans.element, spans.end)
-    present = around.present[near]
-    changes = [*(around.motions[k].time for k in near.tolist()), present[np.isfinite(present)]]
+    present = around.movers.present[near]
+    changes = [
+        *(around.movers.motions[k].time for k in near.tolist()),
+        present[np.isfinite(present)],
+    ]
     knots = np.unique(np.concatenate(changes)) - body.clock
     inside = knots[(knots > begin[0]) & (knots < end[-1])]
     times = np.unique(np.concatenate([begin, end, inside]))
@@ -365,14 +368,14 @@ def _cut_where_motions_change(
 
 def frames_at(around: Surroundings, times: Array) -> Array:
     """Poses (motions, m, 3) of all that moves at times (m,)."""
-    return around.knots.at(np.arange(len(around.motions))[:, None], times)
+    return around.movers.knots.at(np.arange(len(around.movers.motions))[:, None], times)
 
 
 def on_arcs(frames: Array, body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> None:
     """Put frames (m, 2, 3) of pairs where they are, for motions that do not run evenly."""
     motion = around.motion_of_edge[pairs.edge]
-    rows = np.flatnonzero(around.knots.arcs[motion])
+    rows = np.flatnonzero(around.movers.knots.arcs[motion])
     spans = pairs.places.spans.of(pairs.span[rows])
     for k, share in enumerate((spans.begin, spans.end)):
         now = body.clock + body.frames.times_at(spans.element, share)
-        frames[rows, k] = around.knots.at(motion[rows], now)
+        frames[rows, k] = around.movers.knots.at(motion[rows], now)

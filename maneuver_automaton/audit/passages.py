@@ -220,8 +220,10 @@ def _off(
         drift = np.hypot(change[:, 0], change[:, 1]) / lasting
         motion = around.motion_of_edge[pairs.edge]
         moves = (motion >= 0) & (lasts > 0.0)
-        drift = np.maximum(drift, np.where(moves, np.append(around.speeds, 0.0)[motion], 0.0))
-        bend = np.where(moves, np.append(around.bends, 0.0)[motion], 0.0)
+        drift = np.maximum(
+            drift, np.where(moves, np.append(around.movers.speeds, 0.0)[motion], 0.0)
+        )
+        bend = np.where(moves, np.append(around.movers.bends, 0.0)[motion], 0.0)
         spin = np.abs(change[:, 2]) / lasting
         edge_speed = drift + spin * end_reach
     seen = np.abs(paths[:, n])
