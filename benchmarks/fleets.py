@@ -29,6 +29,8 @@ from benchmarks.tables import show
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.collision.surroundings import Part, parts_of
+from maneuver_automaton.automaton.carried import carried
+from maneuver_automaton.collision.surroundings import ShapePart, parts_of
 from maneuver_automaton.fleet import FleetProblem, FleetResult, plan_fleet
 from maneuver_automaton.scenario import load_scenario
 
@@ -54,7 +56,7 @@ def published() -> dict[str, float]:
     return best
 
 
-def bodies(fleet: FleetProblem, result: FleetResult) -> Iterator[list[tuple[Part, Plan]]]:
+def bodies(fleet: FleetProblem, result: FleetResult) -> Iterator[list[tuple[ShapePart, Plan]]]:
     """Parts of every vehicle with the plans of their frames."""
     for name, problem in zip(fleet.names, fleet.problems, strict=True):
         plan = result.plans.get(name)

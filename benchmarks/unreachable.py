@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from maneuver_automaton import Automaton, Box, Car, Disc, OccupancyMap, Problem
-from maneuver_automaton.bounds import Connection, connectivity, pose_scene
+from maneuver_automaton.bounds import Reachability, connectivity, pose_scene
 from maneuver_automaton.groups import SE2
 
 LENGTH, WIDTH = 4.7, 1.9  # [m] of the car
@@ -141,7 +141,7 @@ class Run:
 
     family: str
     spare: float  # [m] negative: what is missing
-    answer: Connection
+    answer: Reachability
     boxes: int
     seconds: float  # of processor time
 
@@ -158,7 +158,7 @@ def run(family: str, seed: int, spare: float) -> Run:
     assert (scene.states(np.concatenate(ends)) == 2).all(), "an end collides"
     found = connectivity(scene, *ends, deadline=time.monotonic() + 5.0 * SECONDS)
     seconds = time.process_time() - begin
-    answer = found.answer if seconds <= SECONDS else Connection.OPEN
+    answer = found.answer if seconds <= SECONDS else Reachability.OPEN
     return Run(family=family, spare=spare, answer=answer, boxes=found.boxes, seconds=seconds)
 
 
@@ -182,7 +182,7 @@ def rates(missing: list[Run]) -> list[tuple[str, int, int, float]]:
     rows = []
     for low, high in itertools.pairwise(BINS):
         inside = [one for one in missing if low <= -100.0 * one.spare + 1e-9 < high]
-        proven = [one for one in inside if one.answer is Connection.SEPARATED]
+        proven = [one for one in inside if one.answer is Reachability.SEPARATED]
         middle = float(np.median([one.seconds for one in inside])) if inside else math.nan
         rows.append((f"{low}-{high} cm", len(inside), len(proven), middle))
     return rows
@@ -223,14 +223,14 @@ def main() -> None:
     for name, count, proven, middle in rates(missing):
         print(f"| {name} | {count} | {proven} | {middle:.2f} |")
     large = [one for one in missing if one.spare <= -0.05]
-    shown = [one for one in large if one.answer is Connection.SEPARATED]
+    shown = [one for one in large if one.answer is Reachability.SEPARATED]
     print(f"\nmissing 5 cm and more: {len(shown)} of {len(large)} proven")
-    wrong = [one for one in spared if one.answer is Connection.SEPARATED]
-    ways = [one for one in spared if one.answer is Connection.CONNECTED]
+    wrong = [one for one in spared if one.answer is Reachability.SEPARATED]
+    ways = [one for one in spared if one.answer is Reachability.CONNECTED]
     print(
         f"1-5 cm to spare: {len(wrong)} of {len(spared)} called infeasible, {len(ways)} connected"
     )
-    wrong += [one for one in missing if one.answer is Connection.CONNECTED]
+    wrong += [one for one in missing if one.answer is Reachability.CONNECTED]
     print(f"wrong answers: {len(wrong)}")
     if options.figure:
         draw(missing, options.figure)

@@ -18,7 +18,14 @@ from maneuver_automaton.audit._kernels_still import Found, Sides, Ways, nearest_
 from maneuver_automaton.audit.frames import Spans
 from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.pairs import StillEdges, bounded, moving_pairs, on_arcs, overlapped
-from maneuver_automaton.audit.passages import Body, Bounds, Pairs, bounds_of, places_of, time_of
+from maneuver_automaton.audit.passages import (
+    AuditedBody,
+    ClearanceBounds,
+    EdgePairs,
+    bounds_of,
+    places_of,
+    time_of,
+)
 
 CONTACT = 1e-9  # [m] what is closer touches: places are rounded
 SHARP = (1e-3, 0.01)  # [m], and of the distance: by how much less may be reported
@@ -41,7 +48,7 @@ NEVER = Least(math.inf, math.inf, 0.0)
 
 
 def least_clearance(
-    body: Body,
+    body: AuditedBody,
     around: Surroundings,
     spans: Spans,
     *,
@@ -52,7 +59,7 @@ def least_clearance(
 
     Parameters
     ----------
-    body : Body
+    body : AuditedBody
     around : Surroundings
     spans : Spans
         In order of time.
@@ -93,7 +100,9 @@ def least_clearance(
     return least._replace(distance=max(least.distance, 0.0))
 
 
-def _compiled(body: Body, around: Surroundings, enough: float, pairs: Pairs) -> tuple[float, Found]:
+def _compiled(
+    body: AuditedBody, around: Surroundings, enough: float, pairs: EdgePairs
+) -> tuple[float, Found]:
     """The least distance measured [m] over pairs in the plane, and what is known of it."""
     outline, frames, edges, spans = body.outline, body.frames, around.outline, pairs.places.spans
     found = nearest_still(
@@ -121,10 +130,10 @@ def _compiled(body: Body, around: Surroundings, enough: float, pairs: Pairs) -> 
 
 
 def _sharpened(
-    body: Body,
+    body: AuditedBody,
     around: Surroundings,
-    pairs: Pairs,
-    known: Bounds,
+    pairs: EdgePairs,
+    known: ClearanceBounds,
     least: Least,
     enough: float,
     ask: Callable[[], None],
@@ -151,7 +160,9 @@ def _sharpened(
     return least._replace(distance=floor)
 
 
-def _cut(body: Body, around: Surroundings, pairs: Pairs, open_: NDArray[np.bool_]) -> Pairs:
+def _cut(
+    body: AuditedBody, around: Surroundings, pairs: EdgePairs, open_: NDArray[np.bool_]
+) -> EdgePairs:
     """Some stretches in `PARTS` each."""
     cut = np.flatnonzero(open_)
     rows, part = np.repeat(cut, PARTS), np.tile(np.arange(PARTS), cut.size)
@@ -166,9 +177,9 @@ def _cut(body: Body, around: Surroundings, pairs: Pairs, open_: NDArray[np.bool_
     span = number * PARTS + part
     places = places_of(body, spans)
     if pairs.frames is None:
-        return Pairs(places, span, pairs.edge[rows], None)
+        return EdgePairs(places, span, pairs.edge[rows], None)
     first, last = pairs.frames[rows, 0], pairs.frames[rows, 1]
     between = np.stack([part, part + 1], axis=1)[..., None] / PARTS
     frames = first[:, None] + between * (last - first)[:, None]
-    on_arcs(frames, body, around, Pairs(places, span, pairs.edge[rows], None))
-    return Pairs(places, span, pairs.edge[rows], frames)
+    on_arcs(frames, body, around, EdgePairs(places, span, pairs.edge[rows], None))
+    return EdgePairs(places, span, pairs.edge[rows], frames)

@@ -19,7 +19,7 @@ from maneuver_automaton.audit.frames import (
     SERIES,
     TO_END,
     TO_NODES,
-    Frames,
+    FrameMotion,
     N,
     Spans,
     frames_along,
@@ -43,7 +43,7 @@ NUDGE = 1e-6  # [model's units] for a derivative
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Drive:
+class DrivenPlan:
     """A plan driven again, and how far what it states is from that.
 
     Examples
@@ -58,7 +58,7 @@ class Drive:
 
     plan: Plan
     model: Model
-    frames: Frames  # of the vehicle
+    frames: FrameMotion  # of the vehicle
     twists: Array  # (e, N, dof) at the nodes of the elements
     states: Array  # (e, N, n_z) reduced states there
     end: Array  # (dof,) last pose
@@ -69,7 +69,7 @@ class Drive:
     controls: Array  # (n, n_u) until there
     sampled_states: Array  # (n + 1, n_z) reduced states at the start and there
 
-    def part(self, name: str) -> Frames:
+    def part(self, name: str) -> FrameMotion:
         """The frame of what the vehicle carries, placed by the model from the reduced state."""
         which = self.model.part_names.index(name)
         seen = np.asarray(self.model.part_poses(self.states), dtype=np.float64)[..., which, :]
@@ -103,7 +103,7 @@ class _Elements(NamedTuple):
     run: IntArray  # (n,) number of the run of each stretch
 
 
-def driven(plan: Plan, model: Model) -> Drive:
+def driven(plan: Plan, model: Model) -> DrivenPlan:
     """Drive a plan again from its start under its controls.
 
     The equations are solved by collocation, on all elements side by side; heading and place are
@@ -156,7 +156,7 @@ def _cut(stated: Stated, turns: Array, parts: IntArray, alone: NDArray[np.bool_]
 class _Integrated(NamedTuple):
     reduced: Reduced
     twists: Array  # (e, N, dof) at the nodes
-    frames: Frames
+    frames: FrameMotion
 
 
 def _integrated(start: Array, model: Model, stated: Stated, elements: _Elements) -> _Integrated:
@@ -172,7 +172,7 @@ def _integrated(start: Array, model: Model, stated: Stated, elements: _Elements)
 
 def _compared(
     plan: Plan, model: Model, stated: Stated, elements: _Elements, found: _Integrated
-) -> Drive:
+) -> DrivenPlan:
     """The drive, and the greatest difference to what the plan states of it."""
     reduced, frames = found.reduced, found.frames
     # What a reduced state is off moves the vehicle for as long as it is driven.
@@ -198,7 +198,7 @@ def _compared(
         off = np.maximum(off, np.abs(states - stated.end_states).max())
         begun_anew = np.abs(states[:-1] - stated.states[1:]).max(initial=0.0)
         off = np.maximum(off, begun_anew)
-    return Drive(
+    return DrivenPlan(
         plan=plan,
         model=model,
         frames=frames,
@@ -214,12 +214,12 @@ def _compared(
     )
 
 
-def _standing(plan: Plan, model: Model, stated: Stated) -> Drive:
+def _standing(plan: Plan, model: Model, stated: Stated) -> DrivenPlan:
     """Of a plan that lasts no time: one element of rest."""
     still = np.zeros((1, N, plan.start.size))
     # Without a trim it rests, with all at zero.
     states = plan.trims[0].reduced_state if plan.trims else np.zeros(len(model.reduced_names))
-    return Drive(
+    return DrivenPlan(
         plan=plan,
         model=model,
         frames=frames_along(plan.start, still, np.full(1, NOTHING)),

@@ -24,7 +24,7 @@ class Spans(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Frames:
+class FrameMotion:
     """Poses (x, y, heading(, altitude)) over time, exact at the nodes and between them.
 
     What it does at most holds at every instant of an element, not only at the nodes: the terms of
@@ -56,7 +56,7 @@ class Frames:
         return float(self.error.sum()) * (1.0 + self.length)
 
 
-def frames_along(start: Array, twists: Array, lengths: Array) -> Frames:
+def frames_along(start: Array, twists: Array, lengths: Array) -> FrameMotion:
     """From a pose (dof,), under twists (e, N, dof) at the nodes of elements of lengths (e,) [s].
 
     The heading is the integral of the turn rate, the place that of the velocity seen with it.
@@ -76,7 +76,7 @@ def frames_along(start: Array, twists: Array, lengths: Array) -> Frames:
     return _bounded(lengths, series, nodes, twists, last)
 
 
-def frames_through(poses: Array, like: Frames) -> Frames:
+def frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
     """Of what is at poses (e, N, dof) at the nodes of the elements of other frames."""
     poses[..., 2] = np.unwrap(poses[..., 2], axis=1)
     series = SERIES @ poses
@@ -105,12 +105,14 @@ def placed(frames: Array, seen: Array) -> Array:
     return np.asarray(frames + np.stack(np.broadcast_arrays(*planar, *higher), axis=-1))
 
 
-def _bounded(lengths: Array, series: Array, nodes: Array, twists: Array, error: Array) -> Frames:
+def _bounded(
+    lengths: Array, series: Array, nodes: Array, twists: Array, error: Array
+) -> FrameMotion:
     terms = np.abs(SERIES @ twists)  # (e, N, dof)
     most = terms.sum(axis=1)
     change = SLOPES @ terms / lengths[:, None]
     speed, turn = np.hypot(most[:, 0], most[:, 1]), most[:, 2]
-    return Frames(
+    return FrameMotion(
         times=_before(lengths),
         series=series,
         nodes=nodes,

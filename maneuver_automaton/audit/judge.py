@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
-from maneuver_automaton.audit.drive import Drive, driven
-from maneuver_automaton.audit.frames import Frames, Spans
+from maneuver_automaton.audit.drive import DrivenPlan, driven
+from maneuver_automaton.audit.frames import FrameMotion, Spans
 from maneuver_automaton.audit.outlines import (
     Surroundings,
     body_outline,
@@ -26,7 +26,7 @@ from maneuver_automaton.audit.outlines import (
     surroundings_of,
 )
 from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
-from maneuver_automaton.audit.passages import Body, Pairs, bounds_of
+from maneuver_automaton.audit.passages import AuditedBody, EdgePairs, bounds_of
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of
 from maneuver_automaton.collision.zones import Zone
@@ -271,10 +271,14 @@ def closest_to(
 
 
 def _body(
-    frames: Frames, shapes: tuple[Shape, ...], plan: Plan, goal: Goal, height: tuple[float, float]
-) -> Body:
+    frames: FrameMotion,
+    shapes: tuple[Shape, ...],
+    plan: Plan,
+    goal: Goal,
+    height: tuple[float, float],
+) -> AuditedBody:
     """A body in the coordinates of obstacles counted from the goal's neighbourhood."""
-    return Body(
+    return AuditedBody(
         outline=body_outline(shapes),
         frames=frames,
         offset=complex(*(goal.pose[:2] - origin_of(goal.pose))),
@@ -286,7 +290,7 @@ def _body(
 
 
 def _clearance(
-    body: Body,
+    body: AuditedBody,
     around: Surroundings,
     obstacles: tuple[AnyObstacle, ...],
     origin: tuple[float, float],
@@ -319,7 +323,7 @@ def _off_the_goal(missed: TerminalError, goal: Goal) -> list[str]:
     return reasons
 
 
-def _beyond_limits(drive: Drive) -> list[str]:
+def _beyond_limits(drive: DrivenPlan) -> list[str]:
     """What exceeds a limit of the model, and by how much."""
     reasons: list[str] = []
     model = drive.model
@@ -364,16 +368,16 @@ def _wrong_ends(plan: Plan, states: tuple[Array, Array]) -> list[str]:
     return reasons
 
 
-class Nearest(NamedTuple):
+class NearestEdge(NamedTuple):
     """The edge that is nearest to a body at a time."""
 
-    pairs: Pairs
+    pairs: EdgePairs
     row: int
     obstacle: int
     distance: float  # [m]
 
 
-def nearest_at(body: Body, around: Surroundings, time: float) -> Nearest:
+def nearest_at(body: AuditedBody, around: Surroundings, time: float) -> NearestEdge:
     """The edge that is nearest at a time since the start [s]."""
     pairs = instant(body, around, time)
     known = bounds_of(body, around, pairs, overlaps=True)
@@ -381,11 +385,11 @@ def nearest_at(body: Body, around: Surroundings, time: float) -> Nearest:
     held = overlapped(body, around, pairs.places)
     if held >= 0:
         row, distance = int(np.flatnonzero(pairs.edge == held)[0]), 0.0
-    return Nearest(pairs, row, int(around.owners[pairs.edge[row]]), distance)
+    return NearestEdge(pairs, row, int(around.owners[pairs.edge[row]]), distance)
 
 
 def what_is_hit(
-    body: Body,
+    body: AuditedBody,
     around: Surroundings,
     obstacles: tuple[AnyObstacle, ...],
     *,
@@ -403,7 +407,7 @@ def what_is_hit(
     return f"at {body.clock + time:.6g} s {near}"
 
 
-def _nearest_point(body: Body, around: Surroundings, pairs: Pairs, row: int) -> complex:
+def _nearest_point(body: AuditedBody, around: Surroundings, pairs: EdgePairs, row: int) -> complex:
     """The point of the edge of a pair that is nearest to the body."""
     assert pairs.frames is not None
     edge, frame, places = pairs.edge[row], pairs.frames[row, 0], pairs.places
@@ -422,7 +426,10 @@ def _nearest_point(body: Body, around: Surroundings, pairs: Pairs, row: int) -> 
 
 
 def zones_broken(
-    drive: Drive, bodies: Sequence[Body], zones: tuple[Zone, ...], origin: tuple[float, float]
+    drive: DrivenPlan,
+    bodies: Sequence[AuditedBody],
+    zones: tuple[Zone, ...],
+    origin: tuple[float, float],
 ) -> list[str]:
     """Which zones a vehicle is in, with any part, while it moves as they do not admit."""
     if not (zones and drive.ends.size):
@@ -466,7 +473,7 @@ def _admitted(zone: Zone, twists: Array) -> NDArray[np.bool_]:
     return good
 
 
-def _named(drive: Drive, zone: Zone) -> NDArray[np.bool_]:
+def _named(drive: DrivenPlan, zone: Zone) -> NDArray[np.bool_]:
     """Whether a zone admits each primitive by its names."""
     names = [
         {one.name} if isinstance(one, Trim) else {one.source, one.target}

@@ -311,6 +311,21 @@ def _side(a: Any, b: Any, point: Any) -> Array:
 GRID = 65536.0  # [m] between the places from where obstacles are counted
 
 
+class MovingEdges(NamedTuple):
+    """The edges of obstacles that move, and how: one row for each motion."""
+
+    motions: tuple[Motion, ...]
+    knots: Knots  # of all motions, side by side
+    present: Array  # (motions, 2) [s] from when until when a moving obstacle is there
+    fastest: Array  # (motions,) [m/s] of the frame at most
+    speeds: Array  # (motions,) the same where it coasts on arcs; else 0
+    bends: Array  # (motions,) [m/s^2] how fast its velocity changes then; else 0
+    edges: IntArray  # numbers of their edges, motion by motion
+    firsts: IntArray  # (motions + 1,) where those of each motion begin among them
+    groups: tuple[Outline, ...]  # (motions,) the edges of each motion
+    reaches: Array  # (motions,) [m] how far they are from their frames at most
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Surroundings:
     """The edges of all obstacles; those that move are seen from their own frames.
@@ -327,17 +342,8 @@ class Surroundings:
     owners: IntArray  # (n,) which obstacle each edge is of
     heights: Array  # (n, 2) [m] from where to where they stand
     motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it is static
-    motions: tuple[Motion, ...]
-    knots: Knots  # of all motions, side by side
-    present: Array  # (motions, 2) [s] from when until when a moving obstacle is there
-    fastest: Array  # (motions,) [m/s] of the frame at most
-    speeds: Array  # (motions,) the same where it coasts on arcs; else 0
-    bends: Array  # (motions,) [m/s^2] how fast its velocity changes then; else 0
+    movers: MovingEdges
     still: IntArray  # (k,) numbers of the static edges
-    moving: IntArray  # those of the others, motion by motion
-    firsts: IntArray  # (motions + 1,) where those of each motion begin among them
-    groups: tuple[Outline, ...]  # (motions,) the edges of each motion
-    reaches: Array  # (motions,) [m] how far they are from their frames at most
     tree: Any  # STRtree of these
     right: float  # [m] no edge is further to the right
     rounds: bool  # whether any edge has a radius
@@ -403,38 +409,34 @@ def surroundings_around(
     counts = [outline.radius.size for outline in outlines]
     whole = joined(outlines)
     index = np.repeat(np.array(indices, dtype=np.int64), counts)
-    still = np.flatnonzero(index < 0)
+    still, moving = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
     heights_of = np.repeat(np.array(heights).reshape(-1, 2), counts, axis=0)
-    moving = np.flatnonzero(index >= 0)
-    firsts = np.searchsorted(index[moving], np.arange(len(motions) + 1))
     knots = Knots.of(motions)
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
     groups = tuple(whole.of(index == number) for number in range(len(motions)))
-    return Surroundings(
-        outline=whole,
-        owners=np.repeat(np.arange(len(counts)), counts),
-        heights=heights_of,
-        motion_of_edge=index,
+    movers = MovingEdges(
         motions=tuple(motions),
         knots=knots,
         present=np.array(present, dtype=np.float64).reshape(-1, 2),
         fastest=fastest,
         speeds=np.where(knots.arcs, fastest, 0.0),
         bends=np.array([float(one.bends.max(initial=0.0)) for one in motions]),
-        still=still,
-        moving=moving,
-        firsts=firsts,
+        edges=moving,
+        firsts=np.searchsorted(index[moving], np.arange(len(motions) + 1)),
         groups=groups,
-        reaches=np.array([_reach(group) for group in groups]),
+        reaches=np.array([float((np.abs(one.begins) + one.radius).max()) for one in groups]),
+    )
+    return Surroundings(
+        outline=whole,
+        owners=np.repeat(np.arange(len(counts)), counts),
+        heights=heights_of,
+        motion_of_edge=index,
+        movers=movers,
+        still=still,
         tree=shapely.STRtree(_geometries(whole, still, heights_of)),
         rounds=bool(whole.radius.any()),
         right=float((whole.begins.real + whole.radius).max(initial=0.0)),
     )
-
-
-def _reach(outline: Outline) -> float:
-    """How far [m] an outline is from the frame that it is seen from at most."""
-    return float((np.abs(outline.begins) + outline.radius).max())
 
 
 def _geometries(outline: Outline, still: IntArray, heights: Array) -> Any:

@@ -22,10 +22,10 @@ from maneuver_automaton.audit.outlines import (
     points_of,
 )
 from maneuver_automaton.audit.passages import (
-    Body,
-    Bounds,
-    Pairs,
-    Places,
+    AuditedBody,
+    ClearanceBounds,
+    EdgePairs,
+    SpanPlaces,
     bounds_of,
     places_of,
 )
@@ -41,7 +41,7 @@ NEAREST = 64  # pairs that are looked at first
 MANY = 256  # pairs at least, of which those that are far are left out first
 
 
-def spans_within(body: Body, first: float, last: float) -> Spans:
+def spans_within(body: AuditedBody, first: float, last: float) -> Spans:
     """Stretches that turn little, and are about as long as the body, between two times [s]."""
     frames, times = body.frames, body.frames.times
     lengths = times[1:] - times[:-1]
@@ -63,7 +63,7 @@ def spans_within(body: Body, first: float, last: float) -> Spans:
     return Spans(element[kept], begin[kept], end[kept])
 
 
-def overlapped(body: Body, around: Surroundings, places: Places) -> int:
+def overlapped(body: AuditedBody, around: Surroundings, places: SpanPlaces) -> int:
     """An edge of an obstacle that the body overlaps as the first stretch begins; -1 for none.
 
     In space those that block every altitude; the others are looked for wherever they are near.
@@ -71,20 +71,20 @@ def overlapped(body: Body, around: Surroundings, places: Places) -> int:
     corners, place, turn = places.corners[0, :, 0], places.place[0, 0], places.turn[0, 0]
     here = _Here(corners, place + turn * body.outline.firsts, place, turn)
     edge = _overlapped_still(body, around, here)
-    if edge >= 0 or not around.motions:
+    if edge >= 0 or not around.movers.motions:
         return edge
     now = body.clock + body.frames.times_at(places.spans.element[:1], places.spans.begin[:1])
     frames = frames_at(around, now)[:, 0]
     away = np.abs(corners - points_of(frames)[:, None]).min(axis=1)
-    away[(now < around.present[:, 0]) | (now > around.present[:, 1])] = np.inf
-    for number in np.flatnonzero(away <= around.reaches + 2.0 * body.outline.size).tolist():
-        first = around.firsts[number]
-        if body.in_space and np.isfinite(around.heights[around.moving[first]]).all():
+    away[(now < around.movers.present[:, 0]) | (now > around.movers.present[:, 1])] = np.inf
+    for number in np.flatnonzero(away <= around.movers.reaches + 2.0 * body.outline.size).tolist():
+        first = around.movers.firsts[number]
+        if body.in_space and np.isfinite(around.heights[around.movers.edges[first]]).all():
             continue
         seen = here.seen_from(points_of(frames[number]), directions(frames[number, 2]))
-        held = _held(body, seen, around.groups[number])
+        held = _held(body, seen, around.movers.groups[number])
         if held.any():
-            return int(around.moving[first + np.argmax(held)])
+            return int(around.movers.edges[first + np.argmax(held)])
     return -1
 
 
@@ -103,7 +103,7 @@ class _Here(NamedTuple):
         return _Here(corners, firsts, own, self.turn * back)
 
 
-def _overlapped_still(body: Body, around: Surroundings, here: _Here) -> int:
+def _overlapped_still(body: AuditedBody, around: Surroundings, here: _Here) -> int:
     """A still edge whose obstacle the body overlaps, or -1."""
     x, y, radius = here.corners.real, here.corners.imag, body.outline.radius
     boxes = [(x.min() - radius, y.min() - radius, x.max() + radius, y.max() + radius)]
@@ -126,12 +126,12 @@ def _overlapped_still(body: Body, around: Surroundings, here: _Here) -> int:
     return int(every[np.argmax(_held(body, here, edges.of(every)))])
 
 
-def _held(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
+def _held(body: AuditedBody, here: _Here, one: Outline) -> NDArray[np.bool_]:
     """Which edges (n,) of whole solids cross those of a body, or are of one that holds it."""
     return np.asarray(one.holds(here.firsts).any(axis=1)[one.solid] | _crosses(body, here, one))
 
 
-def _crosses(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
+def _crosses(body: AuditedBody, here: _Here, one: Outline) -> NDArray[np.bool_]:
     """Which edges (n,) cross those of a body, or begin inside it."""
     own, back = body.outline.edges, here.turn.conj()
     a, b = (one.begins - here.place) * back, (one.ends - here.place) * back
@@ -139,46 +139,46 @@ def _crosses(body: Body, here: _Here, one: Outline) -> NDArray[np.bool_]:
     return np.asarray(crosses | own.holds(a).any(axis=0))
 
 
-def instant(body: Body, around: Surroundings, time: float) -> Pairs:
+def instant(body: AuditedBody, around: Surroundings, time: float) -> EdgePairs:
     """All edges that are there at a time [s] since the start."""
-    first, last = around.present.T - body.clock
-    there = ((first <= time) & (time <= last))[around.motion_of_edge[around.moving]]
-    moving = around.moving[there]
+    first, last = around.movers.present.T - body.clock
+    there = ((first <= time) & (time <= last))[around.motion_of_edge[around.movers.edges]]
+    moving = around.movers.edges[there]
     edge = np.concatenate([around.still, moving])
     places = places_of(body, spans_within(body, time, time))
     frames = np.zeros((edge.size, 2, 3))
-    if around.motions:
+    if around.movers.motions:
         now = frames_at(around, np.array([body.clock + time]))
         frames[around.still.size :] = now[around.motion_of_edge[moving]]
-    return Pairs(places, np.zeros_like(edge), edge, frames)
+    return EdgePairs(places, np.zeros_like(edge), edge, frames)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StillEdges:
     """The still edges near a body over stretches of time."""
 
-    body: Body
+    body: AuditedBody
     around: Surroundings
-    places: Places
+    places: SpanPlaces
     pad: Array  # (s, 1) [m] by which the boxes are too small
     boxes: _Boxes  # around its corners
     own_boxes: _Boxes  # the same, along the axes of the body as a stretch begins
 
     @classmethod
-    def near(cls, body: Body, around: Surroundings, places: Places) -> StillEdges:
+    def near(cls, body: AuditedBody, around: Surroundings, places: SpanPlaces) -> StillEdges:
         """Those of some surroundings."""
         pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
         boxes, own = _Boxes.around(places.corners), _Boxes.around(_from_begins(places))
         return cls(body, around, places, pad, boxes, own)
 
-    def within(self, distance: float) -> Pairs:
+    def within(self, distance: float) -> EdgePairs:
         """All pairs that come nearer than a distance [m], and others."""
         pad = self.pad + distance
         span, edge = self.around.near(np.concatenate(self.boxes.grown(pad), axis=1))
         kept = _meets(self.around, self.places, self.own_boxes.grown(pad), span, edge)
-        return Pairs(self.places, span[kept], edge[kept], None)
+        return EdgePairs(self.places, span[kept], edge[kept], None)
 
-    def nearest(self, measured: Callable[[Pairs], tuple[float, T]]) -> T:
+    def nearest(self, measured: Callable[[EdgePairs], tuple[float, T]]) -> T:
         """What is known of pairs among which the nearest of all is.
 
         They are looked for further and further away, until a distance is `measured` [m] within
@@ -196,7 +196,9 @@ class StillEdges:
             within = nearest
 
 
-def bounded(body: Body, around: Surroundings, pairs: Pairs) -> tuple[float, tuple[Pairs, Bounds]]:
+def bounded(
+    body: AuditedBody, around: Surroundings, pairs: EdgePairs
+) -> tuple[float, tuple[EdgePairs, ClearanceBounds]]:
     """The least distance measured [m], and those pairs that may be the nearest, with bounds."""
     if pairs.edge.size > MANY:
         pairs = _nearest_pairs(body, around, pairs)
@@ -204,7 +206,7 @@ def bounded(body: Body, around: Surroundings, pairs: Pairs) -> tuple[float, tupl
     return float(known.measured.min()), (pairs, known)
 
 
-def _nearest_pairs(body: Body, around: Surroundings, pairs: Pairs) -> Pairs:
+def _nearest_pairs(body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> EdgePairs:
     """Those of many pairs that may be the nearest of all, by discs around the body's way."""
     places, span, edge = pairs.places, pairs.span, pairs.edge
     first, last = (places.place + places.turn * body.outline.middle)[:, span]
@@ -238,13 +240,13 @@ class _Boxes(NamedTuple):
         return _Boxes(self.low - by, self.high + by)
 
 
-def _from_begins(places: Places) -> Points:
+def _from_begins(places: SpanPlaces) -> Points:
     """Corners (2, n, s) of a body over stretches, seen from its frame as they begin."""
     return np.asarray((places.corners - places.place[0]) * places.turn[0].conj())
 
 
 def _meets(
-    around: Surroundings, places: Places, boxes: _Boxes, span: IntArray, edge: IntArray
+    around: Surroundings, places: SpanPlaces, boxes: _Boxes, span: IntArray, edge: IntArray
 ) -> NDArray[np.bool_]:
     """Whether the boxes around edges meet those of stretches, both along the body's axes.
 
@@ -263,14 +265,14 @@ def _meets(
     return np.asarray(kept)
 
 
-def _off_chords(body: Body, places: Places) -> Array:
+def _off_chords(body: AuditedBody, places: SpanPlaces) -> Array:
     """How far [m] points of the body leave their chords at most over stretches: (s,)."""
     return places.off + places.off_by_reach * body.outline.most_reach
 
 
 def moving_pairs(
-    body: Body, around: Surroundings, places: Places, known: float
-) -> Iterator[tuple[float, Callable[[], Pairs]]]:
+    body: AuditedBody, around: Surroundings, places: SpanPlaces, known: float
+) -> Iterator[tuple[float, Callable[[], EdgePairs]]]:
     """The stretches, each with all moving edges: a few that are near, then ever more.
 
     With each a distance [m] that neither they nor what follows comes closer than. What is never as
@@ -281,15 +283,15 @@ def moving_pairs(
         return
     spans, clock = _cut_where_motions_change(body, around, near, places.spans)
     places = places_of(body, spans)
-    every = around.knots.at(near[:, None], clock.ravel()).reshape(near.size, 2, -1, 3)
+    every = around.movers.knots.at(near[:, None], clock.ravel()).reshape(near.size, 2, -1, 3)
     middles = places.place + places.turn * body.outline.middle
     away = middles - points_of(every)
     apart = np.sqrt(point_apart(np.zeros(1), away[:, 0], away[:, 1]))
-    reach = body.outline.size + around.reaches[near, None]
+    reach = body.outline.size + around.movers.reaches[near, None]
     bound = apart - reach - _off_chords(body, places)
-    bound -= 0.125 * places.lasts**2 * around.bends[near, None]
+    bound -= 0.125 * places.lasts**2 * around.movers.bends[near, None]
     bound = np.maximum(bound, 0.0)
-    middle, present = 0.5 * (clock[0] + clock[1]), around.present[near]
+    middle, present = 0.5 * (clock[0] + clock[1]), around.movers.present[near]
     bound[(middle < present[:, :1]) | (middle > present[:, 1:])] = np.inf
     order = np.argsort(bound, axis=None, kind="stable")
     order = order[np.isfinite(bound.flat[order])]
@@ -299,9 +301,11 @@ def moving_pairs(
             yield float(bound.flat[chosen[0]]), pairs
 
 
-def _near_motions(body: Body, around: Surroundings, places: Places, known: float) -> IntArray:
+def _near_motions(
+    body: AuditedBody, around: Surroundings, places: SpanPlaces, known: float
+) -> IntArray:
     """Motions, by number, that may come nearer than a distance known [m], and than others do."""
-    if not around.motions:
+    if not around.movers.motions:
         return np.zeros(0, dtype=np.int64)
     spans = places.spans
     ends = body.clock + np.stack(
@@ -310,40 +314,43 @@ def _near_motions(body: Body, around: Surroundings, places: Places, known: float
     frames = frames_at(around, ends.ravel()).reshape(-1, 2, ends.shape[1], 3)
     middles = places.place + places.turn * body.outline.middle
     apart = np.abs(middles - points_of(frames))
-    sizes = body.outline.size + around.reaches[:, None]
-    first, last = around.present[:, :, None].swapaxes(0, 1)
+    sizes = body.outline.size + around.movers.reaches[:, None]
+    first, last = around.movers.present[:, :, None].swapaxes(0, 1)
     if not body.in_space:  # what flies may be far above
         there = (first[:, None] <= ends) & (ends <= last[:, None])
         known = min(known, float((apart + sizes[:, None])[there].min(initial=np.inf)))
     # The middles come nearer until the half of a stretch at most.
     element = spans.element
     own = body.frames.speed[element] + abs(body.outline.middle) * body.frames.turn[element]
-    closer = 0.5 * places.lasts * (own + around.fastest[:, None])
+    closer = 0.5 * places.lasts * (own + around.movers.fastest[:, None])
     least = apart.min(axis=1) - closer - sizes - SPARE
     least[(ends[1] < first) | (ends[0] > last)] = np.inf
     return np.flatnonzero(least.min(axis=1) <= known)
 
 
 def _expanded(
-    around: Surroundings, places: Places, near: IntArray, frames: Array, chosen: IntArray
-) -> Pairs:
+    around: Surroundings, places: SpanPlaces, near: IntArray, frames: Array, chosen: IntArray
+) -> EdgePairs:
     """Pairs of all edges of some pairs (k,) of motions and stretches, numbered in that order."""
     number, span = np.divmod(chosen, places.lasts.size)
-    first = around.firsts[near[number]]
-    count = around.firsts[near[number] + 1] - first
+    first = around.movers.firsts[near[number]]
+    count = around.movers.firsts[near[number] + 1] - first
     rows = np.repeat(np.arange(chosen.size), count)
     place = np.arange(rows.size) - (np.cumsum(count) - count - first)[rows]
-    return Pairs(places, span[rows], around.moving[place], frames[number, :, span][rows])
+    return EdgePairs(places, span[rows], around.movers.edges[place], frames[number, :, span][rows])
 
 
 def _cut_where_motions_change(
-    body: Body, around: Surroundings, near: IntArray, spans: Spans
+    body: AuditedBody, around: Surroundings, near: IntArray, spans: Spans
 ) -> tuple[Spans, Array]:
     """Stretches within which some motions run evenly, and their ends (2, m) on the clock [s]."""
     begin = body.frames.times_at(spans.element, spans.begin)
     end = body.frames.times_at(spans.element, spans.end)
-    present = around.present[near]
-    changes = [*(around.motions[k].time for k in near.tolist()), present[np.isfinite(present)]]
+    present = around.movers.present[near]
+    changes = [
+        *(around.movers.motions[k].time for k in near.tolist()),
+        present[np.isfinite(present)],
+    ]
     knots = np.unique(np.concatenate(changes)) - body.clock
     inside = knots[(knots > begin[0]) & (knots < end[-1])]
     times = np.unique(np.concatenate([begin, end, inside]))
@@ -361,14 +368,14 @@ def _cut_where_motions_change(
 
 def frames_at(around: Surroundings, times: Array) -> Array:
     """Poses (motions, m, 3) of all that moves at times (m,)."""
-    return around.knots.at(np.arange(len(around.motions))[:, None], times)
+    return around.movers.knots.at(np.arange(len(around.movers.motions))[:, None], times)
 
 
-def on_arcs(frames: Array, body: Body, around: Surroundings, pairs: Pairs) -> None:
+def on_arcs(frames: Array, body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> None:
     """Put frames (m, 2, 3) of pairs where they are, for motions that do not run evenly."""
     motion = around.motion_of_edge[pairs.edge]
-    rows = np.flatnonzero(around.knots.arcs[motion])
+    rows = np.flatnonzero(around.movers.knots.arcs[motion])
     spans = pairs.places.spans.of(pairs.span[rows])
     for k, share in enumerate((spans.begin, spans.end)):
         now = body.clock + body.frames.times_at(spans.element, share)
-        frames[rows, k] = around.knots.at(motion[rows], now)
+        frames[rows, k] = around.movers.knots.at(motion[rows], now)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.frames import Frames, Spans
+from maneuver_automaton.audit.frames import FrameMotion, Spans
 from maneuver_automaton.audit.outlines import (
     BodyOutline,
     Points,
@@ -34,11 +34,11 @@ ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Body:
+class AuditedBody:
     """What keeps clear: its outline in a frame that moves among edges, counted from the origin."""
 
     outline: BodyOutline
-    frames: Frames
+    frames: FrameMotion
     offset: complex  # x + i y [m] from the origin of the edges to that of the frames
     doubt: float = 0.0  # [m, rad] how far a pose may be off at most
     height: tuple[float, float] = (0.0, 0.0)  # [m] about its altitude
@@ -51,7 +51,7 @@ class Body:
         return bool(self.frames.series.shape[2] > 3)
 
 
-class Places(NamedTuple):
+class SpanPlaces(NamedTuple):
     """Where a body is at the begin and the end of stretches of time, and how it leaves chords."""
 
     spans: Spans  # (s,)
@@ -64,21 +64,21 @@ class Places(NamedTuple):
     off_by_reach: Array  # (s,) what is added for each metre that a point is from there
 
 
-class Pairs(NamedTuple):
+class EdgePairs(NamedTuple):
     """Stretches of time, each with an edge of an obstacle, and where its frame is at their ends."""
 
-    places: Places
+    places: SpanPlaces
     span: IntArray  # (m,) numbers of stretches
     edge: IntArray  # (m,)
     frames: Array | None  # (m, 2, 3) of moving obstacles
 
-    def of(self, rows: Any) -> Pairs:
+    def of(self, rows: Any) -> EdgePairs:
         """Some of them, by number, slice or truth."""
         frames = None if self.frames is None else self.frames[rows]
-        return Pairs(self.places, self.span[rows], self.edge[rows], frames)
+        return EdgePairs(self.places, self.span[rows], self.edge[rows], frames)
 
 
-class Bounds(NamedTuple):
+class ClearanceBounds(NamedTuple):
     """What is known of pairs."""
 
     least: Array  # (m,) [m] the clearance is never less
@@ -91,7 +91,7 @@ class Bounds(NamedTuple):
         return np.minimum(self.at_begin, self.at_end)
 
 
-def places_of(body: Body, spans: Spans) -> Places:
+def places_of(body: AuditedBody, spans: Spans) -> SpanPlaces:
     """Where a body is at the ends of stretches of time, counted as the edges are."""
     frames, element = body.frames, spans.element
     both = np.concatenate([element, element])
@@ -101,7 +101,7 @@ def places_of(body: Body, spans: Spans) -> Places:
     begins = frames.times[:-1]
     lasts = (spans.end - spans.begin) * (frames.times[1:] - begins)[element]
     eighth = 0.125 * lasts * lasts
-    return Places(
+    return SpanPlaces(
         spans=spans,
         place=place,
         turn=turn,
@@ -113,14 +113,16 @@ def places_of(body: Body, spans: Spans) -> Places:
     )
 
 
-def time_of(body: Body, pairs: Pairs, known: Bounds, row: int) -> float:
+def time_of(body: AuditedBody, pairs: EdgePairs, known: ClearanceBounds, row: int) -> float:
     """When [s] since the start the clearance of a pair was measured."""
     spans = pairs.places.spans.of(pairs.span[row : row + 1])
     share = spans.begin if known.at_begin[row] <= known.at_end[row] else spans.end
     return float(body.frames.times_at(spans.element, share)[0])
 
 
-def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool = False) -> Bounds:
+def bounds_of(
+    body: AuditedBody, around: Surroundings, pairs: EdgePairs, *, overlaps: bool = False
+) -> ClearanceBounds:
     """What is known of the clearance of a body to edges over stretches of time.
 
     Outlines that cross are looked for where a chord crosses an edge, where edges may be flown over,
@@ -129,7 +131,7 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
     if pairs.edge.size > AT_ONCE:
         blocks = [slice(k, k + AT_ONCE) for k in range(0, pairs.edge.size, AT_ONCE)]
         parts = [bounds_of(body, around, pairs.of(one), overlaps=overlaps) for one in blocks]
-        return Bounds(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+        return ClearanceBounds(*(np.concatenate(column) for column in zip(*parts, strict=True)))
     edges, own, places, span = around.outline, body.outline.edges, pairs.places, pairs.span
     a, b = edges.begins[pairs.edge], edges.ends[pairs.edge]
     n = own.begins.size
@@ -166,10 +168,10 @@ def bounds_of(body: Body, around: Surroundings, pairs: Pairs, *, overlaps: bool 
     if places.altitude is not None:
         heights = around.heights[pairs.edge]
         apart = np.hypot(apart, _apart_in_height(body, pairs, heights, places.altitude))
-    return Bounds(*apart)
+    return ClearanceBounds(*apart)
 
 
-def _radius(body: Body, around: Surroundings, pairs: Pairs) -> Array | None:
+def _radius(body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> Array | None:
     """Radii of what comes near (2 n, m) [m]; None if all have corners."""
     own = body.outline.edges.radius
     if not (around.rounds or body.outline.radius):
@@ -200,7 +202,9 @@ def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Arr
     return np.asarray(apart.min(axis=1))
 
 
-def _off(body: Body, around: Surroundings, pairs: Pairs, paths: Points, end_reach: Array) -> Array:
+def _off(
+    body: AuditedBody, around: Surroundings, pairs: EdgePairs, paths: Points, end_reach: Array
+) -> Array:
     """How far [m] paths (2, 2 n, m) leave their chords at most: (2 n, m).
 
     Edges are at distances `end_reach` (m,) from their frames, which run evenly, or on arcs that
@@ -216,8 +220,10 @@ def _off(body: Body, around: Surroundings, pairs: Pairs, paths: Points, end_reac
         drift = np.hypot(change[:, 0], change[:, 1]) / lasting
         motion = around.motion_of_edge[pairs.edge]
         moves = (motion >= 0) & (lasts > 0.0)
-        drift = np.maximum(drift, np.where(moves, np.append(around.speeds, 0.0)[motion], 0.0))
-        bend = np.where(moves, np.append(around.bends, 0.0)[motion], 0.0)
+        drift = np.maximum(
+            drift, np.where(moves, np.append(around.movers.speeds, 0.0)[motion], 0.0)
+        )
+        bend = np.where(moves, np.append(around.movers.bends, 0.0)[motion], 0.0)
         spin = np.abs(change[:, 2]) / lasting
         edge_speed = drift + spin * end_reach
     seen = np.abs(paths[:, n])
@@ -234,7 +240,7 @@ def _off(body: Body, around: Surroundings, pairs: Pairs, paths: Points, end_reac
     return np.asarray(off)
 
 
-def _apart_in_height(body: Body, pairs: Pairs, heights: Array, altitude: Array) -> Array:
+def _apart_in_height(body: AuditedBody, pairs: EdgePairs, heights: Array, altitude: Array) -> Array:
     """Vertical clearances (3, m): at least on the way, at the begin, at the end."""
     places, span = pairs.places, pairs.span
     rise = body.frames.rise[places.spans.element]
@@ -247,7 +253,7 @@ def _apart_in_height(body: Body, pairs: Pairs, heights: Array, altitude: Array) 
 
 
 def _overlap(
-    body: Body,
+    body: AuditedBody,
     around: Surroundings,
     edge: IntArray,
     corners: Points,

@@ -6,8 +6,8 @@ from maneuver_automaton.bounds.levels import Proof as Proof
 from maneuver_automaton.bounds.levels import cell_proofs as cell_proofs
 from maneuver_automaton.bounds.pose_scene import PoseScene as PoseScene
 from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene
-from maneuver_automaton.bounds.separation import Connection as Connection
 from maneuver_automaton.bounds.separation import Narrowest as Narrowest
+from maneuver_automaton.bounds.separation import Reachability as Reachability
 from maneuver_automaton.bounds.separation import Separation as Separation
 from maneuver_automaton.bounds.separation import connectivity as connectivity
 from maneuver_automaton.bounds.separation import goals_blocked as goals_blocked

@@ -23,7 +23,7 @@ Index = tuple[int, int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Cells:
+class PoseCells:
     """Cells [i, i + 1] x [j, j + 1] x [k, k + 1] times their sizes, seen from a goal.
 
     The goal is the node (0, 0, 0), in the scene's frame. Nodes of a coarser level are nodes of the
@@ -114,12 +114,12 @@ def first_cells(
     headings: int,
     box: Array,
     over: Callable[[], bool] = lambda: False,
-) -> Cells:
+) -> PoseCells:
     """All cells of a rectangle (4,) of places, and of all headings, that a plan may visit."""
     low = np.floor(box[:2] / size).astype(np.int64)
     high = np.maximum(np.ceil(box[2:] / size).astype(np.int64), low + 1)
     shape = (*(high - low).tolist(), headings)
-    cells = Cells(
+    cells = PoseCells(
         size=size,
         headings=headings,
         low=np.array([low[0], low[1], 0]),
@@ -130,11 +130,11 @@ def first_cells(
 
 
 def finer(
-    cells: Cells,
+    cells: PoseCells,
     kept: NDArray[np.bool_],
     scene: PoseScene,
     over: Callable[[], bool] = lambda: False,
-) -> Cells | None:
+) -> PoseCells | None:
     """Halves of the cells that are kept; None if there are none left, or too many to hold."""
     active = np.where(kept, cells.active, 0).astype(np.uint8)
     low = cells.low
@@ -157,7 +157,7 @@ def finer(
         return None
     part = active[begin[0] : end[0], begin[1] : end[1], begin[2] : end[2]]
     halves = part.repeat(2, axis=0).repeat(2, axis=1).repeat(2, axis=2)
-    halved = Cells(
+    halved = PoseCells(
         size=0.5 * cells.size,
         headings=2 * cells.headings,
         low=2 * (low + begin),
@@ -167,7 +167,7 @@ def finer(
     return _classified(halved, scene, over)
 
 
-def _classified(cells: Cells, scene: PoseScene, over: Callable[[], bool]) -> Cells:
+def _classified(cells: PoseCells, scene: PoseScene, over: Callable[[], bool]) -> PoseCells:
     """Without the cells all of whose poses collide, as far as there is time to judge them."""
     unknown = np.argwhere(cells.active == 1)
     half = 0.5 * np.array([cells.size, cells.size, cells.turn])
@@ -182,7 +182,7 @@ def _classified(cells: Cells, scene: PoseScene, over: Callable[[], bool]) -> Cel
     return cells
 
 
-def connected(cells: Cells, seeds: list[Index]) -> NDArray[np.bool_]:
+def connected(cells: PoseCells, seeds: list[Index]) -> NDArray[np.bool_]:
     """Active cells that hang together with the seeds, by faces, edges or corners."""
     seen = np.zeros_like(cells.active)
     stack = np.empty(cells.active.size + len(seeds), dtype=np.int64)
@@ -196,7 +196,7 @@ def connected(cells: Cells, seeds: list[Index]) -> NDArray[np.bool_]:
     return seen.astype(bool)
 
 
-def on_finer(cells: Cells, halved: Cells, value: Array) -> Array:
+def on_finer(cells: PoseCells, halved: PoseCells, value: Array) -> Array:
     """A function (gears, nodes) of a level at the nodes of the next one; it stays the same."""
     for axis in range(3):
         at = (np.arange(halved.nodes[axis]) + halved.low[axis]) * 0.5 - cells.low[axis]
@@ -221,7 +221,7 @@ class CostToGo:
     """
 
     world: World  # in whose frame the cells are counted
-    cells: Cells
+    cells: PoseCells
     value: Array  # (gears, nodes), falls along no motion faster than the cost rises
     at_goal: float  # greatest value at a goal
     start: Array  # (3,) the pose it was proven for, in that frame

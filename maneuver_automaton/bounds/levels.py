@@ -18,9 +18,9 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.bounds import _kernels_certificate
 from maneuver_automaton.bounds._kernels_dual import LANES
 from maneuver_automaton.bounds.cells import (
-    Cells,
     CostToGo,
     Index,
+    PoseCells,
     connected,
     finer,
     first_cells,
@@ -28,7 +28,7 @@ from maneuver_automaton.bounds.cells import (
 )
 from maneuver_automaton.bounds.families import Motions, motions_of
 from maneuver_automaton.bounds.pose_scene import PoseScene, pose_scene
-from maneuver_automaton.bounds.program import Program, program_of, raised, slope
+from maneuver_automaton.bounds.program import BoundProgram, program_of, raised, slope
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.distance_grid import OCTILE
 
@@ -61,7 +61,7 @@ class Proof:
 class _Level:
     """One level, and bounds of its cells that are known by then."""
 
-    cells: Cells
+    cells: PoseCells
     from_start: Array  # (gears, nodes), admissible, backward
     to_goal: Array  # (gears, nodes), admissible
     guess: Array  # (gears, nodes), whatever it is
@@ -89,7 +89,7 @@ def proofs(
     """
     limit = min(cap, incumbent())
     gears = 2 if motions.price > 0.0 else 1
-    cells: Cells | None = _coarsest(scene, motions, start, goals, limit, over)
+    cells: PoseCells | None = _coarsest(scene, motions, start, goals, limit, over)
     level: _Level | None = None
     best, work, depth, reach = 0.0, 0, 0, limit
     function: CostToGo | None = None
@@ -169,17 +169,17 @@ def proofs(
         depth += 1
 
 
-def _proof(cells: Cells, value: float, total: int, work: int) -> Proof:
+def _proof(cells: PoseCells, value: float, total: int, work: int) -> Proof:
     return Proof(value=value, optimal=False, cells=total, size=cells.size, work=work)
 
 
-def _fall(cells: Cells, value: Array, at: Array, fixed: NDArray[np.bool_]) -> float:
+def _fall(cells: PoseCells, value: Array, at: Array, fixed: NDArray[np.bool_]) -> float:
     """How far a function falls from the start to any pose of the goal, at least."""
     return cells.value_at(value, at) - float(value[:, fixed].max())
 
 
 def _solved(
-    program: Program, at: Array, fixed: NDArray[np.bool_], limit: float, most: int
+    program: BoundProgram, at: Array, fixed: NDArray[np.bool_], limit: float, most: int
 ) -> Iterator[tuple[float, Array, int]]:
     """Values proven on a level, each with the best function by then, and the steps it took."""
     cells, motions = program.cells, program.motions
@@ -222,7 +222,7 @@ def _steered(raw: float, steep: float, limit: float) -> float:
 
 def _tube(
     level: _Level,
-    program: Program,
+    program: BoundProgram,
     found: Array,
     at: Array,
     seeds: list[Index],
@@ -245,7 +245,7 @@ def _tube(
 
 
 def _lifted(
-    program: Program,
+    program: BoundProgram,
     value: Array,
     fixed: NDArray[np.bool_],
     over: Callable[[], bool],
@@ -262,7 +262,7 @@ def _lifted(
     return value / max(slope(cells, columns, motions, sign * value), 1.0)
 
 
-def _least(cells: Cells, columns: NDArray[np.int64], value: Array) -> Array:
+def _least(cells: PoseCells, columns: NDArray[np.int64], value: Array) -> Array:
     least = np.full(cells.active.shape, math.inf)
     _kernels_certificate.least_in_cells(np.ascontiguousarray(value), columns, least)
     return least
@@ -275,7 +275,7 @@ def _coarsest(
     goals: tuple[Goal, ...],
     limit: float,
     over: Callable[[], bool],
-) -> Cells:
+) -> PoseCells:
     """All cells that a plan of a cost may visit."""
     length = limit * motions.speed
     low, high = np.full(2, math.inf), np.full(2, -math.inf)
@@ -307,7 +307,7 @@ def _coarsest(
     return first_cells(scene, size=size, headings=HEADINGS, box=box, over=over)
 
 
-def _goal_cells(cells: Cells, goals: tuple[Goal, ...]) -> list[Index]:
+def _goal_cells(cells: PoseCells, goals: tuple[Goal, ...]) -> list[Index]:
     """Cells that hold a pose where a plan may end."""
     found: list[Index] = []
     for goal in goals:
@@ -317,7 +317,7 @@ def _goal_cells(cells: Cells, goals: tuple[Goal, ...]) -> list[Index]:
     return sorted(set(found))
 
 
-def _exact_node(cells: Cells, goals: tuple[Goal, ...]) -> Index | None:
+def _exact_node(cells: PoseCells, goals: tuple[Goal, ...]) -> Index | None:
     """The node that is the only goal; None if the goal is more than a node."""
     goal = goals[0]
     if len(goals) > 1 or goal.free_heading or goal.tolerance_m or goal.tolerance_rad:
@@ -326,7 +326,7 @@ def _exact_node(cells: Cells, goals: tuple[Goal, ...]) -> Index | None:
     return i, j, k
 
 
-def _nodes_of(cells: Cells, inside: list[Index], *, exact: Index | None) -> NDArray[np.bool_]:
+def _nodes_of(cells: PoseCells, inside: list[Index], *, exact: Index | None) -> NDArray[np.bool_]:
     """Nodes where the value is fixed: those of cells, or the one that is the goal."""
     fixed = np.zeros(cells.nodes, dtype=np.bool_)
     if exact is not None:
@@ -341,7 +341,7 @@ def _nodes_of(cells: Cells, inside: list[Index], *, exact: Index | None) -> NDAr
     return fixed
 
 
-def _in_the_plane(cells: Cells, fixed: NDArray[np.bool_], gears: int) -> Array:
+def _in_the_plane(cells: PoseCells, fixed: NDArray[np.bool_], gears: int) -> Array:
     """Distances in the plane to the goal (gears, nodes) [m], as a first guess."""
     from scipy.sparse import coo_matrix  # not where kernels are compiled
     from scipy.sparse.csgraph import dijkstra
@@ -365,7 +365,7 @@ def _in_the_plane(cells: Cells, fixed: NDArray[np.bool_], gears: int) -> Array:
     return np.broadcast_to(found.reshape(1, n_i, n_j, 1), shape).copy()
 
 
-def _spread(level: _Level, cells: Cells) -> NDArray[np.float32]:
+def _spread(level: _Level, cells: PoseCells) -> NDArray[np.float32]:
     """Dual values of a level for the next one: an eighth of the parent's for every cell."""
     assert level.dual is not None
     index = np.argwhere(cells.active)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.bounds import _kernels_ascent, _kernels_certificate, _kernels_dual
 from maneuver_automaton.bounds.arrays import Rows, Single
-from maneuver_automaton.bounds.cells import Cells
+from maneuver_automaton.bounds.cells import PoseCells
 from maneuver_automaton.bounds.families import Families, Motions
 
 OVER = 1.9  # times the step of the method: the limit for convergence is 2
@@ -27,10 +27,10 @@ ROUNDING = 1e-9  # relative, of the largest slope
 
 
 @dataclass(slots=True, eq=False, kw_only=True)
-class Program:
+class BoundProgram:
     """State of the method on one level."""
 
-    cells: Cells
+    cells: PoseCells
     motions: Motions
     columns: IntArray  # (C, 4)
     base: NDArray[np.int32]  # (blocks * 64,) first node of each cell, in blocks
@@ -66,8 +66,8 @@ class Program:
 
 
 def program_of(
-    cells: Cells, motions: Motions, *, start: Array, goal_nodes: NDArray[np.bool_], value: Array
-) -> Program:
+    cells: PoseCells, motions: Motions, *, start: Array, goal_nodes: NDArray[np.bool_], value: Array
+) -> BoundProgram:
     """The program of a level, from the pose `start` to the nodes of the goal, from first values."""
     gears = 2 if motions.price > 0.0 else 1
     families, count = motions.families, cells.active.shape[2] + 1
@@ -91,7 +91,7 @@ def program_of(
         both = aim[..., 0] + aim[..., -1]
         aim[..., 0], aim[..., -1] = both, both
     single = np.ascontiguousarray(value, dtype=np.float32)
-    return Program(
+    return BoundProgram(
         cells=cells,
         motions=motions,
         columns=columns,
@@ -107,7 +107,7 @@ def program_of(
     )
 
 
-def _blocks(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _blocks(cells: PoseCells) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """First node and layer of each active cell, filled up to whole blocks."""
     index = np.argwhere(cells.active)
     count = -(-len(index) // _kernels_dual.LANES) * _kernels_dual.LANES
@@ -118,7 +118,7 @@ def _blocks(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     return base, layer
 
 
-def slope(cells: Cells, columns: IntArray, motions: Motions, value: Array) -> float:
+def slope(cells: PoseCells, columns: IntArray, motions: Motions, value: Array) -> float:
     """Upper bound of how fast a function (gears, nodes) falls along motions, per unit of cost."""
     if cells.round_trip and (value[..., 0] != value[..., -1]).any():
         return math.inf  # it jumps where the circle of headings is closed
@@ -132,7 +132,7 @@ def slope(cells: Cells, columns: IntArray, motions: Motions, value: Array) -> fl
 
 
 def raised(
-    program: Program,
+    program: BoundProgram,
     value: Array,
     *,
     fixed: NDArray[np.bool_],
@@ -177,14 +177,14 @@ def raised(
     return single.astype(np.float64)
 
 
-def _filled(program: Program) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _filled(program: BoundProgram) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """First nodes and layers of whole blocks, filled up with the first cell once more."""
     filler = program.layer == program.cells.active.shape[2]
     base = np.where(filler, program.base[0], program.base)
     return base.astype(np.int32), np.where(filler, program.layer[0], program.layer).astype(np.int32)
 
 
-def _weights(cells: Cells, families: Families) -> Array:
+def _weights(cells: PoseCells, families: Families) -> Array:
     """Directions (F, K + 1, 2) at the layers as the rows have them [1 per unit of cost]."""
     headings = cells.layers[None, :] + families.angle[:, None]
     ahead = np.stack([np.cos(headings), np.sin(headings)], axis=2)
@@ -193,7 +193,7 @@ def _weights(cells: Cells, families: Families) -> Array:
     return np.asarray(ahead * scale[:, None, None])
 
 
-def _directions(cells: Cells, families: Families, rows: int) -> tuple[Single, Single]:
+def _directions(cells: PoseCells, families: Families, rows: int) -> tuple[Single, Single]:
     """The directions at both layers of each cell (F, rows, K + 1), what follows 0; turn rates."""
     weights = _weights(cells, families).astype(np.float32)
     table = np.zeros((families.side.size, rows, weights.shape[1]), dtype=np.float32)
@@ -202,7 +202,7 @@ def _directions(cells: Cells, families: Families, rows: int) -> tuple[Single, Si
     return table, (families.turn_rate / cells.turn).astype(np.float32)
 
 
-def _rows(program: Program) -> Rows:
+def _rows(program: BoundProgram) -> Rows:
     cells, families = program.cells, program.motions.families
     table, rates = _directions(cells, families, 7)
     steps = 1.0 / np.maximum(program.weight * program.rate, 1e-30)
@@ -215,7 +215,7 @@ def _rows(program: Program) -> Rows:
     )
 
 
-def _shares(cells: Cells, families: Families, size: Array, turn: Array, gears: int) -> Array:
+def _shares(cells: PoseCells, families: Families, size: Array, turn: Array, gears: int) -> Array:
     """One over the sum of the entries of each node in all rows, 0 where there are none."""
     active = cells.active > 0
     total = np.zeros((gears, *cells.nodes))

@@ -44,7 +44,7 @@ ROUGHLY = 0.5  # share by which a length that is said may be too large
 FIRST = 0.02  # [m] by which obstacles draw back at first
 
 
-class Connection(enum.Enum):
+class Reachability(enum.Enum):
     """Whether two sets of poses are connected."""
 
     CONNECTED = "connected"  # through boxes that are free
@@ -56,7 +56,7 @@ class Connection(enum.Enum):
 class Connectivity:
     """The answer, and the boxes that it rests on."""
 
-    answer: Connection
+    answer: Reachability
     boxes: int  # that were tested
     reached: Array  # (n, 4, 2) corners of the places of boxes that may be reached, of a separation
     path: Array  # (n, 3) poses of a way through free boxes, also on what two of them share
@@ -112,13 +112,13 @@ def connectivity(
     cells = _room(max(most_boxes, used))
     ends = (starts, goals, give)
     _kernels_connectivity.judge_roots(scene.arrays, grid, cells, *ends)
-    answer, to_start, to_goal = Connection.OPEN, *np.empty((2, len(cells.level)))
-    while answer is Connection.OPEN:
+    answer, to_start, to_goal = Reachability.OPEN, *np.empty((2, len(cells.level)))
+    while answer is Reachability.OPEN:
         _kernels_connectivity.spread(grid, cells, used, START, NO_WAY, math.inf, to_start)
         leaf = cells.child[:used] < 0
         least = to_start[:used][leaf & (cells.ends[:used] & GOAL > 0)].min(initial=math.inf)
         if least == 0.0 or math.isinf(least):
-            answer = Connection.CONNECTED if least == 0.0 else Connection.SEPARATED
+            answer = Reachability.CONNECTED if least == 0.0 else Reachability.SEPARATED
             break
         most = float(least) * (1.0 + 2.0 * ROUNDED)
         _kernels_connectivity.spread(grid, cells, used, GOAL, to_start, most, to_goal)
@@ -131,7 +131,7 @@ def connectivity(
         used = _kernels_connectivity.split_cells(scene.arrays, grid, cells, chosen, used, *ends)
         if time.monotonic() > deadline:
             break
-    separated, connected = answer is Connection.SEPARATED, answer is Connection.CONNECTED
+    separated, connected = answer is Reachability.SEPARATED, answer is Reachability.CONNECTED
     known = np.isfinite(to_start[:used]) & (cells.child[:used] < 0)
     path = _kernels_connectivity.free_path(grid, cells, used) if connected else np.zeros(0, int)
     return Connectivity(
@@ -301,7 +301,7 @@ def separation(
             scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
         )
     )
-    if proof.answer is not Connection.SEPARATED:
+    if proof.answer is not Reachability.SEPARATED:
         return None
     narrowest = _narrowest(problem, scene, start, goals, deadline)
     return Separation(boxes=proof.boxes, reached=proof.reached, narrowest=narrowest)
@@ -309,7 +309,7 @@ def separation(
 
 def widest_path(
     problem: Problem, *, first: float, most_boxes: int = MOST_BOXES, deadline: float = math.inf
-) -> tuple[Connection, Array, float]:
+) -> tuple[Reachability, Array, float]:
     """Whether a path leads to a goal, its poses (n, 3), and how far it stays from all [m].
 
     The path that is found with the most room, of some that are tried: `first` [m] at first. It
@@ -330,12 +330,12 @@ def widest_path(
     scene, start, goals = _asked(problem)
     ask = functools.partial(connectivity, scene, start, goals, bounds=problem.bounds)
     found, kept, apart = ask(most_boxes=most_boxes, deadline=deadline), 0.0, first
-    _proofs(problem).extend([found] if found.answer is Connection.SEPARATED else [])
-    for _ in range(TRIES if found.answer is Connection.CONNECTED else 0):
+    _proofs(problem).extend([found] if found.answer is Reachability.SEPARATED else [])
+    for _ in range(TRIES if found.answer is Reachability.CONNECTED else 0):
         if time.monotonic() > deadline or apart - kept <= ROUGHLY * kept / 2.0:
             break
         wider = ask(give=-apart, price=1.0, most_boxes=MOST_TRIED, deadline=deadline)
-        if wider.answer is Connection.CONNECTED:
+        if wider.answer is Reachability.CONNECTED:
             found, kept, apart = wider, apart, (1.0 + ROUGHLY) * apart
         else:
             apart = 0.5 * (kept + apart)
@@ -360,7 +360,7 @@ def goals_blocked(problem: Problem, *, most_boxes: int, deadline: float = math.i
         proof = connectivity(
             scene, ends, ends, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
         )
-        if proof.answer is not Connection.SEPARATED:
+        if proof.answer is not Reachability.SEPARATED:
             return False
     return True
 
@@ -411,7 +411,7 @@ def _narrowest(
             price=1.0,  # which finds ways sooner than it proves that there is none
             deadline=deadline,
         )
-        if tried.answer is Connection.CONNECTED:
+        if tried.answer is Reachability.CONNECTED:
             high, path = give, tried.path
         else:
             low = give

@@ -15,7 +15,7 @@ from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.shapes import AnyObstacle, OccupancyMap, Shape, name_of
 from maneuver_automaton.collision.surroundings import (
-    Part,
+    ShapePart,
     fastest_point,
     parts_of,
     runs_of,
@@ -88,7 +88,7 @@ def too_close(margin: float) -> float:
     return max(CONTACT, margin - CONTACT)
 
 
-def _point_of(obstacle: AnyObstacle, body: list[Part], here: Array, time: float) -> Array:
+def _point_of(obstacle: AnyObstacle, body: list[ShapePart], here: Array, time: float) -> Array:
     """The point (2,) of an obstacle that is nearest to the body."""
     import shapely
 

@@ -25,7 +25,7 @@ from maneuver_automaton.collision.shapes import (
     Shape,
 )
 from maneuver_automaton.collision.solids import (
-    Region,
+    Cover,
     Skin,
     body_skin,
     obstacle_region,
@@ -289,7 +289,7 @@ def _ground_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
 ) -> _Ground:
     to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
-    regions: list[Region] = []
+    regions: list[Cover] = []
     owners: list[int] = []
     for index, far in enumerate(obstacles):
         if isinstance(far, Obstacle) and far.motion is not None:

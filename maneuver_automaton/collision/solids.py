@@ -30,7 +30,7 @@ from maneuver_automaton.groups import SE2
 POINT = 1e-9  # [m] half the side of the square that stands for a vehicle without a footprint
 
 
-class Region(NamedTuple):
+class Cover(NamedTuple):
     """A part of the plane: triangles that cover it, and where posts stand, two on each part."""
 
     cover: Array  # (n, 3, 2) [m]
@@ -103,7 +103,7 @@ def convex_hull(points: Array) -> Array:
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
-def obstacle_region(obstacle: AnyObstacle, *, excess: float) -> Region:
+def obstacle_region(obstacle: AnyObstacle, *, excess: float) -> Cover:
     """The region of an obstacle in its own frame; a disc stands out by at most `excess` [m].
 
     Raises
@@ -126,7 +126,7 @@ def obstacle_region(obstacle: AnyObstacle, *, excess: float) -> Region:
     if isinstance(obstacle.shape, Box):
         return _region(_fan(obstacle.shape.corners)[None])
     parts = [_region(_triangles(part)[None]) for part in outlines(obstacle.shape)]
-    return Region(*map(np.concatenate, zip(*parts, strict=True)))
+    return Cover(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def body_skin(pieces: Sequence[Array]) -> Skin:
@@ -151,7 +151,7 @@ def body_skin(pieces: Sequence[Array]) -> Skin:
     return Skin(np.concatenate(vertices), np.concatenate(triangles))
 
 
-def obstacle_skin(regions: Sequence[Region]) -> tuple[Skin, IntArray]:
+def obstacle_skin(regions: Sequence[Cover]) -> tuple[Skin, IntArray]:
     """Sheets and posts of regions, and which region each triangle belongs to.
 
     Examples
@@ -180,10 +180,10 @@ def _raised(places: Array, height: float) -> Array:
     return np.column_stack([places, np.full(len(places), height)])
 
 
-def _region(triangles: Array) -> Region:
+def _region(triangles: Array) -> Cover:
     """Connected parts (k, m, 3, 2) of m triangles each; no line holds both posts of one."""
     posts = triangles[:, 0][:, [[0, 1], [1, 2]]]
-    return Region(triangles.reshape(-1, 3, 2), posts.reshape(-1, 2, 2))
+    return Cover(triangles.reshape(-1, 3, 2), posts.reshape(-1, 2, 2))
 
 
 def _grown(part: Array, corners: Array) -> Array:

@@ -26,7 +26,7 @@ from maneuver_automaton.collision.shapes import (
 from maneuver_automaton.groups import SE2
 
 
-class Part(NamedTuple):
+class ShapePart(NamedTuple):
     """A shapely polygon, or a point with a radius."""
 
     core: Any
@@ -58,7 +58,7 @@ class Nearest(NamedTuple):
 class _Single(NamedTuple):
     """An obstacle that the tree does not hold: a disc, or a part of a moving one."""
 
-    part: Part
+    part: ShapePart
     motion: Motion
     owner: int
     present: tuple[float, float] = (-math.inf, math.inf)  # [s]
@@ -69,7 +69,7 @@ class _Single(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Surroundings:
+class ObstacleDistances:
     """Obstacles counted from an origin, prepared once for any number of plans.
 
     Examples
@@ -86,7 +86,7 @@ class Surroundings:
     singles: tuple[_Single, ...]
     speed: float  # [m/s] no point of an obstacle is faster
 
-    def nearest(self, body: Sequence[Part], poses: Array, times: Array) -> Nearest:
+    def nearest(self, body: Sequence[ShapePart], poses: Array, times: Array) -> Nearest:
         """Distance to the nearest obstacle, and which, at poses (n, 3) and times (n,) [s]."""
         best = Nearest(np.full(len(poses), math.inf), np.full(len(poses), -1))
         for part in body:
@@ -96,13 +96,15 @@ class Surroundings:
                 best = self._nearest_single(part, poses, times, best)
         return best
 
-    def _nearest_in_tree(self, part: Part, poses: Array) -> Nearest:
+    def _nearest_in_tree(self, part: ShapePart, poses: Array) -> Nearest:
         (_, which), away = self.tree.query_nearest(
             part.at(poses), return_distance=True, all_matches=False
         )
         return Nearest(np.maximum(away - part.radius, 0.0), self.owners[which])
 
-    def _nearest_single(self, part: Part, poses: Array, times: Array, best: Nearest) -> Nearest:
+    def _nearest_single(
+        self, part: ShapePart, poses: Array, times: Array, best: Nearest
+    ) -> Nearest:
         """Measured only where discs around both do not say that another is nearer."""
         import shapely
 
@@ -133,14 +135,14 @@ class Surroundings:
 @functools.lru_cache(maxsize=4)
 def surroundings_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
-) -> Surroundings:
+) -> ObstacleDistances:
     """As `surroundings_around`; those of the last maps are kept."""
     return surroundings_around(obstacles, origin)
 
 
 def surroundings_around(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
-) -> Surroundings:
+) -> ObstacleDistances:
     """Obstacles counted from an origin [m].
 
     Raises
@@ -167,7 +169,7 @@ def surroundings_around(
             else:
                 moves = obstacle.motion or STANDS
                 singles.append(_Single(part, moves, index, obstacle.presence))
-    return Surroundings(
+    return ObstacleDistances(
         tree=shapely.STRtree(cores),
         owners=np.array(owners, dtype=np.int64),
         singles=tuple(singles),
@@ -181,7 +183,7 @@ def surroundings_around(
     )
 
 
-def parts_of(shapes: tuple[Shape, ...]) -> list[Part]:
+def parts_of(shapes: tuple[Shape, ...]) -> list[ShapePart]:
     """Shapes as shapely knows them; a point if there is none.
 
     Examples
@@ -193,21 +195,21 @@ def parts_of(shapes: tuple[Shape, ...]) -> list[Part]:
     import shapely
 
     if not shapes:
-        return [Part(shapely.Point(0.0, 0.0), 0.0, np.zeros(2), 0.0)]
-    parts: list[Part] = []
+        return [ShapePart(shapely.Point(0.0, 0.0), 0.0, np.zeros(2), 0.0)]
+    parts: list[ShapePart] = []
     for shape in shapes:
         if isinstance(shape, Disc):
             core = shapely.Point(shape.center)
-            parts.append(Part(core, shape.radius, shape.center, shape.radius))
+            parts.append(ShapePart(core, shape.radius, shape.center, shape.radius))
             continue
         for polygon in outlines(shape):
             low, high = np.array(polygon.bounds).reshape(2, 2)
             reach = 0.5 * float(np.hypot(*(high - low)))
-            parts.append(Part(polygon, 0.0, 0.5 * (low + high), reach))
+            parts.append(ShapePart(polygon, 0.0, 0.5 * (low + high), reach))
     return parts
 
 
-def fastest_point(body: Sequence[Part], twists: Array) -> Array:
+def fastest_point(body: Sequence[ShapePart], twists: Array) -> Array:
     """Speeds (n,) [m/s] no point of a body exceeds at twists (n, 3).
 
     Examples

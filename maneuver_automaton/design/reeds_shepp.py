@@ -23,21 +23,21 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Interval:
+class RealInterval:
     """Numbers between `low` and `high`, elementwise; operations enclose all results."""
 
     low: Array
     high: Array
 
-    def __add__(self, other: Interval | float) -> Interval:
-        if isinstance(other, Interval):
-            return Interval(self.low + other.low, self.high + other.high)
-        return Interval(self.low + other, self.high + other)
+    def __add__(self, other: RealInterval | float) -> RealInterval:
+        if isinstance(other, RealInterval):
+            return RealInterval(self.low + other.low, self.high + other.high)
+        return RealInterval(self.low + other, self.high + other)
 
-    def __neg__(self) -> Interval:
-        return Interval(-self.high, -self.low)
+    def __neg__(self) -> RealInterval:
+        return RealInterval(-self.high, -self.low)
 
-    def __sub__(self, other: Interval | float) -> Interval:
+    def __sub__(self, other: RealInterval | float) -> RealInterval:
         return self + (-other)
 
     @property
@@ -45,30 +45,32 @@ class Interval:
         """Both ends."""
         return self.low, self.high
 
-    def times(self, other: Interval) -> Interval:
+    def times(self, other: RealInterval) -> RealInterval:
         """Products."""
         products = np.stack([a * b for a in self.ends for b in other.ends])
-        return Interval(products.min(axis=0), products.max(axis=0))
+        return RealInterval(products.min(axis=0), products.max(axis=0))
 
-    def over(self, other: Interval) -> Interval:
+    def over(self, other: RealInterval) -> RealInterval:
         """Quotients; everything where the divisor may be zero."""
         apart = (other.low > 0.0) | (other.high < 0.0)
         divisor = [np.where(apart, end, 1.0) for end in other.ends]
-        value = self.times(Interval(1.0 / divisor[1], 1.0 / divisor[0]))
-        return Interval(np.where(apart, value.low, -np.inf), np.where(apart, value.high, np.inf))
+        value = self.times(RealInterval(1.0 / divisor[1], 1.0 / divisor[0]))
+        return RealInterval(
+            np.where(apart, value.low, -np.inf), np.where(apart, value.high, np.inf)
+        )
 
-    def size(self) -> Interval:
+    def size(self) -> RealInterval:
         """Absolute values."""
         least = np.maximum(0.0, np.maximum(self.low, -self.high))
-        return Interval(least, np.maximum(np.abs(self.low), np.abs(self.high)))
+        return RealInterval(least, np.maximum(np.abs(self.low), np.abs(self.high)))
 
-    def cos(self) -> Interval:
+    def cos(self) -> RealInterval:
         """Cosines."""
         first, last = np.cos(self.low), np.cos(self.high)
         low = np.where(_holds(self, HALF), -1.0, np.minimum(first, last))
-        return Interval(low, np.where(_holds(self, 0.0), 1.0, np.maximum(first, last)))
+        return RealInterval(low, np.where(_holds(self, 0.0), 1.0, np.maximum(first, last)))
 
-    def sin(self) -> Interval:
+    def sin(self) -> RealInterval:
         """Sines."""
         return (self - QUARTER).cos()
 
@@ -82,9 +84,9 @@ class Family:
     """
 
     trims: int
-    angles: tuple[tuple[Interval, int], ...]
-    turn: Interval  # of which the angles are the sum or the difference, so not both smaller
-    length: Interval  # of all else, at least zero
+    angles: tuple[tuple[RealInterval, int], ...]
+    turn: RealInterval  # of which the angles are the sum or the difference, so not both smaller
+    length: RealInterval  # of all else, at least zero
     somewhere: BoolArray  # whether shortest paths of the kind may exist for some goal of the box
     everywhere: BoolArray  # whether paths of the kind exist for all
 
@@ -123,7 +125,7 @@ def families(low: Array, high: Array) -> Iterator[Family]:
     Source: Reeds, Shepp (1990), Sec. 8: eight forms, each also in reverse, mirrored, and, where it
     is not its own image, driven from the end to the start.
     """
-    x, y, heading = (Interval(low[:, k], high[:, k]) for k in range(3))
+    x, y, heading = (RealInterval(low[:, k], high[:, k]) for k in range(3))
     cos, sin = heading.cos(), heading.sin()
     from_end = (x.times(cos) + y.times(sin), x.times(sin) - y.times(cos), heading)
     for reverse in (False, True):
@@ -136,14 +138,14 @@ def families(low: Array, high: Array) -> Iterator[Family]:
 
 
 def _image(
-    x: Interval, y: Interval, heading: Interval, reverse: bool, mirrored: bool
-) -> tuple[Interval, Interval, Interval]:
+    x: RealInterval, y: RealInterval, heading: RealInterval, reverse: bool, mirrored: bool
+) -> tuple[RealInterval, RealInterval, RealInterval]:
     """The goal of the path that is driven in the other gear, mirrored, or both."""
     turned = -heading if reverse != mirrored else heading
     return -x if reverse else x, -y if mirrored else y, turned
 
 
-def _same(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+def _same(x: RealInterval, y: RealInterval, heading: RealInterval) -> Iterator[Family]:
     """Paths whose first and last circle are turned alike."""
     far, at = _polar(x - heading.sin(), y - 1.0 + heading.cos())
     yield Family(  # L S L (8.1)
@@ -161,7 +163,7 @@ def _same(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
         trims=3,
         angles=((turned, EITHER),),
         turn=heading,
-        length=far + Interval(*(np.maximum(HALF - end, 0.0) for end in turned.ends[::-1])),
+        length=far + RealInterval(*(np.maximum(HALF - end, 0.0) for end in turned.ends[::-1])),
         somewhere=np.zeros(far.low.shape, dtype=np.bool_),
         everywhere=turned.high <= HALF + SLACK,
     )
@@ -178,11 +180,11 @@ def _same(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
     )
 
 
-def _with_image(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+def _with_image(x: RealInterval, y: RealInterval, heading: RealInterval) -> Iterator[Family]:
     """Paths that are not their own image from the end."""
     sin, cos = heading.sin(), heading.cos()
     far, at = _polar(x - sin, y - 1.0 + cos)
-    half = Interval(*(np.arcsin(np.minimum(end / 4.0, 1.0)) for end in far.ends))
+    half = RealInterval(*(np.arcsin(np.minimum(end / 4.0, 1.0)) for end in far.ends))
     yield Family(  # L R L (8.3, 8.4)
         trims=3,
         angles=((at - half + HALF, FORWARD), (heading - at - half - HALF, EITHER)),
@@ -200,7 +202,7 @@ def _with_image(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]
         everywhere=far.high <= 4.0,
     )
     straight = _tangent(far)
-    bend = Interval(np.arctan2(straight.high, -2.0), np.arctan2(straight.low, -2.0))
+    bend = RealInterval(np.arctan2(straight.high, -2.0), np.arctan2(straight.low, -2.0))
     first = at + bend
     yield Family(  # L R(pi/2) S L (8.9)
         trims=4,
@@ -222,13 +224,13 @@ def _with_image(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]
     )
 
 
-def _two_turns(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+def _two_turns(x: RealInterval, y: RealInterval, heading: RealInterval) -> Iterator[Family]:
     """Paths of two turns and a straight, L R S: never shortest, but among those of three parts."""
     sin, cos = heading.sin(), heading.cos()
     along = x.times(cos) + y.times(sin) - sin
     aside = y.times(cos) - x.times(sin) - 1.0 - cos
     wide = aside.size()
-    half = Interval(*(np.sqrt(np.maximum(4.0 - end**2, 0.0)) for end in wide.ends[::-1]))
+    half = RealInterval(*(np.sqrt(np.maximum(4.0 - end**2, 0.0)) for end in wide.ends[::-1]))
     for last, ahead in ((along - half, half), (along + half, -half)):
         _, bend = _polar(ahead, aside)
         yield Family(
@@ -241,11 +243,11 @@ def _two_turns(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
         )
 
 
-def _opposite(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
+def _opposite(x: RealInterval, y: RealInterval, heading: RealInterval) -> Iterator[Family]:
     """Paths whose first and last circle are turned against each other: their own images."""
     far, at = _polar(x + heading.sin(), y - 1.0 - heading.cos())
     straight = _tangent(far)
-    first = at + Interval(np.arctan2(2.0, straight.high), np.arctan2(2.0, straight.low))
+    first = at + RealInterval(np.arctan2(2.0, straight.high), np.arctan2(2.0, straight.low))
     yield Family(  # L S R (8.2)
         trims=3,
         angles=((first, FORWARD), (first - heading, FORWARD)),
@@ -254,7 +256,7 @@ def _opposite(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
         somewhere=far.high >= 2.0,
         everywhere=far.low >= 2.0,
     )
-    first = at + Interval(np.arctan2(straight.high, -2.0), np.arctan2(straight.low, -2.0))
+    first = at + RealInterval(np.arctan2(straight.high, -2.0), np.arctan2(straight.low, -2.0))
     yield Family(  # L R(pi/2) S L(pi/2) R (8.11)
         trims=5,
         angles=((first, FORWARD), (first - heading, FORWARD)),
@@ -263,7 +265,9 @@ def _opposite(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
         somewhere=straight.high >= 4.0,
         everywhere=far.low >= 2.0,
     )
-    middle = Interval(*(np.arccos(np.minimum((2.0 + end) / 4.0, 1.0)) for end in far.ends[::-1]))
+    middle = RealInterval(
+        *(np.arccos(np.minimum((2.0 + end) / 4.0, 1.0)) for end in far.ends[::-1])
+    )
     first = at + middle - 1.5 * np.pi
     yield Family(  # L R(u) L(u) R, the middle two in one gear (8.7)
         trims=4,
@@ -273,7 +277,9 @@ def _opposite(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
         somewhere=far.low <= 2.0,
         everywhere=far.high <= 2.0,
     )
-    middle = Interval(*(np.arccos(np.clip(1.25 - end**2 / 16.0, -1.0, 1.0)) for end in far.ends))
+    middle = RealInterval(
+        *(np.arccos(np.clip(1.25 - end**2 / 16.0, -1.0, 1.0)) for end in far.ends)
+    )
     first = at - HALF - _lag(middle)
     yield Family(  # L R(u) L(u) R, the middle two in either gear (8.8); for u beyond pi/2 too
         trims=4,
@@ -285,22 +291,22 @@ def _opposite(x: Interval, y: Interval, heading: Interval) -> Iterator[Family]:
     )
 
 
-def _lag(middle: Interval) -> Interval:
+def _lag(middle: RealInterval) -> RealInterval:
     """Angle of ``sin u + i (2 - cos u)``, which is least, pi / 3, at u = pi / 3."""
     ends = [np.arctan2(2.0 - np.cos(u), np.sin(u)) for u in middle.ends]
     least = np.where((middle.low <= HALF / 3) & (middle.high >= HALF / 3), HALF / 3, np.inf)
-    return Interval(np.minimum(least, np.minimum(*ends)), np.maximum(*ends))
+    return RealInterval(np.minimum(least, np.minimum(*ends)), np.maximum(*ends))
 
 
-def _tangent(far: Interval) -> Interval:
+def _tangent(far: RealInterval) -> RealInterval:
     """Length of the inner tangent of two circles of radius 1, their centres apart by `far`."""
-    return Interval(*(np.sqrt(np.maximum(end**2 - 4.0, 0.0)) for end in far.ends))
+    return RealInterval(*(np.sqrt(np.maximum(end**2 - 4.0, 0.0)) for end in far.ends))
 
 
-def _polar(x: Interval, y: Interval) -> tuple[Interval, Interval]:
+def _polar(x: RealInterval, y: RealInterval) -> tuple[RealInterval, RealInterval]:
     """Radius and angle of the points of rectangles; all angles where one holds the origin."""
     across, along_y = x.size(), y.size()
-    far = Interval(np.hypot(across.low, along_y.low), np.hypot(across.high, along_y.high))
+    far = RealInterval(np.hypot(across.low, along_y.low), np.hypot(across.high, along_y.high))
     middle = np.arctan2(0.5 * (y.low + y.high), 0.5 * (x.low + x.high))
     along, aside = np.cos(middle), np.sin(middle)
     corners = np.stack(
@@ -308,17 +314,17 @@ def _polar(x: Interval, y: Interval) -> tuple[Interval, Interval]:
     )
     around = far.low <= 0.0
     low = np.where(around, -HALF, middle + corners.min(axis=0))
-    return far, Interval(low, np.where(around, HALF, middle + corners.max(axis=0)))
+    return far, RealInterval(low, np.where(around, HALF, middle + corners.max(axis=0)))
 
 
-def _holds(angle: Interval, value: float) -> BoolArray:
+def _holds(angle: RealInterval, value: float) -> BoolArray:
     """Whether an interval holds `value`, modulo a full turn."""
     return np.asarray(
         np.floor((angle.high - value + SLACK) / FULL) >= np.ceil((angle.low - value - SLACK) / FULL)
     )
 
 
-def _least(angle: Interval, sign: int) -> Array:
+def _least(angle: RealInterval, sign: int) -> Array:
     """Least size of an angle of that sign, modulo a full turn and within half a turn."""
     if sign == EITHER:
         return np.minimum(_least(angle, FORWARD), _least(angle, BACKWARD))
@@ -328,7 +334,7 @@ def _least(angle: Interval, sign: int) -> Array:
     return np.where(_holds(angle, 0.0), 0.0, size)
 
 
-def _greatest(angle: Interval) -> Array:
+def _greatest(angle: RealInterval) -> Array:
     """Greatest size of an angle, driven in the gear in which it is shorter."""
     sizes = [np.abs(np.remainder(end + HALF, FULL) - HALF) for end in angle.ends]
     return np.where(_holds(angle, HALF), HALF, np.maximum(*sizes))

@@ -144,7 +144,7 @@ def along_free_path(query: LatticeQuery, table: CostTable) -> Callable[[Budget],
 
 def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPlan:
     """The word along the widest path of boxes, or none."""
-    from maneuver_automaton.bounds import Connection, widest_path
+    from maneuver_automaton.bounds import Reachability, widest_path
 
     left = SHARE * budget.left
     load_kernels("separation")  # the compiler's time is not the budget's
@@ -156,7 +156,7 @@ def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPla
         deadline=budget.deadline,
     )
     word, expansions, queries = None, 0, 0
-    if answer is Connection.CONNECTED:
+    if answer is Reachability.CONNECTED:
         path, goal = _path_of(query, poses, KEPT * apart)
         steps, expansions, queries = _steps_along(query, table, path, KEPT * apart, budget)
         word = query.word_of(steps, goal) if steps else None
@@ -165,7 +165,7 @@ def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPla
         word=None if late else word,
         expansions=expansions,
         queries=queries,
-        exhausted=answer is Connection.SEPARATED,
+        exhausted=answer is Reachability.SEPARATED,
         enclosed="",
         nearest=(math.inf, math.inf),
     )

@@ -9,7 +9,7 @@ import shapely
 from shapely import affinity
 
 from maneuver_automaton import Disc, Goal, Obstacle, OccupancyMap
-from maneuver_automaton.bounds import Connection, connectivity, pose_scene, separation
+from maneuver_automaton.bounds import Reachability, connectivity, pose_scene, separation
 from maneuver_automaton.collision import Box, Motion
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Problem
@@ -28,13 +28,13 @@ def connected(problem, **more):
 @pytest.mark.parametrize(
     ("scene", "width", "answer"),
     [
-        (gap, 1.88, Connection.SEPARATED),
-        (gap, 1.95, Connection.CONNECTED),
-        (bend, 2.99, Connection.SEPARATED),
-        (bend, 3.02, Connection.CONNECTED),
-        (dead_end, 4.9, Connection.SEPARATED),
-        (dead_end, 5.2, Connection.CONNECTED),
-        (slot, 4.71, Connection.CONNECTED),
+        (gap, 1.88, Reachability.SEPARATED),
+        (gap, 1.95, Reachability.CONNECTED),
+        (bend, 2.99, Reachability.SEPARATED),
+        (bend, 3.02, Reachability.CONNECTED),
+        (dead_end, 4.9, Reachability.SEPARATED),
+        (dead_end, 5.2, Reachability.CONNECTED),
+        (slot, 4.71, Reachability.CONNECTED),
     ],
 )
 def test_passages_are_decided_within_a_few_centimetres(scene, width, answer):
@@ -54,7 +54,7 @@ def test_a_way_through_free_boxes_collides_nowhere():
 
 
 def test_too_little_work_leaves_it_open():
-    assert connected(gap(1.88), most_boxes=3_000).answer is Connection.OPEN
+    assert connected(gap(1.88), most_boxes=3_000).answer is Reachability.OPEN
 
 
 def test_a_moved_scene_has_the_moved_proof():
@@ -64,7 +64,7 @@ def test_a_moved_scene_has_the_moved_proof():
     problem = Problem(CAR, [4, 3, 0], [15, -2, 1.0], obstacles=walls, footprint=BODY)
     by = SE2([300.0, -50.0, 0.7])
     first, second = connected(problem), connected(problem.moved(by))
-    assert first.answer is second.answer is Connection.SEPARATED
+    assert first.answer is second.answer is Reachability.SEPARATED
     assert first.boxes == second.boxes
     assert np.allclose(second.reached, by.act(first.reached), atol=1e-6)
 
@@ -109,7 +109,7 @@ def test_a_goal_is_every_pose_within_its_tolerance():
 def test_what_moves_proves_nothing():
     wall = Obstacle(Box([0.4, 40.0], [10.0, 0.0]))
     problem = dataclasses.replace(gap(1.7), obstacles=(wall,))
-    assert connected(problem).answer is Connection.SEPARATED
+    assert connected(problem).answer is Reachability.SEPARATED
     leaves = dataclasses.replace(wall, motion=Motion([0.0, 60.0], [[0, 0, 0], [0, 90, 0]]))
     assert separation(dataclasses.replace(problem, obstacles=(leaves,))) is None
 
@@ -139,5 +139,5 @@ def test_a_long_corridor_has_as_small_boxes_as_a_short_one():
         return Problem(CAR, *ends, obstacles=obstacles, footprint=Box([2.0, 1.4]))
 
     short, long = (connected(closed(length), most_boxes=300_000) for length in (20.0, 100.0))
-    assert short.answer is long.answer is Connection.SEPARATED
+    assert short.answer is long.answer is Reachability.SEPARATED
     assert long.boxes < 6 * short.boxes

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.costs import Cost
@@ -17,6 +17,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.words import search_words
 from maneuver_automaton.words import _kernels_steering as kernels
+from tests.quickly import draws
 from tests.search.cases import REEDS_SHEPP, VECTORS, robot, vectors
 
 ROBOT = robot(REEDS_SHEPP)
@@ -59,6 +60,7 @@ def test_lengths_are_those_of_ompl():
     assert np.abs(reeds_shepp_length(goals) - stated).max() < 1e-8
 
 
+@settings(max_examples=draws(100))
 @given(goal=GOALS)
 def test_a_path_driven_back_or_mirrored_is_as_long(goal):
     length = reeds_shepp_length(goal)
@@ -66,6 +68,7 @@ def test_a_path_driven_back_or_mirrored_is_as_long(goal):
     assert reeds_shepp_length(goal * [1.0, -1.0, -1.0]) == pytest.approx(length, abs=1e-6)
 
 
+@settings(max_examples=draws(100))
 @given(first=GOALS, last=GOALS)
 def test_two_paths_are_no_shorter_than_one(first, last):
     there = (SE2(first) @ SE2(last)).pose

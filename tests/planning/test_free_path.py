@@ -10,7 +10,7 @@ import shapely
 
 from benchmarks.unreachable import FAMILIES
 from maneuver_automaton import Automaton, Box, Car, plan
-from maneuver_automaton.bounds import Connection, widest_path
+from maneuver_automaton.bounds import Reachability, widest_path
 from maneuver_automaton.bounds.separation import connectivity
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanStatus
@@ -92,7 +92,7 @@ def test_a_proof_ends_the_search(monkeypatch):
 
     def counted(*args, give=0.0, **more):
         found = connectivity(*args, give=give, **more)
-        made.extend([found] if give == 0.0 and found.answer is Connection.SEPARATED else [])
+        made.extend([found] if give == 0.0 and found.answer is Reachability.SEPARATED else [])
         return found
 
     monkeypatch.setattr(
@@ -109,6 +109,6 @@ def test_the_widest_path_is_as_wide_as_there_is_room():
     walls = [(-1, -9, 20, 0), (-1, 2.5, 20, 9)]
     problem = walled(walls, [1, 1.25, 0], [17, 1.25, 0], (0, -1, 20, 4))
     answer, path, apart = widest_path(problem, first=0.5)
-    assert answer is Connection.CONNECTED
+    assert answer is Reachability.CONNECTED
     assert 0.15 < apart < 0.3  # of 0.3 m on either side
     assert np.abs(path[:, 1] - 1.25).max() < 0.3 - apart + 0.01
