@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.cutting import first_times, last_times
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.receding_horizon.log import Decision, Origin, first_part
@@ -39,9 +39,10 @@ def at_best_pace(problem: Problem, plan: Plan) -> Plan:
     Source: the paper, Prop. 15 and Cor. 19.
     """
     moving = [bool(trim.body_velocity.any()) for trim in plan.trims]
-    if not any(moving) or not isinstance(problem.cost, Cost):
+    cost = terms_of(problem.cost)
+    if not any(moving) or cost is None:
         return plan
-    better = retime(plan, problem.automaton.model, cost=problem.cost)
+    better = retime(plan, problem.automaton.model, cost=cost)
     if not better.saving > 0.0:
         return plan
     trims = tuple(_named(problem.automaton, trim) for trim in better.after.trims)
@@ -50,9 +51,8 @@ def at_best_pace(problem: Problem, plan: Plan) -> Plan:
 
 def between_trims(problem: Problem, plan: Plan, pieces: int) -> Plan:
     """A plan with controls between those of the library, in the same time, where it costs less."""
-    if not any(trim.body_velocity.any() for trim in plan.trims) or not isinstance(
-        problem.cost, Cost
-    ):
+    cost = terms_of(problem.cost)
+    if not any(trim.body_velocity.any() for trim in plan.trims) or cost is None:
         return plan
     model = problem.automaton.model
     known = np.array([trim.control for trim in problem.automaton.trims])
@@ -61,7 +61,7 @@ def between_trims(problem: Problem, plan: Plan, pieces: int) -> Plan:
         [np.maximum(known.min(axis=0), most[:, 0]), np.minimum(known.max(axis=0), most[:, 1])],
         axis=-1,
     )
-    return least_effort(plan, model, cost=problem.cost, limits=limits, pieces=pieces)
+    return least_effort(plan, model, cost=cost, limits=limits, pieces=pieces)
 
 
 def base_name(name: str) -> str:
@@ -85,9 +85,10 @@ def _named(automaton: Automaton, trim: Trim) -> Trim:
 
 def is_uniform(plan: Plan, cost: StageCost) -> bool:
     """Whether a plan has the same quadratic effort all along."""
-    if not isinstance(cost, Cost) or not plan.trims:
+    terms = terms_of(cost)
+    if terms is None or not plan.trims:
         return False
-    report = effort_report(plan, cost.effort_matrix)
+    report = effort_report(plan, terms.effort_matrix)
     return bool(report.spread <= UNIFORM) and bool(np.isfinite(report.mean))
 
 

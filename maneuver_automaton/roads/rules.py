@@ -20,8 +20,8 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Motion, Obstacle, Polygon
-from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.blocked import too_close
+from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine, drivable_area, obstacles_in
