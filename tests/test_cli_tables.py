@@ -10,8 +10,6 @@ from rich.cells import cell_len
 
 from maneuver_automaton import Automaton, Plan, Problem, SecondOrderCar, Unicycle
 from maneuver_automaton.audit.judge import TerminalError
-from maneuver_automaton.cli import tables
-from maneuver_automaton.audit.values import TerminalError
 from maneuver_automaton.cli import terminal
 from maneuver_automaton.collision import Box
 from maneuver_automaton.planning import PlanResult, PlanStatus

@@ -53,11 +53,7 @@ from maneuver_automaton.analysis.symmetry import (
 from maneuver_automaton.analysis.turnpike import Turnpike as Turnpike
 from maneuver_automaton.analysis.turnpike import TurnpikeCase as TurnpikeCase
 from maneuver_automaton.analysis.turnpike import turnpike as turnpike
-from maneuver_automaton.analysis.unit_cost import unit_cost as unit_cost
 from maneuver_automaton.refinement.retiming import EffortReport as EffortReport
-from maneuver_automaton.refinement.effort import EffortReport as EffortReport
-from maneuver_automaton.refinement.effort import effort_report as effort_report
-from maneuver_automaton.refinement.effort import effort_threshold as effort_threshold
 from maneuver_automaton.refinement.retiming import Retiming as Retiming
 from maneuver_automaton.refinement.retiming import effort_report as effort_report
 from maneuver_automaton.refinement.retiming import effort_threshold as effort_threshold

@@ -354,7 +354,7 @@ class Automaton(Drawn):
         """
         import networkx
 
-        graph = networkx.MultiDiGraph(name=self.name)
+        graph: networkx.MultiDiGraph[str] = networkx.MultiDiGraph(name=self.name)
         for trim in self.trims:
             graph.add_node(trim.name, trim=trim)
         for a, b in product(range(len(self)), repeat=2):

@@ -157,7 +157,7 @@ def _reach(
         return (automaton.trim_names,), (), ()
     import networkx
 
-    graph = networkx.DiGraph()
+    graph: networkx.DiGraph[int] = networkx.DiGraph()
     graph.add_nodes_from(range(n_classes))
     ends = {
         (int(classes[automaton.index_of(m.source)]), int(classes[automaton.index_of(m.target)]))

@@ -33,7 +33,6 @@ from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, within
 from maneuver_automaton.recording.values import pair_text
-from maneuver_automaton.roads import RoadFleetResult, RoadPair
 from maneuver_automaton.roads import RoadFleetResult
 
 ENDING = ".json"

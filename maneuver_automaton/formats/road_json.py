@@ -14,7 +14,6 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.fleet import Closest
 from maneuver_automaton.formats.documents import (
     FLEET,
     SCHEMA,

@@ -11,10 +11,8 @@ import numpy as np
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.headings import origin_of
-from maneuver_automaton.costs import Cost, StageCost
-from maneuver_automaton.models.speeds import greatest_speed
 from maneuver_automaton.costs import StageCost, terms_of
-from maneuver_automaton.models.greatest_speed import greatest_speed
+from maneuver_automaton.models.speeds import greatest_speed
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.limits import closed_bounds

@@ -12,13 +12,10 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.costs import Cost, StageCost, terms_of
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import LEAST_DURATION, MOST_DURATION
-from maneuver_automaton.costs import Cost, StageCost, terms_of
-from maneuver_automaton.optimal_control.polish_values import LEAST_DURATION, MOST_DURATION
-from maneuver_automaton.optimal_control.problem import Components, RunningCost
 from maneuver_automaton.problem import Problem
 
 EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some

@@ -16,8 +16,7 @@ from matplotlib.path import Path
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Disc, OccupancyMap, Shape
-from maneuver_automaton.collision.outline import outlines, rings_of
-from maneuver_automaton.collision.rectangles import blocked_rectangles
+from maneuver_automaton.collision.outline import blocked_rectangles, outlines, rings_of
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import GREY, Color

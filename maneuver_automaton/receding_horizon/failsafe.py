@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.between import trims_between
+from maneuver_automaton.automaton.validation import trims_between
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.collision import AnyObstacle, Obstacle
 from maneuver_automaton.planning.tracking import clearance_at, free_until, stands_free
@@ -162,7 +162,7 @@ def _task(query: LatticeQuery, until: float) -> kernels.FailSafeTask:
     if not tick < WAITING:  # only maneuvers move it
         tick = float(np.median(arrays.edge_time)) if arrays.edge_time.size else 1.0
     still = np.flatnonzero(~numbered.twists[:m].any(axis=1))
-    rest_of = np.full(len(numbered.cost), -1)
+    rest_of = np.full(len(numbered.transitions.cost), -1)
     rest_of[numbered.class_of[still][::-1]] = still[::-1]  # the first of each class
     return kernels.FailSafeTask(
         pose=tuple(query.start.tolist()),

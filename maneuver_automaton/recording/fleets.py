@@ -30,13 +30,12 @@ from maneuver_automaton.recording.values import (
     Search,
     Table,
     asked_for,
-    bodies_of,
     effort_facts,
+    mover_of,
     nearest_fact,
     proven,
     shown,
     times_of,
-    mover_of,
     world_of,
 )
 

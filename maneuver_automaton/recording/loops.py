@@ -15,15 +15,13 @@ from maneuver_automaton.recording.values import (
     Curve,
     Event,
     Fact,
-    Mover,
     Recording,
     Table,
     asked_for,
-    bodies_of,
+    mover_of,
     times_of,
     world_of,
 )
-from maneuver_automaton.recording.values import Curve, Event, Fact, Recording, mover_of, world_of
 
 
 def recorded(result: ClosedLoop | Statistics) -> Recording | None:

@@ -88,7 +88,8 @@ def timed(plan: Plan, pace: PathLimits) -> Timed:
     mean = 0.5 * (np.sqrt(squared[:-1]) + np.sqrt(squared[1:]))
     passed = width / mean
     steering = _steering(twists, pace.wheelbase)
-    waits = _waits(steering, stroke_of, np.bincount(stroke_of[owner], passed), pace.steering_rate)
+    strokes = np.bincount(stroke_of[owner], weights=passed).astype(np.float64)
+    waits = _waits(steering, stroke_of, strokes, pace.steering_rate)
     return _assembled(
         plan, begins[owner] + share * durations[owner], passed, squared, twists[owner],
         steering[owner], stroke_of[owner], waits,

@@ -15,10 +15,8 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library, load_stock_library, stock_libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
-from maneuver_automaton.models import Model
-from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
-from maneuver_automaton.models.lateral import lateral_limit, pace_within
+from maneuver_automaton.models.speeds import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim, trims_of
 from maneuver_automaton.primitives.closed_form import has_limited_rates, quickest_maneuvers
 from maneuver_automaton.scenario.parts import at
@@ -330,7 +328,7 @@ def preset_automaton(name: str, model: Model) -> Automaton:
 
 def _lattice(name: str, model: Model) -> Automaton:
     from maneuver_automaton.formats.lattice import automaton_of_lattice, lattice_of_arcs
-    from maneuver_automaton.models.lattice_body import LatticeBody
+    from maneuver_automaton.models.robots import LatticeBody
 
     if not isinstance(model, LatticeBody):
         raise ValueError(f"got {name!r}, which is for a lattice_body, not the {model.name}")

@@ -19,16 +19,6 @@ from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.simulation import Disturbance
-from maneuver_automaton.scenario.combining import combined, own_scenario
-from maneuver_automaton.scenario.fleet_schema import (
-    OWN,
-    SHARED,
-    FleetFile,
-    FleetLoopPart,
-    FleetPart,
-    VehicleEntry,
-    VehicleLoopPart,
-from maneuver_automaton.receding_horizon.disturbance import Disturbance
 from maneuver_automaton.scenario.parts import (
     Count,
     FilePart,

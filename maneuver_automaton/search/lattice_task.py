@@ -144,11 +144,11 @@ def _layers(
     """Whether cells know the gear, the trim and the count of trims, and how many layers that is."""
     numbered = library.arrays.library
     by_gear = bool(resolution.layered and numbered.direction_change > 0.0)
-    by_trim = len(library.arrays.trims_of) > len(numbered.cost) and bool(
+    by_trim = len(library.arrays.trims_of) > len(numbered.transitions.cost) and bool(
         least_coast > 0.0 or library.limits_coasts or (resolution.layered and numbered.switch > 0.0)
     )
     by_count = most_trims > 0
-    layers = len(numbered.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
+    layers = len(numbered.transitions.cost) * (3 if by_gear else 1) * (MOST_COUNTS if by_count else 1)
     return by_gear, by_trim, by_count, layers * (numbered.n_trims + 1 if by_trim else 1)
 
 

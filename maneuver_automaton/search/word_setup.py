@@ -18,7 +18,6 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.automaton.validation import trims_between
-from maneuver_automaton.costs import Cost, StageCost
 from maneuver_automaton.costs import StageCost, prices_switches, terms_of
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.problem import Goal, Problem
