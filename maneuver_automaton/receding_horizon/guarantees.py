@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
-from maneuver_automaton.costs import Cost, terms_of
+from maneuver_automaton.costs import Cost, prices_switches, terms_of
 from maneuver_automaton.planning.lower_bound import Proving, in_costs
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
@@ -263,7 +263,5 @@ class LoopBounds:
         Not where a switch or a change of direction between two steps has a price, which neither
         step counts, nor for a fixed time, which every step begins anew.
         """
-        cost = here.cost
-        priced = not isinstance(cost, Cost) or cost.switch or cost.direction_change
-        if not priced and here.horizon.time is None:
+        if not prices_switches(here.cost) and here.horizon.time is None:
             self.least, self.at = least, accumulated
