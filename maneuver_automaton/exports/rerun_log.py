@@ -14,8 +14,7 @@ from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.collision import Obstacle, OccupancyMap
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solid_map
-from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color
-from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.colors import LANE, SEQUENCE, SWEPT, Color, track_colors
 from maneuver_automaton.plotting.obstacles import MOVING, SOLID
 from maneuver_automaton.recording import Mover, Recording, recording_to_write
 

@@ -14,10 +14,9 @@ from matplotlib.text import Text
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.plotting.colors import GREY, INK, Color, twist_color
+from maneuver_automaton.plotting.colors import GREY, INK, Color, track_colors, twist_color
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.maneuvers import draw_maneuvers
-from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.pages import plain_page, settled, write_figure
 from maneuver_automaton.plotting.paths import ARC_POINTS, DART
 from maneuver_automaton.plotting.style import TEXT_PT, shortened, tidy

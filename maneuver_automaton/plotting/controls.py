@@ -15,8 +15,7 @@ from matplotlib.lines import Line2D
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.plotting.colors import GREY, INK, Color
-from maneuver_automaton.plotting.motions import track_colors
+from maneuver_automaton.plotting.colors import GREY, INK, Color, track_colors
 from maneuver_automaton.plotting.style import outer_legend, tidy
 from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
 

@@ -32,9 +32,17 @@ def draw_ends(
     for k, (goal, color) in enumerate(zip(goals, colors, strict=True)):
         artists[f"goal {k}"] = draw_goal(ax, goal.pose, color=color)
         if goal.free_heading:
-            artists[f"any heading {k}"] = _draw_ring(ax, goal.pose, color)
+            artists[f"any heading {k}"] = ax.scatter(
+                goal.pose[0], goal.pose[1], s=210.0, facecolors="none", edgecolors=[color],
+                linewidths=1.1, zorder=4.9,
+            )  # fmt: skip
         if goal.tolerance_m > 0.0:
-            artists[f"tolerance {k}"] = _draw_set(ax, goal)
+            artists[f"tolerance {k}"] = ax.add_patch(
+                Circle(
+                    (float(goal.pose[0]), float(goal.pose[1])), goal.tolerance_m,
+                    facecolor=(*SET, 0.15), edgecolor=SET, linewidth=0.9, zorder=1.6,
+                )
+            )  # fmt: skip
     artists["headings"] = draw_headings(
         ax,
         np.array([start, *(goals[k].pose for k in headed)]),
@@ -85,19 +93,3 @@ def end_handles(goals: Sequence[Goal] = ()) -> tuple[list[Line2D], list[str]]:
         handles.append(mark_handle("o", size=9.0, face=(*SET, 0.15), edge=SET))
         names.append("goal tolerance")
     return handles, names
-
-
-def _draw_ring(ax: Axes, pose: Array, color: Color) -> PathCollection:
-    return ax.scatter(
-        pose[0], pose[1], s=210.0, facecolors="none", edgecolors=[color], linewidths=1.1,
-        zorder=4.9,
-    )  # fmt: skip
-
-
-def _draw_set(ax: Axes, goal: Goal) -> Circle:
-    disc = Circle(
-        (float(goal.pose[0]), float(goal.pose[1])), goal.tolerance_m, facecolor=(*SET, 0.15),
-        edgecolor=SET, linewidth=0.9, zorder=1.6,
-    )  # fmt: skip
-    ax.add_patch(disc)
-    return disc

@@ -14,14 +14,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from maneuver_automaton._arrays import Array, wrapped
-from maneuver_automaton.plotting.cast import Actor, Cast
-from maneuver_automaton.plotting.colors import GREY, INK, SWEPT, Color
+from maneuver_automaton.plotting.cast import Actor, Cast, Scenery
+from maneuver_automaton.plotting.colors import GREY, INK, MOST_TRIMS, SWEPT, Color, motion_names
 from maneuver_automaton.plotting.ends import SET, draw_ends
 from maneuver_automaton.plotting.footprint import footprint_polygons, merged, placed, swept_region
 from maneuver_automaton.plotting.limits import region_path
-from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names
 from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
-from maneuver_automaton.plotting.scene import Scenery
 from maneuver_automaton.plotting.style import dashed_handle, line_handle, mark_handle, shown_name
 from maneuver_automaton.plotting.track import Track, TrackPiece
 

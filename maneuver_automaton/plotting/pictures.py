@@ -12,12 +12,11 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
-from maneuver_automaton.plotting.cast import Cast, cast_of, cast_of_alternatives
+from maneuver_automaton.plotting.cast import MARGIN, Cast, cast_of, cast_of_alternatives
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.over_time import Panel, panels_of
 from maneuver_automaton.plotting.pages import EDGE, page_of, write_figure
 from maneuver_automaton.plotting.plane import draw_cast, plane_entries
-from maneuver_automaton.plotting.scene import MARGIN
 from maneuver_automaton.plotting.searches import draw_cost_bar
 from maneuver_automaton.plotting.style import word_text
 from maneuver_automaton.recording import Recording, recording_of

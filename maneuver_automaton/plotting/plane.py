@@ -11,13 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.patches import Patch
 
-from maneuver_automaton.plotting.cast import Cast, cast_of
+from maneuver_automaton.plotting.cast import Cast, cast_of, set_view
 from maneuver_automaton.plotting.colors import INK, LANE, SEQUENCE
 from maneuver_automaton.plotting.ends import end_handles
 from maneuver_automaton.plotting.limits import draw_limits, limit_handles, shape_path
 from maneuver_automaton.plotting.obstacles import draw_obstacles, obstacle_handles
 from maneuver_automaton.plotting.paths import draw_path, path_entries
-from maneuver_automaton.plotting.scene import set_view
 from maneuver_automaton.plotting.searches import draw_nodes
 from maneuver_automaton.plotting.style import SMALL_PT, outer_legend
 from maneuver_automaton.plotting.together import draw_vehicles, vehicle_entries

@@ -14,7 +14,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.plotting.motions import motion
+from maneuver_automaton.plotting.colors import motion
 from maneuver_automaton.plotting.style import POLISHED
 from maneuver_automaton.primitives import Maneuver
 

@@ -27,7 +27,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.fleet import FleetLog, simulate_fleet
 from maneuver_automaton.formats.commonroad import read_commonroad
 from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.plotting import film
+from maneuver_automaton.plotting import films as film
 from maneuver_automaton.problem import Bounds
 from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.recording import recording_of

@@ -13,9 +13,9 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.fleet import simulate_fleet
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting import film, film_of, save_film
-from maneuver_automaton.plotting.film import MOST_FRAMES, picture_times
-from maneuver_automaton.plotting.films import OUTLINED, TRAIL_S
+from maneuver_automaton.plotting import film_of, save_film
+from maneuver_automaton.plotting import films as film
+from maneuver_automaton.plotting.films import MOST_FRAMES, OUTLINED, TRAIL_S, picture_times
 from maneuver_automaton.receding_horizon import Disturbance
 from tests.fleet import robots
 from tests.plotting.cases import parking_plan, result_of, slalom_problem

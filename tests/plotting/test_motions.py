@@ -4,8 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from maneuver_automaton.plotting import draw_plane
-from maneuver_automaton.plotting.colors import twist_color
-from maneuver_automaton.plotting.motions import MOST_TRIMS, motion_names, track_colors
+from maneuver_automaton.plotting.colors import MOST_TRIMS, motion_names, track_colors, twist_color
 from tests.plotting.cases import plan_of_trims
 
 GRID = {

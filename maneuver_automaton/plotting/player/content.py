@@ -12,11 +12,10 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
-from maneuver_automaton.plotting.colors import Color
+from maneuver_automaton.plotting.cast import BODIES, LEAST_MARK, Actor, Cast, cast_of
+from maneuver_automaton.plotting.colors import Color, track_colors
 from maneuver_automaton.plotting.distances import distance_times, nearest_others
 from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.motions import track_colors
 from maneuver_automaton.plotting.player.numbers import (
     Local,
     body_entries,
@@ -34,7 +33,6 @@ from maneuver_automaton.plotting.player.numbers import (
     sample_times,
 )
 from maneuver_automaton.plotting.player.page import Player
-from maneuver_automaton.plotting.scene import BODIES, LEAST_MARK
 from maneuver_automaton.plotting.style import shown_name
 from maneuver_automaton.plotting.track import Track, joined_track
 from maneuver_automaton.recording import Curve, Fact, Mover, Recording, Search, recording_of
