@@ -28,8 +28,6 @@ from benchmarks import cases
 from benchmarks.tables import show
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import carried
-from maneuver_automaton.collision.surroundings import Part, parts_of
-from maneuver_automaton.automaton.carried import carried
 from maneuver_automaton.collision.surroundings import ShapePart, parts_of
 from maneuver_automaton.fleet import FleetProblem, FleetResult, plan_fleet
 from maneuver_automaton.scenario import load_scenario

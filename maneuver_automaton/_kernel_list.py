@@ -39,7 +39,6 @@ USES = {  # modules of kernels, by what calls them
         "search._kernels_distance",
         "search._kernels_lattice",
         "search._kernels_nodes",
-        "search._kernels_plane",
         "search._kernels_waiting",
         "words._kernels_solve",
         "words._kernels_steering",

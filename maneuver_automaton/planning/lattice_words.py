@@ -32,7 +32,6 @@ from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whol
 from maneuver_automaton.refinement.improve import Improved, Patience, improve, restarts_of
 from maneuver_automaton.refinement.incumbent_words import quick_word
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
-from maneuver_automaton.refinement.restarts import restarts_of
 from maneuver_automaton.search.arrays import CostTable
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan

@@ -207,7 +207,7 @@ def _plan(
     for row in reversed(rows):
         edge = int(search.links[row, kernels.EDGE])
         if edge >= 0:
-            maneuver = automaton.maneuvers[library.edge_maneuver[edge]]
+            maneuver = automaton.maneuvers[library.arrays.edges.maneuver[edge]]
             begin, end = (automaton.trims[automaton.index_of(name)]
                           for name in (maneuver.source, maneuver.target))  # fmt: skip
             if word[-1].name != begin.name:

@@ -18,12 +18,11 @@ import numpy as np
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_improve import attempt_all
 from maneuver_automaton.refinement.clear_insertion import Whole
-from maneuver_automaton.refinement.restarts import RANDOM, Restart, Restarts
 from maneuver_automaton.refinement.work import improving, shortcut, word_of
 from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays
 from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.lattice import distance_grids
-from maneuver_automaton.search.lattice_arrays import LatticeLibrary
+from maneuver_automaton.search.lattice_library import LatticeLibrary
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, as_wide_as_turns

@@ -288,7 +288,7 @@ def edges_of(library: Library) -> EdgeArrays:
     order = np.argsort(leaves, kind="stable")
     edge_of = np.full(len(order) + 1, SWITCH)  # the last is that of none
     edge_of[order] = np.arange(len(order))
-    counts = np.bincount(leaves, minlength=len(library.arrays.cost))
+    counts = np.bincount(leaves, minlength=len(library.arrays.transitions.cost))
     none = np.zeros(len(order))
     displacement, time = np.zeros((len(order), 4)), np.zeros(len(order))
     for e, k in enumerate(order.tolist()):
