@@ -55,8 +55,8 @@ _HOMES = {
     "Player": "player",
     "player_of": "player",
     "player_of_file": "player",
-    "draw_progress": "progress",
-    "save_progress_figure": "progress",
+    "draw_progress": "searches",
+    "save_progress_figure": "searches",
     "flies_among_heights": "space",
 }
 __getattr__, __dir__ = lazily(__name__, _HOMES)

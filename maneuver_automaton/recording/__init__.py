@@ -49,7 +49,7 @@ RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
     >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
     >>> recording = recording_of(plan(Problem(robot, [0, 0, 0], [2, 0, 0])))
     >>> recording.kind, recording.movers[0].end.tolist(), recording.facts[0].text
-    ('plan', [2.0, 0.0, 0.0], '2')
+    ('plan', [2.0, 0.0, 0.0], '2 (proven optimal)')
     """
     if isinstance(result, Recording):
         return result

@@ -154,7 +154,8 @@ def search_with_least_times(
     Examples
     --------
     >>> from maneuver_automaton.automaton import Automaton
-    >>>     >>> from maneuver_automaton.problem import Horizon
+    >>> from maneuver_automaton.models import Unicycle
+    >>> from maneuver_automaton.problem import Horizon
     >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> problem = Problem(robot, [0, 0, 0], [4, 1, 0], horizon=Horizon(max_trims=3, min_coast=0.5))
@@ -284,7 +285,9 @@ def search_insertion(
     Examples
     --------
     >>> from maneuver_automaton.automaton import Automaton
-    >>>     >>>     >>> speeds = [-2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2]
+    >>> from maneuver_automaton.costs import Cost
+    >>> from maneuver_automaton.models import Unicycle
+    >>> speeds = [-2, -1.5, -1, -0.5, 0, 0.5, 1, 1.5, 2]
     >>> robot = Automaton.of_grid(Unicycle(), [speeds, speeds])
     >>> from maneuver_automaton.problem import Horizon
     >>> cost, horizon = Cost(effort=1), Horizon(time=1.25)

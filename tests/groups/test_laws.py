@@ -10,10 +10,10 @@ from hypothesis.extra.numpy import arrays
 from hypothesis.strategies import SearchStrategy
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.groups import SE2, LieGroup, SE2xR, product
+from maneuver_automaton.groups import SE2, LieGroup, SE2xR, product, translations
 from tests.compare import assert_same_motion
 
-GROUPS = [SE2, SE2xR, product(SE2, SE2)]  # SE(2) x R is a product with translations
+GROUPS = [SE2, SE2xR, translations(3), product(SE2, SE2)]
 every_group = pytest.mark.parametrize("group", GROUPS, ids=lambda group: group.__name__)
 
 EVERYDAY = st.floats(-3.0, 3.0)

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.audit import audit_plan
@@ -33,7 +33,6 @@ def path_of(pieces, start=(0.0, 0.0, 0.0)):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
-@settings(max_examples=15)
 @given(data=st.data())
 def test_it_ends_where_the_path_ends_and_obeys_the_model(name, data):
     model = MODELS[name]
@@ -50,7 +49,6 @@ def test_it_ends_where_the_path_ends_and_obeys_the_model(name, data):
 @pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
-@settings(max_examples=30)
 @given(data=st.data())
 def test_every_pose_is_one_of_the_path(name, data):
     """What is free for the kinematic vehicle is free for this one."""
@@ -66,7 +64,6 @@ def test_every_pose_is_one_of_the_path(name, data):
 
 
 @pytest.mark.parametrize("name", MODELS)
-@settings(max_examples=15)
 @given(data=st.data(), by=st.tuples(*[st.floats(-5.0, 5.0)] * 3))
 def test_a_moved_path_has_the_moved_plan(name, data, by):
     model, move = MODELS[name], SE2(by)

@@ -149,7 +149,7 @@ def test_a_fleet_is_where_its_plans_are():
     result = crossing()
     content = player_of(result, title="Crossing").content
     assert content["title"] == "Crossing"
-    assert dict(content["facts"])["vehicles"] == "2 of 3 with a plan"
+    assert dict(content["facts"])["plans"] == "2 of 3"
     names = [one["name"] for one in content["motions"]]
     assert names == ["there", "back", "stuck"]
     for name, plan in result.plans.items():
@@ -207,7 +207,7 @@ def test_a_file_is_played_with_its_numbers():
     }
     content = player_of_file(document, plan, title="parking").content
     assert content["title"] == "parking"
-    assert dict(content["facts"])["proven"] == "at least 9"
+    assert dict(content["facts"])["cost"] == "9.75 (proven: at least 9)"
     assert content["search"]["costs"] == [[0.1, 12.0], [0.4, 9.75]]
     assert content["search"]["bounds"] == [[0.2, 8.0]]
 
