@@ -16,18 +16,18 @@ from tests.reference import plain_end
 
 def centre_clearances(grid, field) -> Array:
     """Clearance (rows, columns) of a point in the middle of every cell of a distance grid."""
-    f_j = np.arange(grid.rows) * grid.stride + grid.shift_y
-    f_i = np.arange(grid.columns) * grid.stride + grid.shift_x
+    f_j = np.arange(grid.layout.rows) * grid.layout.stride + grid.layout.shift_y
+    f_i = np.arange(grid.layout.columns) * grid.layout.stride + grid.layout.shift_x
     in_j = (f_j >= 0) & (f_j < field.distance.shape[0])
     in_i = (f_i >= 0) & (f_i < field.distance.shape[1])
-    clear = np.full((grid.rows, grid.columns), np.inf)
+    clear = np.full((grid.layout.rows, grid.layout.columns), np.inf)
     clear[np.ix_(in_j, in_i)] = field.distance[np.ix_(f_j[in_j], f_i[in_i])]
     return clear
 
 
 def cells_open(grid, field) -> Array:
     """Which cells (rows, columns) of a distance grid the pose may be in."""
-    return np.asarray(centre_clearances(grid, field) >= grid.inflation)
+    return np.asarray(centre_clearances(grid, field) >= grid.walls.inflation)
 
 
 def grid_distances(open_: Array, price: Array, cell: float, seeds: list[tuple[int, int]]) -> Array:

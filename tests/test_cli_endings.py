@@ -130,14 +130,14 @@ def at_once(number: int = signal.SIGINT) -> None:
 @pytest.mark.parametrize("found", [True, False])
 def test_the_best_plan_so_far(monkeypatch, capsys, number, code, found):
     plan = sys.modules["maneuver_automaton.planning.plan"]
-    answered = plan._answered
+    answered = plan.answer
 
     def interrupted(*args, **settings):
         before = answered(*args, **settings) if found else None
         at_once(number)
         return before or answered(*args, **settings)  # which finds that the time is over
 
-    monkeypatch.setattr(plan, "_answered", interrupted)
+    monkeypatch.setattr(plan, "answer", interrupted)
     if not found:
         Path("x.yaml").write_text(
             SCENARIO + "obstacles: [{disc_m: {center: [0.5, 0.6], radius: 0.1}}]"

@@ -620,7 +620,7 @@ def test_more_trims_than_words_can_take():
     with pytest.raises(ValueError) as error:
         plan(problem)
     assert str(error.value) == (
-        "search by words: max_trims is 9, need at most 5; use insertion for more"
+        "search by words: max_trims is 9, need at most 4; use insertion for more"
     )
 
 
