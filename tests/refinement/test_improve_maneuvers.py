@@ -117,7 +117,7 @@ def test_a_word_that_rests_on_the_way_is_cut_short():
         strict=True,
     )
     slow = here.word_of([*steps, *chain], 0)
-    few = here.library.arrays.library.n_few
+    few = here.library.arrays.library.tried.n_few
     better = work.shortcut(here, slow, n_words=few, cut=0.0)
     assert better.cost <= first.cost + 1e-9
     assert_sound(better)
