@@ -134,6 +134,7 @@ def one_use_functions() -> list[str]:
     return [place for name, place in short.items() if used[name] == 2]
 
 
+@functools.cache
 def figures() -> dict[str, int]:
     texts = {path: path.read_text(encoding="utf-8") for path in trees()}
     return {
