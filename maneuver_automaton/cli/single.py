@@ -67,9 +67,9 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
 def _with_gap(result: PlanResult) -> tuple[Fact, ...]:
     """The cost with the gap, too, where that was asked for and is open."""
     return tuple(
-        replace(one, note=f"{one.note}, gap {100.0 * (result.gap or 0.0):.2g} %")
+        replace(one, note=f", gap {100.0 * (result.gap or 0.0):.2g} %")
         for one in recording_of(result).facts
-        if one.label == "cost" and one.note.startswith("proven: ")
+        if one.bound is not None and one.bound != one.value
     )
 
 

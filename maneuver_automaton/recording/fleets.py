@@ -33,7 +33,6 @@ from maneuver_automaton.recording.values import (
     effort_facts,
     mover_of,
     nearest_fact,
-    proven,
     shown,
     times_of,
     world_of,
@@ -85,13 +84,13 @@ def _standing(problem: Problem, **more: Any) -> Mover:
 
 
 def _plan_facts(result: FleetResult) -> list[Fact]:
-    proof = ""
+    below, unit = None, ""
     if result.gap is not None:
+        below = result.cost if result.gap <= 0.0 else result.lower_bound or 0.0
         unit = " s of the last arrival" if result.objective == "last" else ""
-        proof = proven(result.lower_bound or 0.0, optimal=result.gap <= 0.0) + unit
     facts = [
         Fact(label="plans", value=f"{len(result.plans)} of {len(result.results)}"),
-        Fact(label="cost", value=result.cost, note=proof),
+        Fact(label="cost", value=result.cost, bound=below, note=unit),
     ]
     if result.alone_cost:
         facts.append(Fact(label="each alone", value=result.alone_cost, heads=False))

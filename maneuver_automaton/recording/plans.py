@@ -24,7 +24,6 @@ from maneuver_automaton.recording.values import (
     asked_for,
     effort_facts,
     mover_of,
-    proven,
     world_of,
 )
 
@@ -86,13 +85,13 @@ def stated(document: Mapping[str, Any], plan: Plan | None) -> Recording:
         )
     error, vehicle = document.get("terminal_error") or {}, document.get("vehicle") or {}
     apart, turned = error.get("position_m"), error.get("heading_rad")
-    cost, bound, proof = document.get("cost"), document.get("lower_bound"), ""
-    if cost is not None and bound is not None and document.get("gap") is not None:
-        proof = proven(bound, optimal=cost <= bound)
+    cost, bound = document.get("cost"), document.get("lower_bound")
+    if cost is not None and bound is not None:
+        bound = None if document.get("gap") is None else min(cost, bound)
     facts = plan_facts(
         cost=cost,
         duration=plan.duration,
-        proof=proof,
+        bound=bound,
         clearance=document.get("clearance_m"),
         error=None if apart is None or turned is None else (apart, turned),
     )
@@ -105,13 +104,13 @@ def plan_facts(
     *,
     cost: float | None,
     duration: float,
-    proof: str = "",
+    bound: float | None = None,
     clearance: float | None = None,
     margin: float = 0.0,
     error: tuple[float, float] | None = None,
 ) -> list[Fact]:
     """The numbers that head a plan, those that are known; `error` is in metres and radians."""
-    facts = [] if cost is None else [Fact(label="cost", value=cost, note=proof)]
+    facts = [] if cost is None else [Fact(label="cost", value=cost, bound=bound)]
     facts.append(Fact(label="duration", value=duration, unit="s"))
     if clearance is not None and math.isfinite(clearance):
         near = f" to the nearest obstacle{asked_for(clearance, margin)}"
@@ -127,17 +126,17 @@ def _facts(result: PlanResult) -> list[Fact]:
     if plan is None:
         ended = f"{result.status.value.replace('_', ' ')}: {result.reason}"
         return [Fact(label="no plan", value=ended)]
-    proof = ""
+    below = None
     if result.lower_bound is not None and result.gap is not None:
         is_best = result.gap <= 0.0 or (bound is not None and bound.kind == "incumbent")
-        proof = proven(result.lower_bound, optimal=is_best)
+        below = result.cost if is_best else result.lower_bound
     changes = replace(result.problem, cost=Cost(direction_change=1.0)).cost_of(plan)
     turns = f"{round(changes)} between forward and reverse"
     return [
         *plan_facts(
             cost=result.cost,
             duration=plan.duration,
-            proof=proof,
+            bound=below,
             clearance=result.clearance_m,
             margin=result.problem.margin,
             error=None if error is None else (error.position_m, error.heading_rad),

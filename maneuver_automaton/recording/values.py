@@ -35,15 +35,16 @@ class Fact:
     --------
     >>> Fact(label="duration", value=3.14159265, unit="s").text
     '3.14159 s'
-    >>> Fact(label="cost", value=2.00000001, note="proven optimal", more=", at once").in_full
-    '2.00000001 (proven optimal), at once'
+    >>> Fact(label="cost", value=2.00000001, bound=1.98765432, more=", at once").in_full
+    '2.00000001 (proven: at least 1.98765432), at once'
     """
 
     label: str
     value: float | str
     unit: str = ""
     digits: int = 9  # of a number; a heading has at most six of them
-    note: str = ""  # said behind the value, in brackets
+    bound: float | None = None  # proven below the value, or the value itself if it is optimal
+    note: str = ""  # said behind both, in brackets
     more: str = ""  # said behind that, where there is a line for each fact
     heads: bool = True  # whether headings of pictures and pages have it
 
@@ -60,7 +61,11 @@ class Fact:
     def _shown(self, digits: int) -> str:
         value = self.value
         said = value if isinstance(value, str) else f"{value:.{digits}g} {self.unit}".rstrip()
-        return f"{said} ({self.note})" if self.note else said
+        note = self.note
+        if self.bound is not None:
+            optimal = self.bound == value
+            note = f"proven{' optimal' if optimal else f': at least {self.bound:.{digits}g}'}{note}"
+        return f"{said} ({note})" if note else said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -388,17 +393,6 @@ def _loosest(problems: tuple[Problem, ...]) -> Bounds:
         if len(known) == len(problems):
             sides[axis] = (min(low for low, _ in known), max(high for _, high in known))
     return Bounds(**sides)
-
-
-def proven(bound: float, *, optimal: bool) -> str:
-    """What a lower bound proves, in words.
-
-    Examples
-    --------
-    >>> proven(2.9512, optimal=False), proven(3.0, optimal=True)
-    ('proven: at least 2.9512', 'proven optimal')
-    """
-    return "proven optimal" if optimal else f"proven: at least {bound:.9g}"
 
 
 def asked_for(distance: float, margin: float) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import wrapped
+from maneuver_automaton._kept import kept_with
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
@@ -291,9 +292,8 @@ def search_arrays(library: LibraryArrays) -> SearchArrays:
     )
 
 
-def _spare(library: LatticeLibrary) -> list[SearchArrays]:
-    del library  # whoever asks keeps one list for each
-    return []
+def _spare(prepared: Prepared, library: LatticeLibrary) -> list[SearchArrays]:
+    return kept_with(library, prepared, list)
 
 
 def arrays_for(
@@ -302,7 +302,7 @@ def arrays_for(
     """Arrays in which nothing is searched, with room: `known` ones, or an earlier search's."""
     if known is None:
         try:
-            known = prepared.once(_spare, library).pop()
+            known = _spare(prepared, library).pop()
         except IndexError:  # asked for before, another thread might take the last one
             known = search_arrays(library.arrays.library)
     search = with_room(known, nodes)
@@ -315,7 +315,7 @@ def arrays_for(
 
 def give_back(prepared: Prepared, library: LatticeLibrary, arrays: SearchArrays) -> None:
     """Leave the arrays of a search that is over to the next one: fresh memory costs more."""
-    spare = prepared.once(_spare, library)
+    spare = _spare(prepared, library)
     if len(spare) < MOST_SPARE and len(arrays.nodes) <= LARGEST_SPARE:
         spare.append(arrays)
 
