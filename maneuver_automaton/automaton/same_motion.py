@@ -1,4 +1,4 @@
-"""Whether two plans are one motion, however their words spell it."""
+"""Whether two plans are one motion, whatever their words are."""
 
 from __future__ import annotations
 

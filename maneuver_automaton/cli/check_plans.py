@@ -314,13 +314,13 @@ def _ended(log: FleetLog, name: str, problem: Problem, stated: Mapping[str, Any]
 
 def _together(log: FleetLog, verdict: DrivenVerdict, stated: float | None) -> Iterator[Finding]:
     """Whether any two kept apart, and the file says what was measured."""
-    calm = max(verdict.jumps_m.values(), default=0.0) <= THERE
+    undisturbed = max(verdict.jumps_m.values(), default=0.0) <= THERE
     near = [row for row in verdict.closest if row.distance_m < log.problem.margin - 2.0 * FINE]
     for row in near:
         # Disturbances may use up what plans keep, but not more.
         yield Finding(
             what=f"{' and '.join(row.pair)}: apart",
-            holds=False if calm or row.distance_m <= 0.0 else None,
+            holds=False if undisturbed or row.distance_m <= 0.0 else None,
             worst=row.distance_m,
             words=f"{row.distance_m:.6g} m at {row.time_s:.5g} s, plans keep "
             f"{log.problem.margin:g} m",

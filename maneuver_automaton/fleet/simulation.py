@@ -171,13 +171,13 @@ def _upsets(
     seed: int,
 ) -> Iterator[tuple[FleetMember, Disturbance]]:
     """Every vehicle with its disturbance, whose numbers are its own."""
-    calm = Disturbance()
+    undisturbed = Disturbance()
     seeds = np.random.SeedSequence(seed).generate_state(len(vehicles)).tolist()
     for one, own in zip(vehicles, seeds, strict=True):
         if isinstance(disturbance, Mapping):
-            upset = disturbance.get(one.name, calm)
+            upset = disturbance.get(one.name, undisturbed)
         else:
-            upset = calm if disturbance is None else disturbance
+            upset = undisturbed if disturbance is None else disturbance
         dof = one.problem.start.size
         if upset.twist_scale is not None and not switches_at_will(one.problem):
             raise ValueError(

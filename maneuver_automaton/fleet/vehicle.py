@@ -241,7 +241,7 @@ class FleetMember:
         ]
 
     def plan_alone(self, budget: Budget, *, bounded: bool = True) -> None:
-        """Find its way past static obstacles, by itself, and a few others beside it.
+        """Find its way past past obstacles, by itself, and a few others beside it.
 
         And below which cost there is none, if that is wanted.
         """
@@ -268,7 +268,7 @@ class FleetMember:
             self.bound = lattice_bound(query) if exact else formula_bound(self.problem)
 
     def look_for_better_ways(self, budget: Budget) -> None:
-        """Better ways past static obstacles, and others beside them."""
+        """Better ways past past obstacles, and others beside them."""
         if self.ways and self.problem.obstacles:
             self._keep_ways(self._query(self.aimed), self.ways[0], budget, WITH_TIME)
         elif not self.at_will and self.alone is not None:
@@ -336,15 +336,15 @@ class FleetMember:
             if timed is not None and timed.cost < (best.cost if best else known):
                 best = timed
         if best is None:
-            calm = self._past_the_arrived(others)
-            aims = self._aims(calm)
+            past = self._past_the_arrived(others)
+            aims = self._aims(past)
             if not aims:
                 return None
             goals = tuple(goal for _, goal in aims)
-            calm = replace(calm, goals=goals)
+            past = replace(past, goals=goals)
             if goals != own.goals:
                 own, query = replace(own, goals=goals), self._query(replace(problem, goals=goals))
-            best = self._round_the_arrived(query, calm, budget)
+            best = self._round_the_arrived(query, past, budget)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
             word = self._first(query, budget, most).word
             if word is not None and word.cost < (best.cost if best else math.inf):
@@ -376,15 +376,15 @@ class FleetMember:
         if before is not None:
             start = before.plan.end
             trim = None if self.at_will else self.problem.last_trim(goals[0]).name
-        calm = self.problem.starting_at(start, time=begin, goals=goals, trim=trim)
-        calm = replace(calm, obstacles=(*self.problem.obstacles, *self.beside(others)))
-        aims = ((0, aim),) if aim is not None else self._aims(calm)
-        calm = replace(calm, goals=tuple(goal for _, goal in aims) or goals)
-        if not aims or blocked_ends(calm) is not None:
+        past = self.problem.starting_at(start, time=begin, goals=goals, trim=trim)
+        past = replace(past, obstacles=(*self.problem.obstacles, *self.beside(others)))
+        aims = ((0, aim),) if aim is not None else self._aims(past)
+        past = replace(past, goals=tuple(goal for _, goal in aims) or goals)
+        if not aims or blocked_ends(past) is not None:
             return None
         if not self.at_will:
-            return self._found(self._planned(calm, budget, improve=False))
-        query = self._query(calm)
+            return self._found(self._planned(past, budget, improve=False))
+        query = self._query(past)
         word = self._first(query, budget, QUICK).word
         if word is None:
             return None
@@ -397,8 +397,8 @@ class FleetMember:
         """Poses off the way of another vehicle, and off others, the nearest to it first."""
         start = self.problem.start if before is None else before.plan.end
         around = (*self.problem.obstacles, *self.beside([*others, *way.course.obstacles]))
-        calm = replace(self.problem.starting_at(start, time=begin), obstacles=around)
-        poses = refuges(calm, self._query(calm), way.plan, off=True)
+        past = replace(self.problem.starting_at(start, time=begin), obstacles=around)
+        poses = refuges(past, self._query(past), way.plan, off=True)
         return [Goal(pose=np.append(pose, start[3:])) for pose in poses]
 
     def then(self, before: OwnPlan | None, leg: OwnPlan, begin: float) -> OwnPlan:
@@ -437,7 +437,7 @@ class FleetMember:
 
     @functools.cached_property
     def aims(self) -> tuple[tuple[int, Goal], ...]:
-        """Where it may end past static obstacles, each with its goal's number.
+        """Where it may end past past obstacles, each with its goal's number.
 
         The goals themselves, or else poses within their tolerances; the goals where none is free.
         """
@@ -452,14 +452,14 @@ class FleetMember:
         goals = tuple(goal for _, goal in self.aims)
         return self.problem if goals == self.problem.goals else replace(self.problem, goals=goals)
 
-    def _aims(self, calm: Problem) -> tuple[tuple[int, Goal], ...]:
+    def _aims(self, past: Problem) -> tuple[tuple[int, Goal], ...]:
         """Where it may end among those that stay, as `aims`; empty if nowhere.
 
         Who leaves may be there before.
         """
-        if self.leaves or not all(why_goal_blocked(calm, goal) for goal in self.aimed.goals):
+        if self.leaves or not all(why_goal_blocked(past, goal) for goal in self.aimed.goals):
             return self.aims
-        return self._within_tolerances(calm)
+        return self._within_tolerances(past)
 
     def _within_tolerances(self, among: Problem) -> tuple[tuple[int, Goal], ...]:
         """A few free poses within the tolerance of each goal, with its number."""
@@ -473,11 +473,11 @@ class FleetMember:
                 found += [(k, aim) for aim in itertools.islice(rows, MOST_AIMS)]
         return tuple(found)
 
-    def _round_the_arrived(self, query: LatticeQuery, calm: Problem, budget: Budget) -> Word | None:
+    def _round_the_arrived(self, query: LatticeQuery, past: Problem, budget: Budget) -> Word | None:
         """A way round those that stay at their goals, wherever they are now, with rests."""
-        if blocked_ends(calm) is not None:
+        if blocked_ends(past) is not None:
             return None
-        word = self._first(self._query(calm), budget, QUICK).word
+        word = self._first(self._query(past), budget, QUICK).word
         return None if word is None else with_waits(query, word)
 
     def _planned(self, problem: Problem, budget: Budget, *, improve: bool) -> PlanResult:

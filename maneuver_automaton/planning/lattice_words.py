@@ -1,6 +1,6 @@
 """Words of the lattice among obstacles: a first one, then better ones, and others beside it.
 
-Others lead round the other sides of obstacles: a stone is laid on each path that is known.
+Others lead round the other sides of obstacles: a disc blocks each path that is known.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from maneuver_automaton.search.scene import Ends
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.word import Word
 
-SOME = Patience(attempts=400, passes=0)  # of a plan beside a stone
+SOME = Patience(attempts=400, passes=0)  # of a plan beside such a disc
 BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
 FIRST_POLISHED = 0.7  # of what is left, for polishing where there is no plan yet
 MOST_PATHS = 4  # among static obstacles that are tried with rests
@@ -56,7 +56,7 @@ TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
 MOST_DETOURS = 8  # known paths beside which others are looked for
-STONES = (  # where stones are laid and their radii, in shares of the path
+BLOCKING = (  # where discs block a way and their radii, in shares of the path
     (0.5, 0.12),  # so wide that the other side of an obstacle is the shorter path
     (0.5, 0.02),  # so small that it closes a narrow passage alone
     (0.3, 0.08),
@@ -300,12 +300,12 @@ class Lattice(Step):
 
     def _let_pass(self) -> None:
         """Note the cheapest path among static obstacles, with rests that let others pass."""
-        query, calm = self.query, _among_static(self.query)
+        query, static = self.query, _among_static(self.query)
         soon = self.limit.part(PASSING_SHARE)
-        found = self.first_plan(calm, soon)
+        found = self.first_plan(static, soon)
         if found.word is None:
             return
-        better = self.improve(calm, found.word, replace(soon, expansions=None), patience=BRIEF)
+        better = self.improve(static, found.word, replace(soon, expansions=None), patience=BRIEF)
         paths = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
         distinct = {tuple(path.trims.tolist()): path for path in reversed(paths)}
         for path in list(distinct.values())[::-1][:MOST_PATHS]:
@@ -316,13 +316,13 @@ class Lattice(Step):
                 self.gained(timed)
 
     def _detours(self, best: Word, most: int) -> Iterator[Candidate]:
-        """Up to `most` plans round other sides of the obstacles: a stone closes each known path."""
+        """Up to `most` plans round other sides of the obstacles: a disc blocks each known path."""
         query = self.query
         known: list[Plan] = [plan_of_word(query, best)]
         for n_th in range(MOST_DETOURS):
             if n_th >= len(known) or len(known) > most or self.for_others.is_over:
                 return
-            for problem in with_stones(query.problem, known[n_th]):
+            for problem in with_way_blocked(query.problem, known[n_th]):
                 if self.for_others.is_over or self.for_others.expansions == 0:
                     return
                 closed = lattice_query(problem, _goals(query), prepared=query.prepared)
@@ -330,7 +330,7 @@ class Lattice(Step):
                 if first.word is None:
                     continue
                 word = first.word
-                for where in (closed, query):  # away from the stone, then without it
+                for where in (closed, query):  # past the disc, then without it
                     patience = SOME if where is closed else AT_ONCE
                     word = self.improve(where, word, self.for_others, patience=patience).word
                 plan = plan_of_word(query, word)
@@ -365,19 +365,19 @@ def _candidate(query: LatticeQuery, word: Word) -> Candidate:
     return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
 
 
-def with_stones(problem: Problem, known: Plan) -> Iterator[Problem]:
+def with_way_blocked(problem: Problem, known: Plan) -> Iterator[Problem]:
     """Problems with one more obstacle each, which closes the path of a known plan.
 
-    Problems whose start or goal the stone touches are left out.
+    Problems whose start or goal the disc touches are left out.
     """
     times = np.linspace(0.0, known.duration, 101)
     poses = known.pose_at(times)
     driven = np.append(0.0, np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T)))
     if not driven[-1] > 0.0:
         return
-    for share, radius in STONES:
+    for share, radius in BLOCKING:
         place = poses[int(np.searchsorted(driven, share * driven[-1]))]
-        disc = Obstacle(Disc(radius * float(driven[-1]), place[:2].tolist()), name="stone")
+        disc = Obstacle(Disc(radius * float(driven[-1]), place[:2].tolist()), name="blocked way")
         closed = replace(problem, obstacles=(*problem.obstacles, disc))
         if blocked_ends(closed) is None:
             yield closed

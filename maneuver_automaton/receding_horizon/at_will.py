@@ -291,9 +291,9 @@ class AmongObstacles(StepSearch):
         elif self.now.rest is not None and moves_on(self.now.rest):
             yield self.now.rest
 
-    def heedless(self, calm: Problem) -> Plan | None:
+    def heedless(self, static: Problem) -> Plan | None:
         """A plan to the goal of the problem without what moves in it."""
-        return self._tracked(calm, share=LATE).plan
+        return self._tracked(static, share=LATE).plan
 
 
 def _evading(plan: Plan) -> Decision:

@@ -185,7 +185,7 @@ def _moving(plan: Plan) -> list[str]:
 
 MOST_STEPS = 4  # that a plan within the goal's set may take
 ALTERNATIVES = 1  # costlier plans, of which one may stay in the set
-CALM = 0.5  # share of the tolerance that a plan of several steps may use up at the next step
+MOST_USED = 0.5  # share of the tolerance that a plan of several steps may use up at the next step
 FINE = 0.01  # [m, rad] between the poses that are looked at
 
 
@@ -225,7 +225,7 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> StepPlan | No
         ]
         for one in sorted(found, key=lambda candidate: candidate.cost):
             plan, begin = one.plan, one.plan.start_time
-            if steps == 1 or _share(plan.pose_at(begin + settings.step), goal) <= CALM:
+            if steps == 1 or _share(plan.pose_at(begin + settings.step), goal) <= MOST_USED:
                 samples = plan.sample(max_step_m=FINE, max_step_rad=FINE)
                 if all(within(pose, goal) for pose in samples.pose):
                     return one

@@ -361,7 +361,7 @@ def _accumulated(now: Situation) -> float:
 
 
 def _is_taken(violation: Violation, now: Situation) -> bool:
-    """Whether a disturbance took a guarantee away: all but the time budget's need calm.
+    """Whether a disturbance took a guarantee away, as it may any but that of the time budget.
 
     What was taken once, say the horizon by a push, is not given back by the next step.
     """

@@ -242,11 +242,11 @@ class OverManeuvers(StepSearch):
             if here.moves and until == self.until:
                 yield from self._evasions()
 
-    def heedless(self, calm: Problem) -> Plan | None:
+    def heedless(self, static: Problem) -> Plan | None:
         """A plan to the goal of the problem without what moves in it: the lattice's first."""
         if self.now.budget.is_over:
             return None
-        found = self._best_on_lattice(calm, lambda plan: allowed(self.here, plan), first=True)
+        found = self._best_on_lattice(static, lambda plan: allowed(self.here, plan), first=True)
         return None if found is None else found.plan
 
     def _evasions(self) -> Iterator[tuple[Plan, Decision]]:

@@ -1,4 +1,4 @@
-"""The search of a step: keep the rest of the last plan, find a cheaper one, or do no harm.
+"""The search of a step: keep the rest of the last plan, find a cheaper one, or stay safe.
 
 `StepSearch.decide` is the one sequence for every vehicle and every world. Where plans come from,
 and what proves that they are free, is said by its kinds.
@@ -86,7 +86,7 @@ class StepSearch:
         """A fail-safe trajectory from the end of a piece of plan; None if there can be none."""
         raise NotImplementedError
 
-    def heedless(self, calm: Problem) -> Plan | None:
+    def heedless(self, static: Problem) -> Plan | None:
         """A plan to the goal of the problem without what moves in it."""
         raise NotImplementedError
 

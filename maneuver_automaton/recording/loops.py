@@ -102,14 +102,14 @@ def _facts(loop: ClosedLoop) -> list[Fact]:
     ]
 
 
-def _guarantees(loop: ClosedLoop, calm: int) -> str:
-    """Whether what is promised to the undisturbed loop holds; `calm`: how many steps that were."""
+def _guarantees(loop: ClosedLoop, undisturbed: int) -> str:
+    """Whether what is promised holds in the steps that nothing disturbed, so many as given."""
     broken = len({number for number, _ in loop.violations})
     if broken:
         return f"broken in {broken} step{'' if broken == 1 else 's'}"
-    if calm == len(loop.steps):
+    if undisturbed == len(loop.steps):
         return "hold in every step"
-    return f"hold in {calm} of {len(loop.steps)} steps, those that nothing disturbed"
+    return f"hold in {undisturbed} of {len(loop.steps)} steps, those that nothing disturbed"
 
 
 def _under_noise(loop: ClosedLoop, disturbed: int) -> str:
