@@ -5,6 +5,7 @@ import dataclasses
 import pytest
 
 from maneuver_automaton import Cost, Horizon, SearchSettings, plan
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.bounds.levels import Proof
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
@@ -36,6 +37,15 @@ def test_a_plan_for_a_gap_that_is_too_narrow_does_not_exist(tmp_path):
     assert written["narrowest"]["missing_m"] == pytest.approx(0.3, rel=0.2)
     save_picture(result, tmp_path / "plan.png")
     assert (tmp_path / "plan.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("library", ["second_order_car", "car_with_trailer"])
+def test_the_proof_does_not_wait_until_the_time_is_over(library):
+    """Also for a vehicle with inertia, of whose body alone the proof speaks."""
+    problem = dataclasses.replace(gap(1.6), automaton=load_stock_library(library))
+    result = plan(problem, time_limit=100.0)
+    assert result.status is PlanStatus.UNREACHABLE
+    assert result.counts["expansions"] < 20_000
 
 
 @pytest.mark.parametrize("status", [PlanStatus.OUT_OF_BUDGET, PlanStatus.NO_PLAN])
