@@ -96,7 +96,7 @@ def too_long(problem: Problem, budget: Budget) -> str:
     longest = horizon.time or horizon.max_time
     if longest is None or budget.left < FIRST_LOOK:
         return ""
-    from maneuver_automaton.planning.lower_bound import known_bound, proofs_of
+    from maneuver_automaton.planning.proving import known_bound, proofs_of
 
     left = budget.left
     load_kernels("cells")

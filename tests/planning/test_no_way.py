@@ -9,7 +9,7 @@ from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.bounds.levels import Proof
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
-from maneuver_automaton.planning import PlanResult, PlanStatus, lower_bound
+from maneuver_automaton.planning import PlanResult, PlanStatus, proving
 from maneuver_automaton.planning.no_way import (
     FIRST_BOXES,
     FIRST_LOOK,
@@ -87,7 +87,7 @@ def test_work_that_nobody_can_stop_is_not_begun_late(monkeypatch, seconds, yield
             asked.append(work)
             yield Proof(value=0.0, optimal=False, cells=10**12, size=1.0, work=work)
 
-    monkeypatch.setattr(lower_bound, "proofs_of", proofs_of)
+    monkeypatch.setattr(proving, "proofs_of", proofs_of)
     problem = dataclasses.replace(bend(3.2), horizon=Horizon(max_time=1e3))
     assert too_long(problem, Budget.from_now(seconds)) == ""
     assert len(asked) == yields
