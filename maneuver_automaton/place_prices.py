@@ -12,11 +12,11 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import PlaceCost, allowed, scale_of
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import along
 
 SHARE = 2e-4  # of a plan's whole cost: by how much a price may be off, as estimated
-TURN = 0.2  # [rad] of an interval at most, before any is halved
+TURN = 0.4  # [rad] of an interval at most, before any is halved
 ROUNDS = 24  # in which intervals are halved
 MOST_INTERVALS = 1 << 16
 NODES = np.linspace(0.0, 1.0, 5)
@@ -158,13 +158,7 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
             edges = np.array([0.0, lasting])
             steps = np.abs(lasting * primitive.body_velocity[None])
         else:
-            course = primitive.course
-            edges = np.array([0.0, lasting]) if course is None else course.time
-            steps = (
-                np.abs(primitive.displacement[None])
-                if course is None
-                else np.abs(np.diff(course.pose, axis=0))
-            )
+            edges, steps = _between_controls(primitive)
         way = np.linalg.norm(steps[:, [0, 1, *range(3, steps.shape[1])]], axis=1)
         parts = np.maximum(np.ceil(np.maximum(way / scale, steps[:, 2] / TURN)), 1.0).astype(int)
         row = np.repeat(np.arange(len(parts)), parts)
@@ -176,6 +170,17 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     if not pieces:
         return _Intervals(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
     return _Intervals(np.concatenate(pieces), np.concatenate(begins), np.concatenate(ends))
+
+
+def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
+    """Times (n + 1,) [s] at which controls change, and the ways (n, dof) between, added up."""
+    course = maneuver.course
+    if course is None:
+        return np.array([0.0, maneuver.duration]), np.abs(maneuver.displacement[None])
+    changes = (course.control[1:-1] != course.control[:-2]).any(axis=1)
+    rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
+    steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
+    return course.time[rows], steps
 
 
 def _halved(todo: _Intervals, split: NDArray[np.bool_]) -> _Intervals:
