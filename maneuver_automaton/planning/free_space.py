@@ -112,7 +112,9 @@ class AllWords(Step):
     def offer(self, found: Incumbents) -> None:
         """Offer the cheapest ones that stay free and inside, as many as are asked for."""
         problem, ended = found.problem, found.ended
-        sorted_out = not problem.bounds.are_open or bool(problem.obstacles or problem.zones)
+        sorted_out = not problem.bounds.are_open or bool(
+            problem.obstacles or problem.zones or problem.place_costs
+        )
         goals = [
             k for k, goal in enumerate(problem.goals) if not outside(goal.pose, problem.bounds)
         ]
