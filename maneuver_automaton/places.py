@@ -403,11 +403,14 @@ class Ground:
         import shapely
 
         inside = np.zeros(places.shape[:-1], dtype=np.bool_)
-        points = shapely.points(places)
         for part in parts_of(self.areas):
-            if not part.radius:
-                shapely.prepare(part.core)
-            inside |= shapely.dwithin(part.core, points, part.radius)
+            x, y = np.moveaxis(places - part.middle, -1, 0)
+            near = (np.abs(x) <= part.reach) & (np.abs(y) <= part.reach) & ~inside
+            if part.radius:
+                inside[near] = np.hypot(x[near], y[near]) <= part.radius
+                continue
+            shapely.prepare(part.core)
+            inside[near] = shapely.intersects_xy(part.core, places[near])
         return inside
 
 
