@@ -68,6 +68,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.models import SingleTrack as SingleTrack
     from maneuver_automaton.models import Unicycle as Unicycle
     from maneuver_automaton.models import UserModel as UserModel
+    from maneuver_automaton.places import Clearance as Clearance
+    from maneuver_automaton.places import Ground as Ground
+    from maneuver_automaton.places import PlaceCost as PlaceCost
     from maneuver_automaton.planning import LowerBound as LowerBound
     from maneuver_automaton.planning import Planner as Planner
     from maneuver_automaton.planning import PlanResult as PlanResult
@@ -109,6 +112,7 @@ _HOMES = {
     "Box": "collision",
     "Car": "models",
     "CarWithTrailer": "models",
+    "Clearance": "places",
     "Cost": "costs",
     "DaskWorkers": "fleet",
     "DesignedLibrary": "design",
@@ -121,6 +125,7 @@ _HOMES = {
     "FleetResult": "fleet",
     "FleetScenario": "scenario",
     "Goal": "problem",
+    "Ground": "places",
     "Helicopter": "models",
     "Horizon": "problem",
     "Hovercraft": "models",
@@ -130,6 +135,7 @@ _HOMES = {
     "Obstacle": "collision",
     "OccupancyMap": "collision",
     "Omnidirectional": "models",
+    "PlaceCost": "places",
     "Plan": "automaton",
     "Planner": "planning",
     "PlanResult": "planning",

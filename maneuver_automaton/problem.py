@@ -29,6 +29,8 @@ from maneuver_automaton.collision import (
 from maneuver_automaton.costs import Cost, StageCost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
+from maneuver_automaton.place_prices import PlacePrice, price_along
+from maneuver_automaton.places import PlaceCost, bound, check_place_costs, moved
 from maneuver_automaton.primitives import Maneuver, Trim
 
 _Element: TypeAlias = SE2 | SE2xR | Translations
@@ -221,6 +223,8 @@ class Problem:
         Distance [m] that the body keeps from every obstacle.
     zones : sequence of Zone
         Where only some motions are admitted.
+    place_costs : PlaceCost, or a sequence of these
+        What a motion costs beside `cost` because of where it goes: `Clearance`, `Ground`.
 
     Raises
     ------
@@ -253,6 +257,7 @@ class Problem:
     body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
+    place_costs: tuple[PlaceCost, ...] = field(default=(), kw_only=True)  # beside the invariant one
 
     __repr__ = brief
 
@@ -276,6 +281,7 @@ class Problem:
             body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
+            place_costs: PlaceCost | Sequence[PlaceCost] = (),
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -310,6 +316,7 @@ class Problem:
                 f"body_height must be [low, high] with low <= high, got {self.body_height} m"
             )
         object.__setattr__(self, "zones", tuple(self.zones))
+        object.__setattr__(self, "place_costs", check_place_costs(self.place_costs))
         for zone in self.zones:
             for trim in zone.trims or ():
                 self.automaton.index_of(trim)
@@ -443,7 +450,46 @@ class Problem:
         return np.array(rates)
 
     def cost_of(self, plan: Plan) -> float:
-        """Cost of a plan, whatever primitives it uses: their rates, and the prices of switches.
+        """Cost of a plan of any primitives: `invariant_cost_of`, and what places cost."""
+        invariant = self.invariant_cost_of(plan)
+        if not self.place_costs:
+            return invariant
+        return invariant + sum(one.price for one in self.place_prices_of(plan))
+
+    def place_prices_of(self, plan: Plan) -> tuple[PlacePrice, ...]:
+        """What a plan costs because of where it goes, for every one of the place costs.
+
+        Examples
+        --------
+        >>> from maneuver_automaton import Box, Ground, Unicycle
+        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
+        >>> lawn = Ground(Box([2.0, 2.0], center=[4.0, 0.0]), price=3.0)
+        >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], place_costs=lawn)
+        >>> plan = Plan([0.0, 0.0, 0.0], (robot["ahead"],), durations=[9.0])
+        >>> [round(one.price, 2) for one in problem.place_prices_of(plan)]
+        [6.0]
+        """
+        beside = self.invariant_cost_of(plan)
+        return kept_with(
+            plan,
+            self.bound_place_costs,
+            lambda: tuple(
+                price_along(cost, plan, self.automaton.model, beside=beside)
+                for cost in self.bound_place_costs
+            ),
+        )
+
+    @property
+    def bound_place_costs(self) -> tuple[PlaceCost, ...]:
+        """The place costs, each knowing the obstacles and the body of the problem."""
+        setting = self.setting
+        key = ("bound place costs", setting.place_costs)
+        return kept_with(
+            setting, key, lambda: tuple(bound(cost, setting) for cost in setting.place_costs)
+        )
+
+    def invariant_cost_of(self, plan: Plan) -> float:
+        """The part of a plan's cost that does not see where it goes: rates, prices of switches.
 
         Along a maneuver the rates are integrated from sample to sample by the trapezoidal rule:
         exact for time and effort, and for the length wherever the speed is linear.
@@ -458,7 +504,7 @@ class Problem:
         return coasting + maneuvers + self.cost.switching(np.concatenate(driven))
 
     def cost_of_trims(self, trims: Sequence[Trim], durations: Array) -> float:
-        """Cost of trims that last `durations` (n,) [s], with the prices of the switches between."""
+        """Invariant cost of trims that last `durations` (n,) [s], with the switches between."""
         if not trims:
             return 0.0
         coasting = float(self.rates_of_trims(trims) @ durations)
@@ -610,6 +656,7 @@ class Problem:
             goals=tuple(replace(goal, pose=(by @ group(goal.pose)).pose) for goal in self.goals),
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
             zones=tuple(zone.moved(by) for zone in self.zones),
+            place_costs=tuple(moved(cost, by) for cost in self.place_costs),
         )
 
     @property

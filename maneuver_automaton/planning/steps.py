@@ -118,10 +118,12 @@ def search_steps(problem: Problem) -> Steps:
     in space, where it has one more dimension, a word that passes above or below is found sooner.
     """
     method, automaton = problem.search.method, problem.automaton
+    invariant = not problem.place_costs  # then reduced costs are those of the whole
     if not problem.has_inertia:
         if not uses_lattice(problem):
-            return Steps([NearlyMet(), AllWords()], certified=True)
-        first: list[Step] = [Checks(), FreeWords()] if problem.climbs_among_obstacles else []
+            return Steps([NearlyMet(), AllWords()], certified=invariant)
+        climbs = problem.start.size > 3
+        first: list[Step] = [Checks(), FreeWords()] if climbs else []
         lattice = [Lattice()] if method in ("auto", "lattice") else []
         return Steps([NearlyMet(), *first, *lattice], UNFINISHED)
     searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
@@ -139,7 +141,7 @@ def search_steps(problem: Problem) -> Steps:
         steps.append(Lattice(polish))
     if polish:
         steps.append(polish)
-    return Steps(steps, POLISHED, certified=True)
+    return Steps(steps, POLISHED, certified=invariant)
 
 
 def prepare_steps(problem: Problem, workspace: Workspace) -> None:
@@ -153,7 +155,9 @@ def prepare_steps(problem: Problem, workspace: Workspace) -> None:
 
 
 def _may_be_a_graph(problem: Problem) -> bool:
-    return problem.automaton.lattice is not None and problem.search.method in ("auto", "lattice")
+    # A graph is searched to a proof, for which the prices of places are not exact enough.
+    searched = problem.search.method in ("auto", "lattice") and not problem.place_costs
+    return problem.automaton.lattice is not None and searched
 
 
 def _suits_words(problem: Problem) -> bool:
@@ -174,7 +178,8 @@ def uses_lattice(problem: Problem) -> bool:
 
 @kept_by_first
 def _uses_lattice(problem: Problem) -> bool:
-    if problem.climbs_among_obstacles:
+    climbs = problem.start.size > 3 and not problem.has_inertia
+    if problem.climbs_among_obstacles or (climbs and problem.place_costs):
         return True
     velocities = problem.automaton.body_velocities
     moving = velocities[velocities.any(axis=1)]
@@ -183,7 +188,7 @@ def _uses_lattice(problem: Problem) -> bool:
     if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
         return False
     method = problem.search.method
-    return method == "lattice" or (method == "auto" and bool(problem.obstacles))
+    return method == "lattice" or (method == "auto" and bool(problem.obstacles or problem.place_costs))
 
 
 class Ends(Step):

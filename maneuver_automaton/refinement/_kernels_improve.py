@@ -23,12 +23,13 @@ from maneuver_automaton.refinement._kernels_word import (
     gear_after,
     gear_before,
     owner,
+    place_between,
     pose_at,
     price_of_transition,
     still_free,
     take,
     unroll,
-    word_cost,
+    whole_cost,
 )
 from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays
 from maneuver_automaton.search._kernels_connection import free_candidate
@@ -100,11 +101,10 @@ class Section(NamedTuple):
 
 
 @bare_inner_kernel
-def section_price(
-    lib: LatticeArrays, word: WordArrays, begin: float, end: float, first: int, last: int
-) -> float:
-    """Price of the word between two times, its transitions included."""
-    price = 0.0
+def section_price(one: Improving, begin: float, end: float, first: int, last: int) -> float:
+    """Price of the word between two times, its transitions and places included."""
+    lib, word = one.library, one.word
+    price = place_between(one, begin, end, first, last)
     for k in range(first, last + 1):
         low, high = max(word.times[k], begin), min(word.ends[k], end)
         price += lib.library.rates[word.now.trims[k]] * max(high - low, 0.0)
@@ -117,14 +117,13 @@ def section_price(
 
 
 @bare_inner_kernel
-def drawn_section(
-    lib: LatticeArrays, task: ImproveTask, word: WordArrays, n: int, cost: float, draw: Array
-) -> Section:
+def drawn_section(one: Improving, n: int, cost: float, draw: Array) -> Section:
     """The section of a word of `cost` that six numbers between 0 and 1 draw.
 
     It begins and ends in coasts, where the state is known. A trim that a maneuver leads to has been
     entered when its coast begins.
     """
+    lib, task, word = one.library, one.task, one.word
     # The length of the section is drawn evenly in its logarithm, so that short sections of a long
     # word are drawn as often as long ones.
     total = word.times[n]
@@ -158,7 +157,7 @@ def drawn_section(
         trim_and_gear(before, 0 if before == NO_TRIM else gear_before(lib, word, entered)),
         trim_and_gear(after, 0 if after == NO_TRIM else gear_after(lib, word, n, last)),
         task.free_heading and to_end,
-        section_price(lib, word, begin, end, first, last) - GAIN * cost,
+        section_price(one, begin, end, first, last) - GAIN * cost,
         task.limits.most_time - total + (end - begin),
         task.limits.clock + begin,
     )
@@ -318,14 +317,14 @@ def attempt_all(one: Improving, uniform: Array, normal: Array) -> float:
     lib, task = one.library, one.task
     word, scene = one.word, one.scene
     n = word.length[0]
-    cost = word_cost(lib, word.now, n)
+    cost = whole_cost(one, word.now, n)
     unroll(lib, word, n)
     changes = scene.layers.moving.speed.shape[0] > 0
     for row in range(uniform.shape[0]):
         if n == 0 or not word.times[n] > 0.0:
             return cost
         draw = uniform[row]
-        section = drawn_section(lib, task, word, n, cost, draw)
+        section = drawn_section(one, n, cost, draw)
         if draw[0] < task.via:
             via, there = via_pose(lib, task, word, section, draw[5], normal[row])
             m = via_middle(one, section, via, there)
@@ -336,7 +335,7 @@ def attempt_all(one: Improving, uniform: Array, normal: Array) -> float:
         size = spliced(lib, task, word, n, section, m)
         if not admitted(lib, task, word, size):
             continue
-        new_cost = word_cost(lib, word.new, size)
+        new_cost = whole_cost(one, word.new, size)
         if not new_cost < cost - GAIN * cost:
             continue
         # What comes after the section is driven at other times: the dearest test, so the last.

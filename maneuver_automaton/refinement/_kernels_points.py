@@ -26,12 +26,13 @@ from maneuver_automaton.refinement._kernels_word import (
     begun,
     ended,
     owner,
+    place_between,
     pose_at,
     price_of_transition,
     still_free,
     take,
     unroll,
-    word_cost,
+    whole_cost,
 )
 from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays
 from maneuver_automaton.search._kernels_connection import free_candidate
@@ -62,11 +63,12 @@ def put_points(lib: LatticeArrays, word: WordArrays, n: int, times: Array) -> No
 
 
 @bare_inner_kernel
-def price_along(lib: LatticeArrays, word: WordArrays, j: int) -> float:
-    """Price of the word from point `j - 1` to point `j`."""
+def price_along(one: Improving, j: int) -> float:
+    """Price of the word from point `j - 1` to point `j`, its places included."""
+    lib, word = one.library, one.word
     begin, end = word.points.at[j - 1, TIME], word.points.at[j, TIME]
     first, last = word.points.owners[j - 1], word.points.owners[j]
-    price = 0.0
+    price = place_between(one, begin, end, first, last)
     for k in range(first, last + 1):
         low, high = max(word.times[k], begin), min(word.ends[k], end)
         price += lib.library.rates[word.now.trims[k]] * max(high - low, 0.0)
@@ -155,16 +157,17 @@ def unwound(lib: LatticeArrays, task: ImproveTask, word: WordArrays, n: int, poi
 
 
 @bare_kernel
-def begin_program(lib: LatticeArrays, word: WordArrays, times: Array) -> float:
+def begin_program(one: Improving, times: Array) -> float:
     """Cut the word at some times, rising from its begin to its end, all of them within coasts.
 
     Returns its cost. The points are then joined, in order, by `join_points`, and `take_program`
     makes the word the cheapest path through them: in parts, so that a deadline can end it.
     """
+    lib, word = one.library, one.word
     n = word.length[0]
     unroll(lib, word, n)
     put_points(lib, word, n, times)
-    return word_cost(lib, word.now, n)
+    return whole_cost(one, word.now, n)
 
 
 @bare_kernel
@@ -177,7 +180,7 @@ def join_points(one: Improving, first: int, points: int, n_words: int, gain: flo
     # Forwards over the points: the cheapest path to each earlier one is final.
     lib, task, word = one.library, one.task, one.word
     for j in range(first, min(points, word.points.at.shape[0])):
-        word.points.best[j] = word.points.best[j - 1] + price_along(lib, word, j)
+        word.points.best[j] = word.points.best[j - 1] + price_along(one, j)
         word.points.spent[j] = (
             word.points.spent[j - 1] + word.points.at[j, TIME] - word.points.at[j - 1, TIME]
         )
@@ -196,7 +199,7 @@ def take_program(one: Improving, cost: float) -> None:
     size = unwound(lib, task, word, n, word.points.at.shape[0])
     if not admitted(lib, task, word, size):
         return
-    new_cost = word_cost(lib, word.new, size)
+    new_cost = whole_cost(one, word.new, size)
     if not new_cost < cost - GAIN * cost:
         return
     # Trims that stay are driven at other times: among moving obstacles all is proven once more.

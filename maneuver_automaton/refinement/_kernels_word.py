@@ -14,6 +14,12 @@ from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays, WordSteps
 from maneuver_automaton.search._kernels_coast import coast_free, coasted, is_still, may_stay
 from maneuver_automaton.search._kernels_connection import edge_end, edge_proven
+from maneuver_automaton.search._kernels_place import (
+    coast_place,
+    edge_place,
+    places_cost,
+    steps_place,
+)
 from maneuver_automaton.search.arrays import LatticeArrays
 from maneuver_automaton.words._kernels_library import class_of
 
@@ -39,6 +45,35 @@ def word_cost(lib: LatticeArrays, steps: WordSteps, n: int) -> float:
                 cost += lib.library.direction_change
             gear = lib.library.gears[trim]
     return cost
+
+
+@bare_inner_kernel
+def whole_cost(one: Improving, steps: WordSteps, n: int) -> float:
+    """Cost of a word with what its places cost."""
+    cost = word_cost(one.library, steps, n)
+    if places_cost(one.scene):
+        start, lib = one.word.start, one.library
+        trims, durations, edges = steps.trims, steps.durations, steps.edges
+        cost += steps_place(one.scene, lib, start, trims, durations, edges, n)
+    return cost
+
+
+@bare_inner_kernel
+def place_between(one: Improving, begin: float, end: float, first: int, last: int) -> float:
+    """Price of the places along the word between two times, within the trims `first` and `last`."""
+    scene, lib, word = one.scene, one.library, one.word
+    total = 0.0
+    if not places_cost(scene):
+        return total
+    for k in range(first, last + 1):
+        low, high = max(word.times[k], begin), min(word.ends[k], end)
+        if k > first and word.now.edges[k] >= 0:
+            before = pose_at(lib, word, k - 1, word.ends[k - 1])
+            total += edge_place(scene, lib, word.now.edges[k], before)
+        if high > low:
+            at = pose_at(lib, word, k, low)
+            total += coast_place(scene, lib, word.now.trims[k], at, high - low)
+    return total
 
 
 @bare_inner_kernel

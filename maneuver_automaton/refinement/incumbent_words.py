@@ -9,9 +9,10 @@ from typing import NamedTuple
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.refinement.improve import FINER, Improvement, Patience
 from maneuver_automaton.search.lattice import distance_grids, first_plan
+from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words.word import Word, with_price
+from maneuver_automaton.words.word import Word
 
 TO_THE_END = Patience(passes=2**62)
 
@@ -94,5 +95,5 @@ def quick_word(
     for incumbent in incumbent_words(quick, budget=budget):
         total = incumbent.expansions
         if incumbent.word is not None and incumbent.word.duration <= query.most_time:
-            return with_price(query.library.priced, incumbent.word), total
+            return with_cost(incumbent.word, query), total
     return None, total

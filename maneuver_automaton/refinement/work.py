@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_points import begin_program, join_points, take_program
 from maneuver_automaton.refinement._kernels_word import AT_WILL, GAIN
@@ -39,7 +39,7 @@ def shortcut(
     if points < 2:
         return word
     one = improving(query, word, points=points)
-    cost = begin_program(one.library, one.word, times)
+    cost = begin_program(one, times)
     most = max(1, TIMELY_WORDS // (n_words * points))  # the last points have the most connections
     pace, first = Pace(budget, steps=most, most=most), 1
     while part := pace.take(points - first):
@@ -56,7 +56,7 @@ def point_times(query: LatticeQuery, word: Word, cut: float) -> Array:
 
     All but the ends lie earlier by the share `cut` of the time between two.
     """
-    edges = _edges_of(query, word)
+    edges = query.edges_along(word)
     lasting = np.where(edges >= 0, np.append(query.library.arrays.edges.time, 0.0)[edges], 0.0)
     steps = np.cumsum(np.column_stack([lasting, word.durations]).ravel())
     begins, ends = steps[0::2], steps[1::2]
@@ -67,14 +67,6 @@ def point_times(query: LatticeQuery, word: Word, cut: float) -> Array:
     inside = even <= ends[np.searchsorted(begins, even, side="right") - 1]
     led = np.flatnonzero(edges >= 0)
     return np.unique(np.concatenate([[0.0], even[inside], ends[led - 1], begins[led]]))
-
-
-def _edges_of(query: LatticeQuery, word: Word) -> IntArray:
-    """The edge (n,) that leads to each trim of a word, -1 for a switch, and to the first."""
-    edges = np.full(len(word.trims), AT_WILL)
-    led = np.flatnonzero(word.transitions != SWITCH)
-    edges[led + 1] = query.library.edges_of(word.transitions[led])
-    return edges
 
 
 def improving(query: LatticeQuery, word: Word, *, points: int = 0) -> Improving:
@@ -111,7 +103,7 @@ def improving(query: LatticeQuery, word: Word, *, points: int = 0) -> Improving:
     )
     arrays.now.trims[:used] = library.number_of[word.trims]
     arrays.now.durations[:used] = word.durations
-    arrays.now.edges[:used] = _edges_of(query, word)
+    arrays.now.edges[:used] = query.edges_along(word)
     return Improving(arrays, library.arrays, improve_task(query, word), query.scene())
 
 

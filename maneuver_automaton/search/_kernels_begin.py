@@ -193,6 +193,7 @@ def begin_search(call: FirstCallArrays, search: LatticeSearch) -> int:
         scene.highest,
         scene.zone_trims,
         scene.zone_pieces,
+        scene.place,
     )
     begun = LatticeSearch(search.arrays, ready, search.library, around, laid, search.table)
     return expanded(begun, call.asked[0], math.inf)

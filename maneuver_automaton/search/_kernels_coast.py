@@ -272,6 +272,16 @@ def coasted(
     return x, y, heading, pose[3] + t * lib.library.twists[trim, 3]
 
 
+@bare_inner_kernel
+def edge_end(
+    lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
+) -> tuple[float, float, float, float]:
+    """Pose at the end of a maneuver."""
+    moved = lib.edges.displacement[edge]
+    x, y, heading = compose(pose[0], pose[1], pose[2], moved[0], moved[1], moved[2])
+    return x, y, heading, pose[3] + moved[3]
+
+
 @inlined_kernel
 def coast_free(
     scene: Scene,

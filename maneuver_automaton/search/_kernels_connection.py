@@ -15,10 +15,12 @@ from maneuver_automaton.search._kernels_coast import (
     coast_free,
     coast_inside,
     coasted,
+    edge_end,
     inside_window,
     part_body,
     part_free,
 )
+from maneuver_automaton.search._kernels_place import coast_place, edge_place, places_cost
 from maneuver_automaton.search.arrays import Joint, LatticeArrays, Scene
 from maneuver_automaton.words._kernels_library import class_of
 from maneuver_automaton.words.library import Scratch
@@ -101,16 +103,6 @@ def edge_inside(
 
 
 @bare_inner_kernel
-def edge_end(
-    lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
-) -> tuple[float, float, float, float]:
-    """Pose at the end of a maneuver."""
-    moved = lib.edges.displacement[edge]
-    x, y, heading = compose(pose[0], pose[1], pose[2], moved[0], moved[1], moved[2])
-    return x, y, heading, pose[3] + moved[3]
-
-
-@bare_inner_kernel
 def edge_free(
     scene: Scene,
     lib: LatticeArrays,
@@ -184,6 +176,32 @@ def connection_free(
     return True
 
 
+@bare_inner_kernel
+def connection_place(
+    scene: Scene, lib: LatticeArrays, joint: Joint, word: IntArray, climb: int, times: Array
+) -> float:
+    """Price of the places along a connection, its transitions included, as `connection_free`."""
+    pose, before, total = joint.pose, joint.before, 0.0
+    for n in range(5):
+        trim, t = joint.after, 0.0
+        if n < 3:
+            trim, t = word[n], times[n]
+        elif n == 3:
+            trim, t = climb, times[3]
+        if trim < 0 or trim >= lib.library.n_trims:
+            continue
+        at, goal = class_of(lib.library, before), class_of(lib.library, trim)
+        while at != goal:
+            edge = lib.edges.via[at, goal]
+            total += edge_place(scene, lib, edge, pose)
+            pose = edge_end(lib, edge, pose)
+            at = class_of(lib.library, lib.edges.target[edge])
+        before = trim
+        total += coast_place(scene, lib, trim, pose, t)
+        pose = coasted(lib, trim, pose, t)
+    return total
+
+
 @inlined_kernel
 def free_candidate(
     scene: Scene,
@@ -195,19 +213,30 @@ def free_candidate(
 ) -> int:
     """Cheapest of `n` candidates that is proven free; -1 if none of the first few is.
 
-    A candidate that was tried costs inf from then on.
+    A candidate that was tried costs inf from then on. Where places cost something, they are added
+    to what the one that is returned costs, and it is the cheapest with them.
     """
     # The least is sought anew each time: few are tried, so that sorting all would cost more.
+    # Without the places a candidate costs less than with them: once the next one costs more than
+    # the best does with them, no other is better.
+    priced = places_cost(scene)
+    whole, found = joint.most_cost, -1
     for _ in range(joint.tries):
-        best, which = joint.most_cost, -1
+        best, which = whole, -1
         for k in range(n):
             if scratch.costs[k] < best and scratch.durations[k] <= joint.most_time:
                 best, which = scratch.costs[k], k
         if which < 0:
-            return -1
+            break
         word = words[scratch.rows[which]]
         climb, times = scratch.climbs[which], scratch.times[which]
-        if connection_free(scene, lib, joint, word, climb, times):
-            return which
+        if priced:
+            best += connection_place(scene, lib, joint, word, climb, times)
+        if best < whole and connection_free(scene, lib, joint, word, climb, times):
+            whole, found = best, which
+            if not priced:
+                return found
         scratch.costs[which] = math.inf
-    return -1
+    if found >= 0:
+        scratch.costs[found] = whole
+    return found

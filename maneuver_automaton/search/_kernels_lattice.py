@@ -72,6 +72,7 @@ from maneuver_automaton.search._kernels_nodes import (
     open_node,
     slot_of,
 )
+from maneuver_automaton.search._kernels_place import coast_place, edge_place, places_cost
 from maneuver_automaton.search.arrays import (
     Joint,
     LatticeArrays,
@@ -182,6 +183,7 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
     # Clearance known from before spares a test, unless obstacles move, since it is that of an
     # earlier time, or there are zones, which it does not count.
     known = scene.layers.moving.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
+    priced = places_cost(scene)
     cos, sin = math.cos(heading), math.sin(heading)
     held = class_of(lib.library, before)
     for place in range(lib.first_trim[held], lib.first_trim[held + 1]):
@@ -260,7 +262,11 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
                 ahead = cost_to_go(task, grid, table, plane, child, trim)
             fits = cost + ahead < limit and (old < 0 or nodes[old, COST] > cost)
             # The window comes last: only now is it known how long the edge is.
-            if fits and coast_inside(scene, lib, trim, pose, task.sign * t):
+            fits = fits and coast_inside(scene, lib, trim, pose, task.sign * t)
+            if fits and priced:  # and the price of its places after that: so few edges have one
+                cost += coast_place(scene, lib, trim, pose, task.sign * t)
+                fits = cost + ahead < limit and (old < 0 or nodes[old, COST] > cost)
+            if fits:
                 if old >= 0:
                     links[old, CLOSED] = 1
                 row = (n_x, n_y, n_heading, n_z, cost, time, t, lasted + t, max(clearance, 0.0))
@@ -291,7 +297,7 @@ def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> Non
         return
     limit = min(upper_bound, arrays.found[0])
     known = scene.layers.moving.speed.shape[0] == 0 and scene.zone_trims.shape[0] == 0
-    held = class_of(lib.library, before)
+    priced, held = places_cost(scene), class_of(lib.library, before)
     for edge in range(edges.first[held], edges.first[held + 1]):
         target = edges.target[edge]
         cost, time = done + edges.cost[edge], spent + edges.time[edge]
@@ -315,6 +321,10 @@ def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> Non
             state[QUERIES] += 1
             clearance = edge_proven(scene, lib, edge, pose, limits.clock + spent)
             if not clearance >= 0.0:
+                continue
+        if priced:
+            cost += edge_place(scene, lib, edge, pose)
+            if cost + ahead >= limit or (old >= 0 and nodes[old, COST] <= cost):
                 continue
         if old >= 0:
             links[old, CLOSED] = 1
@@ -348,7 +358,8 @@ def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate:
         aim = (aims.poses[g, 0], aims.poses[g, 1], aims.poses[g, 2], aims.poses[g, 3])
         # What a connection may cost: less than is left to the best plan, and not much more than the
         # estimate.
-        most = min(upper_bound, found[0]) - done
+        left_over = min(upper_bound, found[0]) - done
+        most = left_over
         if estimate < math.inf:
             most = min(most, asked.factor * estimate + asked.slack)
         there = trim_and_gear(aims.trims[g], 0)
@@ -365,6 +376,8 @@ def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate:
                 if not word_admitted(arrays, task, lib, words, node, k):
                     scratch.costs[k] = math.inf
         left = limits.most_time - spent
+        if places_cost(scene):  # they may make it cost more than what the estimate allows
+            most = left_over
         joint = Joint(begin, int(first[0]), int(last[0]), clock, asked.tries, most, left)
         which = free_candidate(scene, lib, words, joint, n, scratch)
         state[QUERIES] += 1

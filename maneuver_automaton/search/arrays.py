@@ -99,6 +99,23 @@ class LatticeArrays(NamedTuple):
 # What motions are tested against, and what leads a search.
 
 
+class PlaceArrays(NamedTuple):
+    """What places cost: clearance by the distance to obstacles, all else by a raster of rates.
+
+    Of the sheets of the raster the first is per metre; where the way matters, the second is per
+    metre of driving back; and the third is per second. Between its samples a rate is linear.
+    """
+
+    weight: float  # of the clearance, per metre; 0: it costs nothing
+    within: float  # [m] from obstacles, beyond which it costs nothing
+    per_second: bool  # whether it costs by time and not by the way
+    step: float  # [m] that no point of the vehicle moves farther in, from sample to sample
+    value: NDArray[np.float32]  # (1 or 3, headings, rows, columns); no cells where there is none
+    origin_x: float  # of the first sample
+    origin_y: float
+    cell: float  # [m]
+
+
 class Scene(NamedTuple):
     """Where a motion is free."""
 
@@ -112,6 +129,7 @@ class Scene(NamedTuple):
     highest: float
     zone_trims: NDArray[np.bool_]  # (Z, m) trims that a zone admits
     zone_pieces: NDArray[np.bool_]  # (Z, N) pieces of maneuvers that a zone admits
+    place: PlaceArrays  # what it costs there
 
 
 class CellQueue(NamedTuple):

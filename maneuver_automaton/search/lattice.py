@@ -37,6 +37,7 @@ from maneuver_automaton.search.lattice_task import (
 )
 from maneuver_automaton.search.lattice_trims import priced_library, trims_of
 from maneuver_automaton.search.part_motion import posed_parts
+from maneuver_automaton.search.place_arrays import driven_back
 from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
@@ -325,10 +326,11 @@ def reversed_query(query: LatticeQuery) -> LatticeQuery | None:
         problem.footprint,
         tuple(problem.parts.items()),
     )
+    around = for_library(query.around, problem, library)
     return replace(
         query,
         library=library,
-        around=for_library(query.around, problem, library),
+        around=around._replace(place=driven_back(around.place)),
         start=query.goals[0],
         goals=query.start[None],
         goal_poses=problem.start[None],

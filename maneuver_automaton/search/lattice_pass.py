@@ -247,8 +247,8 @@ def _edges_between(library: LatticeArrays, source: int, target: int) -> list[int
 
 
 def with_cost(word: Word, query: LatticeQuery) -> Word:
-    """The word with its cost in the lattice library, prices of switches included."""
-    return with_price(query.library.priced, word)
+    """The word with its cost in the lattice library, prices of switches and places included."""
+    return query.with_places(with_price(query.library.priced, word))
 
 
 def plan_of_word(query: LatticeQuery, word: Word) -> Plan:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._compile import plain
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
@@ -18,6 +19,7 @@ from maneuver_automaton.collision.convex import DIGITS
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem, SearchSettings
+from maneuver_automaton.search._kernels_place import places_cost, word_place
 from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
@@ -31,6 +33,7 @@ from maneuver_automaton.search.scene import (
     worlds_around,
 )
 from maneuver_automaton.words.library import NO_TRIM
+from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body
@@ -146,7 +149,23 @@ class LatticeQuery:
 
     def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
         """A word of steps in the automaton's numbers, with its cost."""
-        return word_of_steps(steps, goal=goal, library=self.library.priced)
+        return self.with_places(word_of_steps(steps, goal=goal, library=self.library.priced))
+
+    def with_places(self, word: Word) -> Word:
+        """The word with what its places cost added to its cost."""
+        if not plain(places_cost)(self.around):
+            return word
+        trims, edges = self.library.number_of[word.trims], self.edges_along(word)
+        lib, durations = self.library.arrays, np.array(word.durations)
+        paid = word_place(self.around, lib, np.array(self.start), trims, durations, edges)
+        return replace(word, cost=word.cost + paid)
+
+    def edges_along(self, word: Word) -> IntArray:
+        """The edge (n,) that leads to each trim of a word, -1 for a switch, and to the first."""
+        edges = np.full(len(word.trims), SWITCH)
+        led = np.flatnonzero(word.transitions != SWITCH)
+        edges[led + 1] = self.library.edges_of(word.transitions[led])
+        return edges
 
 
 def lattice_query(
@@ -185,7 +204,7 @@ def lattice_query(
         problem=problem,
         library=library,
         worlds=worlds,
-        around=scene_of(problem, library, worlds, window, margin=margin, level=aimed.level),
+        around=scene_of(problem, library, worlds, window, box, margin=margin, level=aimed.level),
         start=aimed.seen[0],
         start_trim=int(aimed.trims[0]),
         goals=aimed.seen[1:],

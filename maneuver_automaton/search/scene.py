@@ -31,6 +31,7 @@ from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_library import LatticeLibrary
 from maneuver_automaton.search.part_motion import Part
+from maneuver_automaton.search.place_arrays import known_distance, place_arrays
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
 CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
@@ -72,7 +73,8 @@ def world_around(problem: Problem) -> World:
 
 @kept_by_first
 def _world(setting: Problem, frame: tuple[float, ...]) -> World:
-    return world_of(setting.obstacles, setting.footprint, frame, keep=setting.margin)
+    keep = known_distance(setting)
+    return world_of(setting.obstacles, setting.footprint, frame, keep=keep)
 
 
 def _frame(problem: Problem) -> tuple[float, ...]:
@@ -105,7 +107,7 @@ def _worlds_on(
         tuple(part.shapes for part in parts),
         frame,
         (low + below, high + above) if setting.start.size > 3 else None,
-        keep=setting.margin,
+        keep=known_distance(setting),
     )
 
 
@@ -190,12 +192,14 @@ def scene_of(
     library: LatticeLibrary,
     worlds: Worlds,
     window: Array,
+    box: Array,
     *,
     margin: float,
     level: float,
 ) -> Scene:
     """The scene of a problem inside a window (9,), seen from an altitude `level` [m].
 
+    `box` (4,) is that of the window in the world's frame.
     `margin` is the clearance that a proof needs beyond the problem's own [m].
     """
     admitted = _admitted(library, problem.setting)
@@ -215,6 +219,7 @@ def scene_of(
         highest=highest - level + ROUNDED,
         zone_trims=admitted[0],
         zone_pieces=admitted[1],
+        place=place_arrays(problem, library, worlds.whole.frame, box),
     )
 
 

@@ -1,0 +1,201 @@
+"""What a motion costs because of where it goes: its place costs, integrated along it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
+from maneuver_automaton.places import PlaceCost, allowed, scale_of
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.driving import along
+from maneuver_automaton.primitives.primitive import Trajectory
+
+SHARE = 2e-4  # of a plan's whole cost: by how much a price may be off, as estimated
+TURN = 0.4  # [rad] of an interval at most, before any is halved
+ROUNDS = 24  # in which intervals are halved
+DENSE = 0.25  # of a scale, and [rad], between samples of a course that is driven as sampled
+MOST_INTERVALS = 1 << 16
+NODES = np.linspace(0.0, 1.0, 5)
+COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
+
+
+class PlacePrice(NamedTuple):
+    """The price of the places along a motion."""
+
+    price: float
+    error: float  # by how much it is off, as the last halving shows
+    refused: float | None  # [s] when it first is where it must not be; None: never
+
+
+class _Intervals(NamedTuple):
+    """Stretches of a plan, each within one primitive."""
+
+    piece: IntArray  # (n,)
+    begin: Array  # (n,) [s] since the primitive began
+    end: Array  # (n,)
+
+
+def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> PlacePrice:
+    """The integral of a cost along a plan, to `SHARE` of it and of what the plan costs `beside`.
+
+    Simpson's rule over stretches not longer than the finest feature; those whose halves say
+    something else are halved again, until what they differ by in all is small enough. Where a rate
+    jumps, at the border of an area, that finds the border.
+
+    Raises
+    ------
+    ValueError
+        If a maneuver has no course, or a rate is negative or not finite.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Box, Ground, Unicycle
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[9.0])
+    >>> lawn = Ground(Box([2.0, 2.0], center=[4.0, 0.0]), price=3.0)
+    >>> round(price_along(lawn, plan, Unicycle(), beside=9.0).price, 2)
+    6.0
+    """
+    motion = _Motion(cost, plan, model)
+    todo, done, doubt, refused = _first_stretches(plan, scale_of(cost)), 0.0, 0.0, None
+    for _ in range(ROUNDS):
+        if not len(todo.piece):
+            break
+        spans = todo.end - todo.begin
+        rates, good = motion.at(todo.piece[:, None], todo.begin[:, None] + spans[:, None] * NODES)
+        if refused is None and not good.all():
+            row, node = np.argwhere(~good)[0]
+            since = float(todo.begin[row] + spans[row] * NODES[node])
+            refused = float(plan.switching_times[todo.piece[row]]) + since
+        fine = spans * (rates @ FINE)
+        off = np.abs(fine - spans * (rates @ COARSE))
+        whole = beside + done + float(fine.sum())
+        if doubt + off.sum() <= SHARE * whole or len(off) > MOST_INTERVALS:
+            done, doubt = done + float(fine.sum()), doubt + float(off.sum())
+            break
+        split = off > 0.25 * SHARE * whole / len(off)
+        done += float(fine[~split].sum())
+        doubt += float(off[~split].sum())
+        todo = _halved(todo, split)
+    else:
+        doubt += float(off[split].sum())
+        done += float(fine[split].sum())
+    return PlacePrice(done, doubt, refused)
+
+
+class _Motion:
+    """Rates along a plan."""
+
+    def __init__(self, cost: PlaceCost, plan: Plan, model: Model) -> None:
+        self.cost, self.plan, self.model = cost, plan, model
+        self.group = group_of(plan.start.size)
+        self.begins = plan.switching_poses
+
+    def at(self, piece: IntArray, since: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """Rates per second (n, k), and where the vehicle may be, in pieces (n, 1) at times [s]."""
+        dof, pieces = self.plan.start.size, np.broadcast_to(piece, since.shape)
+        steps, twists = np.zeros((*since.shape, dof)), np.zeros((*since.shape, dof))
+        states = np.zeros((*since.shape, len(self.model.reduced_names)))
+        for k in np.unique(piece):
+            here = pieces == k
+            steps[here], twists[here], states[here] = self._within(int(k), since[here])
+        poses = (self.group(self.begins[pieces]) @ self.group(steps)).pose
+        with_states = getattr(self.cost, "rates_along", None)
+        rates = np.asarray(
+            self.cost.rates(poses, twists)
+            if with_states is None
+            else with_states(poses, twists, states),
+            dtype=np.float64,
+        )
+        if rates.shape != since.shape or not (np.isfinite(rates).all() and (rates >= 0.0).all()):
+            raise ValueError(
+                f"place cost {type(self.cost).__name__}: rates of shape {rates.shape} "
+                f"from {rates.min(initial=0.0):g}, need finite ones of at least 0 "
+                f"of shape {since.shape}"
+            )
+        if self.cost.per == "metre":
+            way = [0, 1, *range(3, dof)]
+            rates = rates * np.linalg.norm(twists[..., way], axis=-1)
+        return rates, allowed(self.cost, poses, twists)
+
+    def _within(self, k: int, since: Array) -> tuple[Array, Array, Array]:
+        """Motion since a primitive began, twists and reduced states, at times (n,) [s]."""
+        primitive: Any = self.plan.primitives[k]
+        if isinstance(primitive, Trim):
+            twists = np.tile(primitive.body_velocity, (since.size, 1))
+            states = np.tile(primitive.reduced_state, (since.size, 1))
+            return self.group.exp(since[:, None] * twists).pose, twists, states
+        course = primitive.course
+        if course is None:
+            raise ValueError(f"maneuver {primitive.name!r}: has no course, so no price of places")
+        row = np.clip(np.searchsorted(course.time, since, "right") - 1, 0, len(course.time) - 2)
+        if course.model is not None and self._is_coarse(course):
+            steps, states = along(course, since, course.model)
+        else:
+            span = np.diff(course.time)[row]
+            share = np.divide(
+                since - course.time[row], span, out=np.zeros_like(since), where=span > 0
+            )
+            states = course.reduced_state[row]
+            states = states + share[:, None] * (course.reduced_state[row + 1] - states)
+            steps = course.pose_at(since)
+        return steps, self.model.body_velocity(states, course.control[row]), states
+
+    def _is_coarse(self, course: Trajectory) -> bool:
+        """Whether samples are too far apart for one twist from each to the next."""
+        steps = np.abs(np.diff(course.pose, axis=0))
+        way = np.hypot(steps[:, 0], steps[:, 1]).max(initial=0.0)
+        return bool(way > DENSE * scale_of(self.cost) or steps[:, 2].max(initial=0.0) > DENSE)
+
+
+def _first_stretches(plan: Plan, scale: float) -> _Intervals:
+    """Stretches of a plan that are not longer than a scale [m], and do not turn far."""
+    pieces, begins, ends = list[Any](), list[Array](), list[Array]()
+    for k, (primitive, lasting) in enumerate(
+        zip(plan.primitives, plan.primitive_durations.tolist(), strict=True)
+    ):
+        if lasting <= 0.0:
+            continue
+        if isinstance(primitive, Trim):
+            edges = np.array([0.0, lasting])
+            steps = np.abs(lasting * primitive.body_velocity[None])
+        else:
+            edges, steps = _between_controls(primitive)
+        way = np.linalg.norm(steps[:, [0, 1, *range(3, steps.shape[1])]], axis=1)
+        parts = np.maximum(np.ceil(np.maximum(way / scale, steps[:, 2] / TURN)), 1.0).astype(int)
+        row = np.repeat(np.arange(len(parts)), parts)
+        share = (np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[row]
+        times = np.append(edges[row] + share * np.diff(edges)[row], edges[-1])
+        pieces.append(np.full(len(times) - 1, k))
+        begins.append(times[:-1])
+        ends.append(times[1:])
+    if not pieces:
+        return _Intervals(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
+    return _Intervals(np.concatenate(pieces), np.concatenate(begins), np.concatenate(ends))
+
+
+def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
+    """Times (n + 1,) [s] at which controls change, and the ways (n, dof) between, added up."""
+    course = maneuver.course
+    if course is None:
+        return np.array([0.0, maneuver.duration]), np.abs(maneuver.displacement[None])
+    changes = (course.control[1:-1] != course.control[:-2]).any(axis=1)
+    rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
+    steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
+    return course.time[rows], steps
+
+
+def _halved(todo: _Intervals, split: NDArray[np.bool_]) -> _Intervals:
+    piece, begin, end = todo.piece[split], todo.begin[split], todo.end[split]
+    middle = 0.5 * (begin + end)
+    return _Intervals(
+        np.repeat(piece, 2),
+        np.column_stack([begin, middle]).ravel(),
+        np.column_stack([middle, end]).ravel(),
+    )

@@ -1,0 +1,621 @@
+"""What places cost: near obstacles, on priced ground, uphill, or by a function of the user's own.
+
+The vehicle, its trims and its maneuvers look the same wherever a group element moves them; what
+they cost here does not. So these costs stand beside the invariant one, and a motion is priced by
+integrating them along it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import check_size
+from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.collision import (
+    AnyObstacle,
+    AnyShape,
+    Obstacle,
+    OccupancyMap,
+    Shape,
+    as_shapes,
+)
+from maneuver_automaton.collision.motion import planar
+from maneuver_automaton.collision.surroundings import (
+    ObstacleDistances,
+    ShapePart,
+    parts_of,
+    surroundings_around,
+)
+from maneuver_automaton.groups import SE2, LieGroup
+
+PER = ("metre", "second")
+SCALE = 0.1  # [m] nothing that is priced is finer, unless a cost says its own `scale`
+SHARE = 2e-4  # of a plan's whole cost: by how much the price of its places may be off, estimated
+ROUNDS = 24  # in which intervals are halved
+STEP = 1e-4  # [m, rad] of central differences
+
+
+class PlaceCost(Protocol):
+    """A cost that sees where the vehicle is: a rate of at least 0 at poses.
+
+    Rates and `per` are all that it takes. It may also have ``gradient(poses, velocities)``, its
+    derivatives (..., dof) by the pose; ``least(low, high)``, a number that no rate is below while
+    x and y [m] are in a box; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the cost once
+    it knows obstacles and body; ``scale`` [m], the size of its finest feature; and
+    ``allows(poses, velocities)``, where the vehicle may be at all. What is missing is found by
+    differences, is 0, or is the cost at poses moved back.
+
+    Examples
+    --------
+    >>> class KeepRight:
+    ...     per = "metre"
+    ...     def rates(self, poses, velocities):
+    ...         return np.maximum(poses[..., 1], 0.0)  # left of y = 0
+    >>> gradient_of(KeepRight(), np.array([[0.0, 2.0, 0.0]]), np.zeros((1, 3))).round(6).tolist()
+    [[0.0, 1.0, 0.0]]
+    """
+
+    @property
+    def per(self) -> str:
+        """Of what: "metre" of the way of the pose, or "second"."""
+        ...
+
+    def rates(self, poses: Array, velocities: Array) -> Array:
+        """Rates (...,) of at least 0 at poses (..., dof) under body velocities (..., dof)."""
+        ...
+
+
+class _Surrounded(Protocol):
+    """What costs look at of a problem."""
+
+    @property
+    def automaton(self) -> Automaton: ...
+    @property
+    def obstacles(self) -> tuple[AnyObstacle, ...]: ...
+    @property
+    def footprint(self) -> tuple[Shape, ...]: ...
+    @property
+    def parts(self) -> Mapping[str, tuple[Shape, ...]]: ...
+    @property
+    def body_height(self) -> tuple[float, float]: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Clearance:
+    """``weight (1 - d / within)^2`` where the body is at d < `within` from what stands still.
+
+    The distance is that of the body and of all that it carries, to the nearest obstacle; the margin
+    is not taken off. Obstacles that move do not count, nor do those above or below the body.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Box, Disc, Problem, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
+    >>> wall = Box([20.0, 1.0], [0.0, 2.0])
+    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=wall, footprint=Disc(0.5))
+    >>> near = Clearance(weight=4.0, within=2.0).on(problem)
+    >>> near.rates(np.zeros((1, 3)), np.zeros((1, 3))).tolist()  # 1 m to the wall
+    [1.0]
+    """
+
+    weight: float
+    within: float  # [m]
+    per: str = field(default="metre", kw_only=True)
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
+        _check_number("clearance: weight", self.weight)
+        if not (math.isfinite(self.within) and self.within > 0.0):
+            raise ValueError(f"clearance: within must be positive, got {self.within} m")
+        _check_per("clearance", self.per)
+
+    def rates(self, poses: Array, velocities: Array) -> Array:
+        """Zero: nothing is near before the cost is bound to a problem."""
+        return np.zeros(poses.shape[:-1])
+
+    def least(self, low: ArrayLike, high: ArrayLike) -> float:
+        """Zero, which no rate is below."""
+        return 0.0
+
+    def moved(self, by: LieGroup) -> Clearance:
+        """The cost itself: obstacles are moved with the problem."""
+        return self
+
+    def on(self, problem: _Surrounded) -> PlaceCost:
+        """The cost among the obstacles of a problem, for its body."""
+        names = {} if not problem.parts else {n: k for k, n in enumerate(_part_names(problem))}
+        bodies = [(None, parts_of(problem.footprint))]
+        carried = [(names[name], parts_of(shapes)) for name, shapes in problem.parts.items()]
+        kinds: dict[tuple[float, float] | None, list[AnyObstacle]] = {}
+        for one in problem.obstacles:
+            height = one.height if isinstance(one, Obstacle) else None
+            if not (isinstance(one, Obstacle) and one.motion is not None):
+                kinds.setdefault(height, []).append(one)
+        return _Near(
+            clearance=self,
+            bodies=(*bodies, *carried),
+            around=tuple((h, surroundings_around(tuple(k), (0.0, 0.0))) for h, k in kinds.items()),
+            body_height=problem.body_height,
+            automaton=problem.automaton,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Near:
+    """A clearance among obstacles."""
+
+    clearance: Clearance
+    bodies: tuple[tuple[int | None, list[ShapePart]], ...]  # number of the part, None: the own one
+    around: tuple[tuple[tuple[float, float] | None, ObstacleDistances], ...]  # by heights
+    body_height: tuple[float, float]  # [m]
+    automaton: Automaton
+
+    @property
+    def per(self) -> str:
+        return self.clearance.per
+
+    @property
+    def scale(self) -> float:
+        return 0.5 * self.clearance.within
+
+    def rates(self, poses: Array, velocities: Array) -> Array:
+        return self.rates_along(poses, velocities, None)
+
+    def rates_along(self, poses: Array, velocities: Array, states: Array | None) -> Array:
+        near = np.maximum(1.0 - self.distances(poses, states) / self.clearance.within, 0.0)
+        return np.asarray(self.clearance.weight * near * near)
+
+    def distances(self, poses: Array, states: Array | None) -> Array:
+        """To the nearest obstacle (...,) [m]; what is carried counts where states are known."""
+        flat = poses.reshape(-1, poses.shape[-1])
+        best = np.full(len(flat), math.inf)
+        for part, body in self.bodies:
+            frames = flat[:, :3]
+            if part is not None:
+                if states is None:
+                    continue
+                model: Any = self.automaton.model
+                seen = np.asarray(model.part_poses(states.reshape(len(flat), -1)))[:, part, :3]
+                frames = (SE2(frames) @ SE2(seen)).pose
+            for height, around in self.around:
+                rows = self._level_with(height, flat)
+                if rows.any():
+                    found = self._to_obstacles(around, body, frames[rows])
+                    best[rows] = np.minimum(best[rows], found)
+        return np.asarray(best.reshape(poses.shape[:-1]))
+
+    def _to_obstacles(
+        self, around: ObstacleDistances, body: list[ShapePart], frames: Array
+    ) -> Array:
+        """Distances (n,) [m] of a body, exact where they are less than `within`."""
+        middle, reach = (
+            body[0].middle,
+            max(math.dist(body[0].middle, one.middle) + one.reach for one in body),
+        )
+        centers = np.column_stack([SE2(frames).act(middle), np.zeros(len(frames))])
+        found = around.nearest(parts_of(()), centers, np.zeros(len(frames))).distance - reach
+        near = np.flatnonzero(found < self.clearance.within)
+        found[near] = around.nearest(body, frames[near], np.zeros(near.size)).distance
+        return found
+
+    def _level_with(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:
+        """Whether the body is neither above nor below obstacles of a height."""
+        low, high = self.body_height
+        if height is None or (poses.shape[1] == 3 and low == high == 0.0):
+            return np.ones(len(poses), dtype=np.bool_)
+        altitude = poses[:, 3:].sum(axis=1)
+        return np.asarray((altitude + low <= height[1]) & (altitude + high >= height[0]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ground:
+    """Ground with a price: areas, or a raster; nothing outside.
+
+    `areas` cost `price` where the pose is in one of them. A raster of prices comes in by
+    `of_raster`, a costmap of Nav2 by `of_costmap`, elevation by `of_elevation`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Box
+    >>> lawn = Ground(Box([4.0, 2.0]), price=3.0)
+    >>> lawn.rates(np.array([[1.0, 0.5, 0.0], [9.0, 0.0, 0.0]]), np.zeros((2, 3))).tolist()
+    [3.0, 0.0]
+    """
+
+    areas: tuple[Shape, ...]
+    price: float = 1.0
+    per: str = field(default="metre", kw_only=True)
+    raster: Raster | None = field(default=None, kw_only=True)
+
+    __repr__ = brief
+
+    if TYPE_CHECKING:
+
+        def __init__(
+            self,
+            areas: AnyShape | Sequence[AnyShape],
+            price: float = 1.0,
+            *,
+            per: str = "metre",
+            raster: Raster | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
+        object.__setattr__(self, "areas", as_shapes("ground", self.areas))
+        _check_number("ground: price", self.price)
+        _check_per("ground", self.per)
+        if bool(self.areas) == (self.raster is not None):
+            raise ValueError("ground: need areas or a raster")
+
+    @classmethod
+    def of_raster(
+        cls,
+        prices: ArrayLike,
+        *,
+        resolution: float,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        price: float = 1.0,
+        per: str = "metre",
+    ) -> Ground:
+        """Prices (rows, columns) of cells, row 0 lowest as in an `OccupancyMap`, times `price`.
+
+        Between the middles of cells they are interpolated.
+
+        Examples
+        --------
+        >>> ground = Ground.of_raster([[0.0, 4.0]], resolution=1.0)
+        >>> ground.rates(np.array([[1.0, 0.5, 0.0]]), np.zeros((1, 3))).tolist()
+        [2.0]
+        """
+        values = as_array("ground: prices", prices)
+        if values.size and values.min() < 0.0:
+            raise ValueError(f"ground: prices must be at least 0, got {values.min():g}")
+        raster = Raster(values, resolution=resolution, origin=as_array("ground: origin", origin))
+        return cls((), price, per=per, raster=raster)
+
+    @classmethod
+    def of_costmap(
+        cls,
+        values: ArrayLike,
+        *,
+        resolution: float,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        price: float = 1.0,
+        per: str = "metre",
+    ) -> tuple[Ground, OccupancyMap]:
+        """Ground and obstacles of a costmap of Nav2: 252 costs `price`, 253 and above are blocked.
+
+        Blocked cells cost as much as the dearest others, which counts beside them alone.
+
+        Examples
+        --------
+        >>> ground, walls = Ground.of_costmap([[0, 126, 254]], resolution=0.5, price=2.0)
+        >>> ground.raster.values.tolist(), walls.blocked.tolist()
+        ([[0.0, 0.5, 1.0]], [[False, False, True]])
+        """
+        cells = as_array("costmap: values", values)
+        if cells.ndim != 2 or not cells.size:
+            raise ValueError(f"costmap: values have shape {cells.shape}, need (rows, columns)")
+        if not (cells.min() >= 0.0 and cells.max() <= 255.0):
+            raise ValueError(
+                f"costmap: values reach from {cells.min():g} to {cells.max():g}, need 0 to 255"
+            )
+        prices = np.minimum(cells, 252.0) / 252.0
+        ground = cls.of_raster(prices, resolution=resolution, origin=origin, price=price, per=per)
+        walls = OccupancyMap(cells >= 253.0, resolution=resolution, origin=origin, name="costmap")
+        return ground, walls
+
+    @classmethod
+    def of_elevation(
+        cls,
+        heights: ArrayLike,
+        *,
+        resolution: float,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        price: float = 1.0,
+        max_cross_slope: float | None = None,
+    ) -> Ground:
+        """Hills of `heights` (rows, columns) [m]: uphill costs `price` per metre climbed.
+
+        Downhill is free. Where the ground slopes more than `max_cross_slope` [rise per metre] from
+        the left of the vehicle to its right, or back, it must not be.
+
+        Examples
+        --------
+        >>> hill = Ground.of_elevation([[0.0, 1.0, 2.0]], resolution=2.0, price=10.0)
+        >>> up, down = np.array([[[3.0, 1.0, 0.0]], [[3.0, 1.0, np.pi]]])
+        >>> ahead = np.array([[1.0, 0.0, 0.0]])
+        >>> hill.rates(up, ahead).tolist(), hill.rates(down, ahead).tolist()
+        ([5.0], [0.0])
+        """
+        values = as_array("elevation: heights", heights)
+        if max_cross_slope is not None:
+            _check_number("elevation: max_cross_slope", max_cross_slope)
+        hills = Raster(
+            values,
+            resolution=resolution,
+            origin=as_array("elevation: origin", origin),
+            are_heights=True,
+            max_cross_slope=max_cross_slope,
+        )
+        return cls((), price, raster=hills)
+
+    @property
+    def scale(self) -> float:
+        """Size [m] of the finest feature."""
+        if self.raster is not None:
+            return self.raster.resolution
+        cores = [(part.core, part.radius) for part in parts_of(self.areas)]
+        widths = [2.0 * (r or 2.0 * core.area / core.length) for core, r in cores]
+        return min(SCALE, 0.25 * min(widths))
+
+    @property
+    def isotropic(self) -> bool:
+        """Whether the rate is the same for all headings and velocities."""
+        return self.raster is None or not self.raster.are_heights
+
+    def rates(self, poses: Array, velocities: Array) -> Array:
+        """Rates (...,) at poses (..., dof) under body velocities (..., dof)."""
+        if self.raster is None:
+            return np.asarray(self.price * self._inside(poses[..., :2]))
+        if not self.raster.are_heights:
+            return np.asarray(self.price * self.raster.at(self.raster.values, poses[..., :2]))
+        uphill, speed = self.raster.climb(poses, velocities)
+        share = np.divide(uphill, speed, out=np.zeros_like(speed), where=speed > 0.0)
+        return np.asarray(self.price * np.maximum(share, 0.0))
+
+    def allows(self, poses: Array, velocities: Array) -> NDArray[np.bool_]:
+        """Whether the ground slopes little enough across the vehicle."""
+        if self.raster is None or self.raster.max_cross_slope is None:
+            return np.ones(poses.shape[:-1], dtype=np.bool_)
+        left = np.zeros_like(velocities)
+        left[..., 1] = 1.0
+        return np.abs(self.raster.climb(poses, left)[0]) <= self.raster.max_cross_slope + 1e-9
+
+    def least(self, low: ArrayLike, high: ArrayLike) -> float:
+        """A number that no rate is below while x and y [m] are between two corners (2,)."""
+        import shapely
+
+        if self.raster is not None:
+            return self.price * self.raster.least(np.asarray(low), np.asarray(high))
+        box = shapely.box(*np.asarray(low)[:2], *np.asarray(high)[:2])
+        solid = [part.core for part in parts_of(self.areas) if not part.radius]
+        return self.price if solid and shapely.union_all(solid).covers(box) else 0.0
+
+    def moved(self, by: LieGroup) -> Ground:
+        """The ground moved by a planar pose."""
+        raster = None if self.raster is None else self.raster.moved(by)
+        return replace(self, areas=tuple(one.moved(by) for one in self.areas), raster=raster)
+
+    def _inside(self, places: Array) -> NDArray[np.bool_]:
+        """Whether places (..., 2) are in an area."""
+        import shapely
+
+        inside = np.zeros(places.shape[:-1], dtype=np.bool_)
+        for part in parts_of(self.areas):
+            x, y = np.moveaxis(places - part.middle, -1, 0)
+            near = (np.abs(x) <= part.reach) & (np.abs(y) <= part.reach) & ~inside
+            if part.radius:
+                inside[near] = np.hypot(x[near], y[near]) <= part.radius
+                continue
+            shapely.prepare(part.core)
+            inside[near] = shapely.intersects_xy(part.core, places[near])
+        return inside
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Raster:
+    """Values at the middles of square cells, row 0 lowest, and linear between.
+
+    Examples
+    --------
+    >>> raster = Raster(np.array([[0.0, 4.0]]), resolution=1.0)
+    >>> raster.at(raster.values, np.array([[0.5, 0.5], [1.0, 0.5], [7.0, 0.5]])).tolist()
+    [0.0, 2.0, 0.0]
+    """
+
+    values: Array  # (rows, columns)
+    resolution: float = field(kw_only=True)  # [m]
+    origin: Array = field(default_factory=lambda: np.zeros(3), kw_only=True)  # (3,) as of a map
+    are_heights: bool = field(default=False, kw_only=True)  # [m] and not prices
+    max_cross_slope: float | None = field(default=None, kw_only=True)
+    slopes: tuple[Array, Array] | None = field(init=False, default=None)  # along columns, rows
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
+        freeze(self, "values")
+        freeze(self, "origin", last=3)
+        if self.values.ndim != 2 or not self.values.size:
+            raise ValueError(
+                f"ground: the raster has shape {self.values.shape}, need (rows, columns)"
+            )
+        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
+            raise ValueError(f"ground: resolution must be positive, got {self.resolution} m")
+        check_size("ground: origin", self.origin[:2])
+        if self.are_heights:
+            x, y = (
+                np.gradient(self.values, self.resolution, axis=axis)
+                if self.values.shape[axis] > 1
+                else np.zeros_like(self.values)
+                for axis in (1, 0)
+            )
+            object.__setattr__(self, "slopes", (x, y))
+
+    def at(self, values: Array, places: Array) -> Array:
+        """Values (...,) at places (..., 2) [m]; 0 outside."""
+        cells = SE2(self.origin).inverse().act(places) / self.resolution
+        column, row = cells[..., 0], cells[..., 1]
+        rows, columns = values.shape
+        inside = (column >= 0.0) & (column <= columns) & (row >= 0.0) & (row <= rows)
+        (i, up), (j, right) = (
+            _between(np.where(inside, at, 0.0), count)
+            for at, count in ((row, rows), (column, columns))
+        )
+        above, beside = np.minimum(i + 1, rows - 1), np.minimum(j + 1, columns - 1)
+        low = (1.0 - right) * values[i, j] + right * values[i, beside]
+        high = (1.0 - right) * values[above, j] + right * values[above, beside]
+        return np.asarray(np.where(inside, (1.0 - up) * low + up * high, 0.0))
+
+    def climb(self, poses: Array, velocities: Array) -> tuple[Array, Array]:
+        """Height gained per second (...,) [m/s] at body velocities, and the speeds in the plane."""
+        assert self.slopes is not None
+        turned = poses[..., 2] - self.origin[2]
+        cosine, sine = np.cos(turned), np.sin(turned)
+        ahead, left = velocities[..., 0], velocities[..., 1]
+        x, y = (self.at(one, poses[..., :2]) for one in self.slopes)
+        gained = x * (cosine * ahead - sine * left) + y * (sine * ahead + cosine * left)
+        return np.asarray(gained), np.asarray(np.hypot(ahead, left))
+
+    def least(self, low: Array, high: Array) -> float:
+        """A number that no price is below in a box."""
+        corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])])
+        cells = SE2(self.origin).inverse().act(corners) / self.resolution
+        first, last = cells.min(axis=0), cells.max(axis=0)
+        shape = np.array(self.values.shape[::-1])
+        if self.are_heights or (first < 0.0).any() or (last > shape).any():
+            return 0.0
+        j, i = np.maximum(np.floor(first - 0.5), 0).astype(int)
+        k, n = np.ceil(last + 0.5).astype(int)
+        return float(self.values[i : n + 1, j : k + 1].min())
+
+    def moved(self, by: LieGroup) -> Raster:
+        """The raster moved by a planar pose."""
+        return Raster(
+            self.values,
+            resolution=self.resolution,
+            origin=(planar(by) @ SE2(self.origin)).pose,
+            are_heights=self.are_heights,
+            max_cross_slope=self.max_cross_slope,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Moved:
+    """A cost elsewhere: that of the pose moved back."""
+
+    cost: PlaceCost
+    by: LieGroup
+
+    @property
+    def per(self) -> str:
+        return self.cost.per
+
+    @property
+    def scale(self) -> float:
+        return scale_of(self.cost)
+
+    def rates(self, poses: Array, velocities: Array) -> Array:
+        return self.cost.rates(self._back(poses), velocities)
+
+    def allows(self, poses: Array, velocities: Array) -> NDArray[np.bool_]:
+        return allowed(self.cost, self._back(poses), velocities)
+
+    def on(self, problem: _Surrounded) -> PlaceCost:
+        return replace(self, cost=bound(self.cost, problem))
+
+    def _back(self, poses: Array) -> Array:
+        return np.asarray((self.by.inverse() @ type(self.by)(poses)).pose)
+
+
+def check_place_costs(value: Any) -> tuple[PlaceCost, ...]:
+    """Costs of places from one or several.
+
+    Raises
+    ------
+    ValueError
+        If one has no rates, or says not of what.
+
+    Examples
+    --------
+    >>> len(check_place_costs(Clearance(1.0, 0.5)))
+    1
+    """
+    costs = tuple(value) if isinstance(value, Sequence) else (value,)
+    for k, cost in enumerate(costs):
+        if not callable(getattr(cost, "rates", None)):
+            raise ValueError(
+                f"place_costs[{k}]: got {cost!r:.60}, need Clearance, Ground, or an object with "
+                "rates(poses, velocities) and per"
+            )
+        _check_per(f"place_costs[{k}]", getattr(cost, "per", None))
+        if type(cost).__hash__ is None:
+            raise ValueError(f"place_costs[{k}]: {type(cost).__name__} has no hash; need one")
+    return costs
+
+
+def bound(cost: PlaceCost, problem: _Surrounded) -> PlaceCost:
+    """The cost once it knows obstacles and body of a problem; itself if it does not ask."""
+    on: Callable[[Any], PlaceCost] | None = getattr(cost, "on", None)
+    return cost if on is None else on(problem)
+
+
+def moved(cost: PlaceCost, by: LieGroup) -> PlaceCost:
+    """The cost moved by a group element: by its own method, or at poses moved back."""
+    own: Callable[[LieGroup], PlaceCost] | None = getattr(cost, "moved", None)
+    return _Moved(cost, by) if own is None else own(by)
+
+
+def least_of(cost: PlaceCost, low: ArrayLike, high: ArrayLike) -> float:
+    """A number that no rate is below while x and y [m] are between two corners; 0 if not known."""
+    own: Callable[[Any, Any], float] | None = getattr(cost, "least", None)
+    return 0.0 if own is None else own(low, high)
+
+
+def scale_of(cost: PlaceCost) -> float:
+    """Size [m] of the finest feature."""
+    return float(getattr(cost, "scale", SCALE))
+
+
+def allowed(cost: PlaceCost, poses: Array, velocities: Array) -> NDArray[np.bool_]:
+    """Where (...,) the vehicle may be; everywhere if the cost does not say."""
+    own: Callable[[Array, Array], NDArray[np.bool_]] | None = getattr(cost, "allows", None)
+    return np.ones(poses.shape[:-1], dtype=np.bool_) if own is None else own(poses, velocities)
+
+
+def gradient_of(cost: PlaceCost, poses: Array, velocities: Array) -> Array:
+    """Derivatives (..., dof) of the rates by the pose: its own, or central differences."""
+    own: Callable[[Array, Array], Array] | None = getattr(cost, "gradient", None)
+    if own is not None:
+        return own(poses, velocities)
+    slopes = np.empty(poses.shape)
+    for k in range(poses.shape[-1]):
+        step = np.zeros(poses.shape[-1])
+        step[k] = STEP
+        ahead, behind = (cost.rates(poses + sign * step, velocities) for sign in (1.0, -1.0))
+        slopes[..., k] = (ahead - behind) / (2.0 * STEP)
+    return slopes
+
+
+def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:
+    """Cell whose middle is below, and how far on to the next one, held at the border."""
+    middle = np.clip(at - 0.5, 0.0, count - 1.0)
+    cell = np.minimum(middle.astype(np.int64), count - 1)
+    return cell, middle - cell
+
+
+def _part_names(problem: _Surrounded) -> tuple[str, ...]:
+    names: tuple[str, ...] = problem.automaton.model.part_names
+    return names
+
+
+def _check_number(what: str, value: float) -> None:
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ValueError(f"{what} must be a number of at least 0, got {value}")
+
+
+def _check_per(what: str, per: Any) -> None:
+    if per not in PER:
+        raise ValueError(f"{what}: per must be 'metre' or 'second', got {per!r}")

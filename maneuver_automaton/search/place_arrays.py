@@ -1,0 +1,140 @@
+"""What places cost, as searches see it: one clearance by itself, all else sampled on a raster."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_with
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.places import Clearance, PlaceCost, allowed, bound
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.arrays import PlaceArrays
+from maneuver_automaton.search.lattice_library import LatticeLibrary
+
+TURNS = 16  # headings of a raster, where they matter
+FINE = 0.25  # cells of a raster, in half widths of the body ...
+ROUGH = 0.1  # ... or in length scales of a vehicle that is a point
+MOST_SAMPLES = 1 << 21  # of a raster: 8 MiB
+ALONG = 1.0  # cells from sample to sample along a motion, at most ...
+NEARING = 0.5  # ... and shares of the distance within which obstacles are dear
+FORBIDDEN = 1e3  # per metre, where the vehicle must not be at all
+FOUR = (-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)  # quarters of a cell
+BESIDE = 4.0  # length scales, to whole multiples of which the box of a raster is widened
+
+NOTHING = PlaceArrays(
+    weight=0.0,
+    within=0.0,
+    per_second=False,
+    step=math.inf,
+    value=np.zeros((1, 1, 0, 0), dtype=np.float32),
+    origin_x=0.0,
+    origin_y=0.0,
+    cell=1.0,
+)
+
+
+def place_arrays(problem: Problem, library: LatticeLibrary, frame: Array, box: Array) -> PlaceArrays:
+    """What places cost within a box (4,), seen from a frame (3,); of what is beyond, the border.
+
+    The first clearance is that of the body that there is, whatever its parts. All other costs are
+    kept with the setting, at samples as near as suits the vehicle.
+    """
+    found = NOTHING
+    others = list(problem.place_costs)
+    for one in problem.place_costs:
+        if isinstance(one, Clearance):
+            others.remove(one)
+            found = found._replace(
+                weight=float(one.weight),
+                within=float(one.within),
+                per_second=one.per == "second",
+                step=NEARING * float(one.within),
+            )
+            break
+    if not others:
+        return found
+    unit = BESIDE * float(library.radius)
+    low, high = np.floor(box[:2] / unit) * unit, np.ceil(box[2:] / unit) * unit
+    own = FINE * library.half_width or ROUGH * library.radius
+    key = "places", tuple(frame.tolist()), *low.tolist(), *high.tolist(), float(own)
+
+    def sampled() -> PlaceArrays:
+        costs = [bound(one, problem.setting) for one in others]
+        return _sampled(problem, costs, frame, low, high, cell=float(own))
+
+    kept = kept_with(problem.setting, key, sampled)
+    step = min(found.step, ALONG * kept.cell)
+    return kept._replace(
+        weight=found.weight, within=found.within, per_second=found.per_second, step=step
+    )
+
+
+def known_distance(problem: Problem) -> float:
+    """How far [m] from obstacles distances have to be known: where they are kept, or dear."""
+    near = [one.within for one in problem.place_costs if isinstance(one, Clearance)]
+    return max([float(problem.margin), *near])
+
+
+def driven_back(place: PlaceArrays) -> PlaceArrays:
+    """The same for a vehicle whose motions are those of another one in reverse."""
+    if len(place.value) == 1:
+        return place
+    return place._replace(value=np.ascontiguousarray(place.value[[1, 0, 2]]))
+
+
+def _sampled(
+    problem: Problem,
+    costs: Sequence[PlaceCost],
+    frame: Array,
+    low: Array,
+    high: Array,
+    *,
+    cell: float,
+) -> PlaceArrays:
+    """Costs on a raster of cells, larger ones where it would have too many samples."""
+    same = all(getattr(one, "isotropic", False) for one in costs)
+    turns = 1 if same else TURNS
+    sheets = 1 if same and all(one.per == "metre" for one in costs) else 3
+    width = high - low
+    cell = max(cell, math.sqrt(float(width.prod()) * turns * sheets / MOST_SAMPLES))
+    columns, rows = (np.ceil(width / cell).astype(int) + 1).tolist()
+    headings = np.arange(turns) * (2.0 * math.pi / turns)
+    ahead = np.zeros(problem.start.size)
+    ahead[0] = 1.0
+    value = np.zeros((sheets, turns, rows, columns))
+    # Each sample is the mean of four about it: so the areas of what is sampled stay what they are.
+    for x, y in (0.25 * cell * np.array(FOUR)).tolist():
+        places = np.stack(
+            np.broadcast_arrays(
+                low[0] + x + cell * np.arange(columns)[None, None, :],
+                low[1] + y + cell * np.arange(rows)[None, :, None],
+                headings[:, None, None],
+            ),
+            axis=-1,
+        )
+        poses = (SE2(frame) @ SE2(places)).pose
+        higher = np.broadcast_to(problem.start[3:], (*poses.shape[:-1], problem.start.size - 3))
+        poses = np.concatenate([poses, higher], axis=-1)
+        for one in costs:
+            if one.per == "second":
+                value[2] += 0.25 * one.rates(poses, np.broadcast_to(ahead, poses.shape))
+                continue
+            for sheet in range(min(sheets, 2)):
+                velocities = np.broadcast_to(ahead * (1.0, -1.0)[sheet], poses.shape)
+                rates = one.rates(poses, velocities)
+                good = allowed(one, poses, velocities)
+                value[sheet] += 0.25 * (rates + np.where(good, 0.0, FORBIDDEN))
+    if (value == value[:, :1]).all():
+        value = value[:, :1]
+    if sheets == 3 and (value[0] == value[1]).all() and not value[2].any():
+        value = value[:1]
+    return NOTHING._replace(
+        value=np.ascontiguousarray(value, dtype=np.float32),
+        origin_x=float(low[0]),
+        origin_y=float(low[1]),
+        cell=float(cell),
+    )
