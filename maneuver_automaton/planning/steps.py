@@ -28,6 +28,7 @@ from maneuver_automaton.planning.free_space import (
     TurnedByManeuvers,
     certificate_of,
 )
+from maneuver_automaton.planning.from_state import FromState, between_trims
 from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.lattice_words import Lattice
 from maneuver_automaton.planning.on_state_lattice import StateLattice
@@ -93,7 +94,12 @@ def answer(
 
 
 def steps_of(problem: Problem) -> Steps:
-    """The steps of a problem: its graph, if it has one, then those to its goals."""
+    """The steps of a problem: its graph, if it has one, then those to its goals.
+
+    Where it starts or ends in a state of no trim, problems between trims are answered instead.
+    """
+    if problem.has_states:
+        return Steps([FromState(answer, prepare_steps)], POLISHED)
     graph = [StateLattice()] if _may_be_a_graph(problem) else []
     if problem.has_tolerance:
         return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
@@ -146,6 +152,9 @@ def prepare_steps(problem: Problem, workspace: Workspace) -> None:
     """Have ready what the steps of a problem need, before the clock runs."""
     if problem.obstacles or problem.zones:
         load_checking()  # what is imported in the first check would make it late
+    if problem.has_states:
+        FromState(answer, prepare_steps).prepare(problem, workspace)
+        return
     if _may_be_a_graph(problem) and StateLattice().prepare(problem, workspace):
         return
     for step in search_steps(problem).steps:
@@ -169,7 +178,7 @@ def uses_lattice(problem: Problem) -> bool:
     rest where the time is fixed. Otherwise words are searched, and those that meet obstacles are
     refused.
     """
-    return _uses_lattice(problem.setting)
+    return _uses_lattice(between_trims(problem).setting)
 
 
 @kept_by_first

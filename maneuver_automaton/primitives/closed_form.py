@@ -142,11 +142,25 @@ def _maneuvers(
     return tuple(
         maneuver
         for k in range(0, len(pairs), BATCH)
-        for maneuver in _batch(model, pairs[k : k + BATCH], late=late)
+        for maneuver in quickest_between(model, pairs[k : k + BATCH], late=late)
     )
 
 
-def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> list[Maneuver]:
+def quickest_between(
+    model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool = False
+) -> list[Maneuver]:
+    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> from maneuver_automaton.primitives.equilibrium import trims_of
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
+    ...                             max_angular_acceleration=1.0)
+    >>> rest, ahead = trims_of(robot, {"speed": [0.0, 1.0], "turn_rate": [0.0]}).trims
+    >>> [one.duration for one in quickest_between(robot, [(rest, ahead), (ahead, rest)])]
+    [2.0, 2.0]
+    """
     source = np.array([source.reduced_state for source, _ in pairs])
     target = np.array([target.reduced_state for _, target in pairs])
     same = ~(np.abs(target - source) > EQUAL * np.maximum(1.0, np.abs(source))).any(axis=1)
