@@ -6,6 +6,7 @@ are tried: those that are reached soonest, and rest. What was found is polished 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +29,7 @@ from maneuver_automaton.primitives.on_the_spot import (
     maneuvers_between,
     prepare_maneuvers,
     seconds_between,
+    trim_at,
 )
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.limits import closed_bound, stays_inside
@@ -258,6 +260,21 @@ def _free_legs(found: Incumbents, state: Trim) -> tuple[list[Leg | None], str]:
         if legs and not counted and found.budget.elapsed > MAKING_SHARE * found.budget.seconds:
             break
     return legs, refused
+
+
+def leg_from(problem: Problem, state: Array, trim: Trim) -> Leg | None:
+    """A first maneuver from a state, free if one is: to a trim, or else to one that is near.
+
+    A step of a loop begins with it where the vehicle is in another state than its plan says.
+    """
+    here = trim_at(problem.automaton.model, state, "measured state")
+    there = maneuvers_between(problem.automaton.model, here, trim)
+    wanted = [Leg(maneuver, here, trim) for maneuver in there]
+    for leg in itertools.chain(wanted, _legs(problem, here, ends=False)):
+        plan = _driven(leg, problem.start, problem.start_time, ends=False)
+        if stays_inside(plan, problem.bounds) and not what_is_hit(problem, plan, problem.goals[0]):
+            return leg
+    return wanted[0] if wanted else None
 
 
 def _legs(problem: Problem, state: Trim, *, ends: bool) -> Iterator[Leg]:

@@ -168,10 +168,19 @@ def scenario_of_document(
         problem = Problem(
             automaton,
             file.start.pose,
-            tuple(made(Goal, one, free_heading=one.heading == "free") for one in file.goals),
+            tuple(
+                made(
+                    Goal,
+                    one,
+                    free_heading=one.heading == "free",
+                    state=_by_name(one.state, automaton),
+                )
+                for one in file.goals
+            ),
             cost=cost,
             horizon=horizon,
             start_trim=file.start.trim,
+            start_state=_by_name(file.start.state, automaton),
             start_time=file.start.time_s,
             bounds=made(Bounds, file.bounds_m),
             search=made(SearchSettings, file.search),
@@ -248,11 +257,40 @@ def _check_ends(document: Document, file: ScenarioFile, automaton: Automaton) ->
             said = f"got {len(end.pose)} numbers, need {dof}: {names}"
             raise document.error((*where, "pose"), said)
         _check_trim(document, (*where, "trim"), end.trim, automaton)
+        if end.state is not None:
+            _check_state(document, (*where, "state"), end, automaton)
     if file.bounds_m.z is not None and dof == 3:
         raise document.error(("bounds_m", "z"), f"the {automaton.model.name} has no height")
     for k, zone in enumerate(file.zones):
         for n, name in enumerate(zone.trims or ()):
             _check_trim(document, ("zones", k, "trims", n), name, automaton)
+
+
+def state_keys(names: Sequence[str]) -> dict[str, str]:
+    """The key in a file of each component of a reduced state: its name, with the unit if known."""
+    return {name: f"{name}_{STATE_UNITS[name]}" if name in STATE_UNITS else name for name in names}
+
+
+def _by_name(state: Mapping[str, float] | None, automaton: Automaton) -> dict[str, float] | None:
+    """A state of a file by the names that the model has."""
+    if state is None:
+        return None
+    keys = state_keys(automaton.model.reduced_names)
+    return {name: state[key] for name, key in keys.items() if key in state}
+
+
+def _check_state(
+    document: Document, where: Where, end: StartPart | GoalPart, automaton: Automaton
+) -> None:
+    """Raise where a state is none of the vehicle."""
+    keys = state_keys(automaton.model.reduced_names)
+    for key in end.state or ():
+        if keys and key not in keys.values():
+            raise document.error(
+                (*where, key), f"is no key here, need some of {', '.join(keys.values())}"
+            )
+    with at(document, where):
+        settled_state(automaton, _by_name(end.state, automaton), where[0], trim=end.trim)
 
 
 def _check_trim(document: Document, where: Where, trim: str | None, automaton: Automaton) -> None:

@@ -109,6 +109,13 @@ MEASURES = {  # the parameters of all models, by their units
     "n_m_s": "turn_drag",
     "per_rad": "cornering",
 }
+STATE_UNITS = {  # of what reduced states hold
+    "speed": "m_s",
+    "lateral_speed": "m_s",
+    "climb": "m_s",
+    "turn_rate": "rad_s",
+    **dict.fromkeys(("steering", "hitch", "tilt", "lateral_tilt", "articulation"), "rad"),
+}
 UNIT_OF = {name: unit for unit, names in MEASURES.items() for name in names.split()}
 WHAT = {  # each model is
     "unicycle": "A robot that drives ahead and turns on the spot; control [v, omega].",
