@@ -29,6 +29,7 @@ from maneuver_automaton.collision import (
 from maneuver_automaton.costs import Cost, StageCost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
+from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.on_the_spot import state_of, trim_at
 
@@ -523,7 +524,8 @@ class Problem:
                 for states in (course.reduced_state[:-1], course.reduced_state[1:])
             ]
             rate = float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
-            entry = maneuver, maneuver.cost_multiplier * rate
+            standing = standing_price(model, course.reduced_state)
+            entry = maneuver, maneuver.cost_multiplier * rate + standing
             if len(known) < MOST_KNOWN or maneuver.name in known:
                 known[maneuver.name] = entry
         return entry[1]

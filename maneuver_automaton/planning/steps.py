@@ -17,6 +17,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.models.speeds import steers_at_rest
 from maneuver_automaton.planning.along_paths import AlongPaths
 from maneuver_automaton.planning.among_zones import AmongZones
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
@@ -131,7 +132,8 @@ def search_steps(problem: Problem) -> Steps:
         lattice = [Lattice()] if method in ("auto", "lattice") else []
         return Steps([NearlyMet(), *first, *lattice], UNFINISHED)
     searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
-    along = searched and follows_paths(automaton.model) and problem.rests_at_both_ends
+    stops = follows_paths(automaton.model) and steers_at_rest(automaton.model)
+    along = searched and stops and problem.rests_at_both_ends
     shortest = along and prices_metres_alone(problem.cost)  # to stop and steer costs no metre
     polish = None if shortest or why_not_polished(problem) else Polish()
     steps: list[Step] = [NearlyMet(), Checks()]

@@ -14,7 +14,13 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.speeds import is_too_sharp, lateral_limit, pace_within
+from maneuver_automaton.models.speeds import (
+    is_too_sharp,
+    lateral_limit,
+    pace_within,
+    standing_price,
+    steers_at_rest,
+)
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.primitive import Maneuver, Trajectory, Trim
 
@@ -470,11 +476,19 @@ def quickest_maneuvers(
     46
     """
     early = connect_bang_bang(model, trims, pairs=pairs)
-    others = connect_bang_bang(model, trims, pairs=pairs, late=True) if late else early
+    both = late or not steers_at_rest(model)  # who brakes last has turned the wheels before
+    others = connect_bang_bang(model, trims, pairs=pairs, late=True) if both else early
     rests = [trim for trim in trims if trim.is_rest]
-    return (
+    every = (
         *early,
         *differing(early, others),
         *_from_rest(model, rests, strokes, "speed"),
         *_from_rest(model, rests, turns, "turn_rate"),
     )
+    return tuple(one for one in every if may_drive(model, one))
+
+
+def may_drive(model: Model, maneuver: Maneuver) -> bool:
+    """Whether a maneuver with a course turns no wheel at rest, or the vehicle may do so."""
+    course = maneuver.course
+    return course is None or math.isfinite(standing_price(model, course.reduced_state))

@@ -25,7 +25,12 @@ from maneuver_automaton.optimal_control.maneuvers import (
     solve_transfer,
     transfer_program,
 )
-from maneuver_automaton.primitives.closed_form import differing, has_limited_rates, quickest_between
+from maneuver_automaton.primitives.closed_form import (
+    differing,
+    has_limited_rates,
+    may_drive,
+    quickest_between,
+)
 from maneuver_automaton.primitives.connecting import CLOSED, WITHIN, Inputs, closed, excess
 from maneuver_automaton.primitives.primitive import Maneuver, Trim
 from maneuver_automaton.primitives.turning import hitch_maneuvers
@@ -144,7 +149,9 @@ def maneuvers_between(model: Model, source: Trim, target: Trim) -> tuple[Maneuve
     if _limited(model):
         try:
             early = quickest_between(model, [(source, target)])
-            return (*early, *differing(early, quickest_between(model, [(source, target)], late=True)))
+            late = quickest_between(model, [(source, target)], late=True)
+            both = (*early, *differing(early, late))
+            return tuple(one for one in both if may_drive(model, one))
         except ValueError:  # a component cannot change that way at all
             return ()
     return _by_optimal_control(model, source, target)
@@ -181,7 +188,10 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         inputs = closed(model, start, end, inputs=raw, limits=model.control_limits, enough=enough)
         course = inputs.drive(model, start)
         missed = float(np.abs(course.reduced_state[-1] - end).max())
-        if not missed <= CLOSED or excess(model.reduced_limits, course.reduced_state).max() > WITHIN:
+        if (
+            not missed <= CLOSED
+            or excess(model.reduced_limits, course.reduced_state).max() > WITHIN
+        ):
             continue
         if is_too_sharp(model, course.twists(model)).any():
             continue
@@ -194,5 +204,3 @@ def prepare_maneuvers(model: Model) -> None:
     """Have the program of a model ready, before a clock runs."""
     if not (isinstance(model, CarWithTrailer) or _limited(model)):
         program_of(model)
-
-

@@ -67,7 +67,9 @@ class Disturbance:
                 f"{list(self.reduced_state or ())}"
             )
         if self.reduced_state is not None and self.delay:
-            raise ValueError("disturbance: reduced_state is for a delay of 0, got a delay of 1 step")
+            raise ValueError(
+                "disturbance: reduced_state is for a delay of 0, got a delay of 1 step"
+            )
         if self.delay not in (0, 1):
             raise ValueError(f"disturbance: delay must be 0 or 1 steps, got {self.delay}")
         if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
@@ -324,9 +326,7 @@ class _Track:
         """Note pose and state after the last step: the end of its piece, with noise and pushes."""
         now = self.log[-1]
         where = pushed(np.array(self.driven[-1].end) + draw.noise, self.upset, after=now.number)
-        self.state = shifted_state(
-            self.driven[-1], draw.state, self.problem.automaton.model
-        )
+        self.state = shifted_state(self.driven[-1], draw.state, self.problem.automaton.model)
         self.poses.append(where)
         self.times.append(now.time + now.applied)
         self.inside.append(any(within(where, goal) for goal in self.problem.goals))

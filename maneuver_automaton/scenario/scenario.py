@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -20,16 +20,26 @@ from maneuver_automaton.formats.statement import MapFile, StatedVehicle, Stateme
 from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import (
+    STATE_TOLERANCE,
+    Bounds,
+    Goal,
+    Horizon,
+    Problem,
+    SearchSettings,
+    settled_state,
+)
 from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
     CostPart,
+    GoalPart,
     NoisePart,
     RecedingHorizonPart,
     ScenarioFile,
+    StartPart,
 )
 from maneuver_automaton.scenario.shapes import (
     footprint_of,
@@ -37,7 +47,7 @@ from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     zones_of,
 )
-from maneuver_automaton.scenario.vehicles import carried_of, model_of
+from maneuver_automaton.scenario.vehicles import STATE_UNITS, carried_of, model_of
 
 T = TypeVar("T")
 Made: TypeAlias = dict[tuple[object, ...], Any]  # of parts of a file, which several vehicles share
@@ -329,7 +339,6 @@ def _horizon(document: Document, file: ScenarioFile) -> Horizon:
         return made(Horizon, part, time=None if time_s == "free" else time_s)
 
 
-STATE_TOLERANCE = 1e-9  # between a reduced state that a file states and a trim's, in its units
 TPCAP = """\
 schema: 1
 name: The car of TPCAP

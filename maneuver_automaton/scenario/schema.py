@@ -138,8 +138,12 @@ class AutomatonPart(FilePart):
 
 
 def _by_names(value: Any) -> Any:
-    numbers = isinstance(value, dict) and value and all(
-        isinstance(one, int | float) and not isinstance(one, bool) for one in value.values()
+    numbers = (
+        isinstance(value, dict)
+        and value
+        and all(
+            isinstance(one, int | float) and not isinstance(one, bool) for one in value.values()
+        )
     )
     if not numbers:
         raise need("a mapping of numbers, such as {speed_m_s: 1.37, steering_rad: 0.12}")

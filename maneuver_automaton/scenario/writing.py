@@ -11,13 +11,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import relative
 from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Horizon, Unstated
+from maneuver_automaton.problem import Horizon, Problem, Unstated
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
 from maneuver_automaton.scenario.parts import stated
-from maneuver_automaton.scenario.scenario import Scenario
+from maneuver_automaton.scenario.scenario import Scenario, state_keys
 from maneuver_automaton.scenario.schema import (
     BoundsPart,
     CostPart,
