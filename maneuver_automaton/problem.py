@@ -399,7 +399,7 @@ class Problem:
         return replace(goal, state=state, trim=trim)
 
     def _check_rests(self) -> None:
-        """A vehicle with inertia begins and ends in a trim, or in a reduced state that is stated."""
+        """A vehicle with inertia begins and ends in a trim, or in a state that is stated."""
         ends = [("start", self.start_trim, self.start_state)]
         ends += [("goal", goal.trim, goal.state) for goal in self.goals]
         for what, trim, state in ends:

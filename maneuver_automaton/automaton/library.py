@@ -42,7 +42,6 @@ from maneuver_automaton.models import Model, in_world
 from maneuver_automaton.models.kinds import KINDS, is_of_a_kind
 from maneuver_automaton.primitives import Trim
 
-
 AT_REST, NEVER = "steering_at_rest", "forbidden"  # a parameter, and how its infinity is written
 
 

@@ -17,7 +17,6 @@ from maneuver_automaton.models.vehicle import (
     speed_limits,
 )
 
-
 STANDING = 1e-3  # [m/s] slower is to stand
 TURNED = 1e-9  # [rad] between two samples, that is no rounding
 

@@ -31,7 +31,7 @@ from maneuver_automaton.primitives.closed_form import (
     may_drive,
     quickest_between,
 )
-from maneuver_automaton.primitives.connecting import CLOSED, WITHIN, Inputs, closed, excess
+from maneuver_automaton.primitives.connecting import CLOSED, WITHIN, Inputs, beyond_limits, closed
 from maneuver_automaton.primitives.primitive import Maneuver, Trim
 from maneuver_automaton.primitives.turning import hitch_maneuvers
 
@@ -190,7 +190,7 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         missed = float(np.abs(course.reduced_state[-1] - end).max())
         if (
             not missed <= CLOSED
-            or excess(model.reduced_limits, course.reduced_state).max() > WITHIN
+            or beyond_limits(model.reduced_limits, course.reduced_state).max() > WITHIN
         ):
             continue
         if is_too_sharp(model, course.twists(model)).any():
