@@ -31,11 +31,14 @@ from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.place_prices import PlacePrice, price_along
 from maneuver_automaton.places import PlaceCost, bound, check_place_costs, moved
+from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.on_the_spot import state_of, trim_at
 
 _Element: TypeAlias = SE2 | SE2xR | Translations
 MOST_KNOWN = 1 << 14  # maneuvers of a library whose costs are kept
 STANDING = 1e-3  # [m/s] slower is no direction of travel
+STATE_TOLERANCE = 1e-9  # between a reduced state that is stated and a trim's, in its units
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
 
@@ -51,6 +54,7 @@ class Goal:
 
     pose: Array  # (dof,) [m, m, rad(, m)]; without heading if translations alone move the vehicle
     trim: str | None = field(default=None, kw_only=True)
+    state: Array | None = field(default=None, kw_only=True)  # (n_z,) reduced, in place of a trim
     free_heading: bool = field(default=False, kw_only=True)
     tolerance_m: float = field(default=0.0, kw_only=True)
     tolerance_rad: float = field(default=0.0, kw_only=True)
@@ -64,6 +68,7 @@ class Goal:
             pose: ArrayLike,
             *,
             trim: str | None = None,
+            state: ArrayLike | Mapping[str, float] | None = None,
             free_heading: bool = False,
             tolerance_m: float = 0.0,
             tolerance_rad: float = 0.0,
@@ -72,6 +77,8 @@ class Goal:
     def __post_init__(self) -> None:
         plain_numbers(self)
         freeze(self, "pose", last=(2, 3, 4))
+        if self.state is not None and not isinstance(self.state, Mapping):  # names need a model
+            freeze(self, "state")
         if self.pose.ndim != 1:
             raise ValueError(f"goal: pose has shape {self.pose.shape}, need one pose")
         check_size("goal: pose", self.pose[[0, 1, *range(3, self.pose.size)]])
@@ -203,6 +210,9 @@ class Problem:
         How long the plan lasts, and how many trims it may have; both free if left out.
     start_trim : str, optional
         Name of the trim in which the vehicle starts; rest if left out.
+    start_state : (n_z,) array or mapping of str to float, optional
+        The reduced state in which it starts instead, in the order of the model's `reduced_names` or
+        by these names; what is left out of a mapping is 0. It need be that of no trim.
     start_time : float
         Time at the start [s], on the clock of the moving obstacles.
     bounds : Bounds
@@ -248,6 +258,7 @@ class Problem:
     cost: StageCost = field(default_factory=lambda: Cost(time=1.0), kw_only=True)
     horizon: Horizon = field(default_factory=Horizon, kw_only=True)
     start_trim: str | None = field(default=None, kw_only=True)
+    start_state: Array | None = field(default=None, kw_only=True)  # (n_z,) in place of a trim
     start_time: float = field(default=0.0, kw_only=True)  # [s]
     bounds: Bounds = field(default_factory=Bounds, kw_only=True)
     search: SearchSettings = field(default_factory=SearchSettings, kw_only=True)
@@ -272,6 +283,7 @@ class Problem:
             cost: StageCost = ...,
             horizon: Horizon = ...,
             start_trim: str | None = None,
+            start_state: ArrayLike | Mapping[str, float] | None = None,
             start_time: float = 0.0,
             bounds: Bounds = ...,
             search: SearchSettings = ...,
@@ -294,6 +306,7 @@ class Problem:
                 "such as a frozen dataclass"
             )
         object.__setattr__(self, "goals", _as_goals(self.goals))
+        self._settle_states()
         if self.automaton.translated is not None:
             self._give_headings(self.automaton.translated)
         self._check_ends()
@@ -375,11 +388,29 @@ class Problem:
         )
         object.__setattr__(self, "goals", goals)
 
+    def _settle_states(self) -> None:
+        """Reduced states at the ends are those of the model; one that a trim has is that trim."""
+        if self.start_state is not None:
+            state, trim = settled_state(
+                self.automaton, self.start_state, "start", trim=self.start_trim
+            )
+            object.__setattr__(self, "start_state", state)
+            object.__setattr__(self, "start_trim", trim)
+        if any(goal.state is not None for goal in self.goals):
+            object.__setattr__(self, "goals", tuple(map(self._with_state, self.goals)))
+
+    def _with_state(self, goal: Goal) -> Goal:
+        if goal.state is None:
+            return goal
+        state, trim = settled_state(self.automaton, goal.state, "goal", trim=goal.trim)
+        return replace(goal, state=state, trim=trim)
+
     def _check_rests(self) -> None:
-        """A vehicle with inertia begins and ends in a trim."""
-        named = [("start", self.start_trim), *(("goal", goal.trim) for goal in self.goals)]
-        for what, trim in named:
-            if trim is None and self.automaton.rest is None:
+        """A vehicle with inertia begins and ends in a trim, or in a state that is stated."""
+        ends = [("start", self.start_trim, self.start_state)]
+        ends += [("goal", goal.trim, goal.state) for goal in self.goals]
+        for what, trim, state in ends:
+            if trim is None and state is None and self.automaton.rest is None:
                 raise ValueError(
                     f"{what}: the {self.automaton.model.name} has no trim that stands still, need "
                     f"the name of one of its trims: {', '.join(self.automaton.trim_names[:12])}"
@@ -387,11 +418,13 @@ class Problem:
 
     @property
     def first_trim(self) -> Trim:
-        """The trim in which the vehicle starts; rest unless one is named.
+        """The trim in which the vehicle starts; rest unless one is named, or a state is stated.
 
         On a lattice that is the rest at the heading next to that of the start. Where the heading
         belongs to the trim, the start must have it: within a maneuver there is no first trim.
         """
+        if self.start_state is not None:
+            return trim_at(self.automaton.model, self.start_state, "start state")
         if self.start_trim is not None and self.automaton.translated is not None:
             posed(self.automaton, self.start, "start", trim=self.start_trim)
         if self.start_trim is None and self.automaton.lattice is not None:
@@ -399,11 +432,13 @@ class Problem:
         return self._trim_or_rest(self.start_trim)
 
     def last_trim(self, goal: Goal) -> Trim:
-        """The trim in which the vehicle ends at `goal`; rest unless one is named.
+        """The trim in which the vehicle ends at `goal`; rest unless one is named, or a state is.
 
         On a lattice that is the rest at the heading next to that of the goal, as the lattice lies
         under the start.
         """
+        if goal.state is not None:
+            return trim_at(self.automaton.model, goal.state, "goal state")
         model = self.automaton.lattice
         if goal.trim is None and model is not None:
             begun = model.heading(self.first_trim.reduced_state)
@@ -535,7 +570,8 @@ class Problem:
                 for states in (course.reduced_state[:-1], course.reduced_state[1:])
             ]
             rate = float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
-            entry = maneuver, maneuver.cost_multiplier * rate
+            standing = standing_price(model, course.reduced_state)
+            entry = maneuver, maneuver.cost_multiplier * rate + standing
             if len(known) < MOST_KNOWN or maneuver.name in known:
                 known[maneuver.name] = entry
         return entry[1]
@@ -562,12 +598,13 @@ class Problem:
         time: float,
         goals: ArrayLike | _Element | Goal | Sequence[Goal] | None = None,
         trim: str | None = None,
+        state: ArrayLike | Mapping[str, float] | None = None,
         horizon: Horizon | None = None,
     ) -> Problem:
         """The same problem from another start (dof,) at another time [s], perhaps to other goals.
 
         What stays the same is not checked again: that takes longer than a search of few words. The
-        trim at the start is that of the problem, unless one is named.
+        trim or reduced state at the start is that of the problem, unless one is given.
 
         Raises
         ------
@@ -587,8 +624,8 @@ class Problem:
         changed: dict[str, Any] = {"start": start, "start_time": as_number("time", time)}
         if goals is not None:
             changed["goals"] = goals
-        if trim is not None:
-            changed["start_trim"] = trim
+        if trim is not None or state is not None:
+            changed.update(start_trim=trim, start_state=state)
         if horizon is not None:
             changed["horizon"] = horizon
         longer = horizon is not None and (horizon.time or 0.0) > (self.horizon.time or 0.0)
@@ -602,9 +639,10 @@ class Problem:
         if horizon is None:
             known["_setting"] = self.setting
         moved.__dict__.update(known, moves=self.moves, **changed)
-        if goals is None and trim is None:
+        if goals is None and trim is None and state is None:
             moved._check_start()
         else:
+            moved._settle_states()
             moved._check_ends()
         return moved
 
@@ -679,6 +717,11 @@ class Problem:
         return in_space and bool(self.obstacles) and self.search.method in ("auto", "lattice")
 
     @property
+    def has_states(self) -> bool:
+        """Whether the vehicle starts or ends in a reduced state that is that of no trim."""
+        return self.start_state is not None or any(goal.state is not None for goal in self.goals)
+
+    @property
     def has_tolerance(self) -> bool:
         """Whether a plan may end beside a goal; on a lattice also whether at any heading."""
         turns = self.automaton.lattice is not None
@@ -708,6 +751,39 @@ class Problem:
 
 
 _FIELDS = tuple(one.name for one in fields(Problem))
+
+
+def settled_state(
+    automaton: Automaton, state: Any, what: str, *, trim: str | None = None
+) -> tuple[Array | None, str | None]:
+    """A reduced state at an end, or else the name of the trim that has it, rather one at rest.
+
+    Raises
+    ------
+    ValueError
+        If a `trim` is named too, or the state is none of the vehicle.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import load_stock_library
+    >>> car = load_stock_library("second_order_car")
+    >>> settled_state(car, {"speed": 1.0}, "start")[1], settled_state(car, [1.1, 0.2], "start")[1]
+    ('speed 1, steering 0', None)
+    """
+    if trim is not None:
+        raise ValueError(f"{what}: both the trim {trim!r} and a state are given, need one of them")
+    if automaton.translated is not None or automaton.lattice is not None:
+        raise ValueError(
+            f"{what}: the trims of the {automaton.model.name} belong to headings, so it cannot "
+            "start or end in a state between them; need a trim"
+        )
+    known = state_of(automaton.model, state, what)
+    here = [
+        one for one in automaton.trims if np.abs(one.reduced_state - known).max() <= STATE_TOLERANCE
+    ]
+    if here:
+        return None, min(here, key=lambda one: not one.is_rest).name
+    return known, None
 
 
 def apart(one: Array, other: Array) -> tuple[float, float]:

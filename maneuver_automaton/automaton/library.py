@@ -42,6 +42,8 @@ from maneuver_automaton.models import Model, in_world
 from maneuver_automaton.models.kinds import KINDS, is_of_a_kind
 from maneuver_automaton.primitives import Trim
 
+AT_REST, NEVER = "steering_at_rest", "forbidden"  # a parameter, and how its infinity is written
+
 
 def model_entry(model: Model) -> dict[str, Any]:
     """The model as a file states it: its parameters; of a user's own model, its names."""
@@ -50,7 +52,11 @@ def model_entry(model: Model) -> dict[str, Any]:
         return {"kind": model.name, **{key: list(value) for key, value in names.items()}}
     parameters = [field.name for field in dataclasses.fields(KINDS[model.name])]
     values = {name: getattr(model, name) for name in parameters}
-    return {"kind": model.name} | {k: float(v) for k, v in values.items() if v is not None}
+    if not values.get(AT_REST):  # what says nothing new keeps its hash
+        values.pop(AT_REST, None)
+    entry = {k: float(v) for k, v in values.items() if v is not None}
+    never = {k: NEVER for k, v in entry.items() if v == math.inf}
+    return {"kind": model.name} | entry | never
 
 
 def model_of(entry: Any, *, own: Model | None) -> Model:
@@ -76,7 +82,11 @@ def model_of(entry: Any, *, own: Model | None) -> Model:
     needed = tuple(field.name for field in fields if field.default is dataclasses.MISSING)
     check_keys("model", entry, known=("kind", *known), needed=needed)
     model: Model = KINDS[kind](
-        **{k: number_of(f"model: {k}", v) for k, v in entry.items() if k != "kind"}
+        **{
+            k: math.inf if (k, v) == (AT_REST, NEVER) else number_of(f"model: {k}", v)
+            for k, v in entry.items()
+            if k != "kind"
+        }
     )
     return model
 

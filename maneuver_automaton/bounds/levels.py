@@ -432,7 +432,8 @@ def cell_proofs(
     scene = pose_scene(problem, frame=problem.goals[0].pose[:3])
     start = scene.world.into(problem.start[:3])
     goals = tuple(
-        replace(goal, pose=scene.world.into(goal.pose[:3]), trim=None) for goal in problem.goals
+        replace(goal, pose=scene.world.into(goal.pose[:3]), trim=None, state=None)
+        for goal in problem.goals
     )
     besides = motions.besides
     for proof in proofs(

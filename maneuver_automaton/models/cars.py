@@ -17,6 +17,9 @@ from maneuver_automaton.models.vehicle import (
     speed_limits,
 )
 
+STANDING = 1e-3  # [m/s] slower is to stand
+TURNED = 1e-9  # [rad] between two samples, that is no rounding
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Car(Vehicle):
@@ -170,6 +173,9 @@ class SecondOrderCar(Vehicle):
         Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
     max_lateral_acceleration : float, optional
         Greatest speed times turn rate [m/s^2]; no limit if None.
+    steering_at_rest : float
+        Price of every radian that the wheels turn while the car stands, beside what a plan costs
+        otherwise [1/rad]; inf: they never do.
 
     Examples
     --------
@@ -188,9 +194,33 @@ class SecondOrderCar(Vehicle):
     max_steering_rate: float  # [rad/s]
     min_speed: float | None = None  # [m/s]
     max_lateral_acceleration: float | None = None  # [m/s^2]
+    steering_at_rest: float = 0.0  # [1/rad]
     name: ClassVar[str] = "second_order_car"
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering_rate")
     reduced_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
+
+    def __post_init__(self) -> None:
+        check_parameters(self, but=("steering_at_rest",))
+        if not self.steering_at_rest >= 0.0:
+            raise ValueError(
+                f"{self.name}: steering_at_rest must be at least 0, or inf, got "
+                f"{self.steering_at_rest} 1/rad"
+            )
+
+    def standing_price(self, states: Array) -> float:
+        """Price of how far the wheels turn while it stands, along samples (n, 2) of its state.
+
+        Examples
+        --------
+        >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
+        ...                      max_acceleration=1.0, max_steering_rate=0.5, steering_at_rest=3.0)
+        >>> car.standing_price(np.array([[0.0, 0.0], [0.0, 0.5], [1.0, 0.7]]))
+        1.5
+        """
+        stands = np.abs(states[:, 0]) <= STANDING
+        turned = np.abs(np.diff(states[:, 1]))[stands[:-1] & stands[1:]]
+        angle = float(turned[turned > TURNED].sum())
+        return self.steering_at_rest * angle if angle else 0.0
 
     @property
     def turning_radius(self) -> float:

@@ -14,6 +14,28 @@ from maneuver_automaton.models.model import Model, OnlyTranslated
 EXCEEDED = 1e-9  # relative, by which a limit may be exceeded
 
 
+def standing_price(model: Model, states: Array) -> float:
+    """Price of steering while it stands, along samples (n, n_z) of the reduced state; or inf.
+
+    Zero for a vehicle that steers at rest at will, or has no wheels to turn.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5, steering_at_rest=np.inf)
+    >>> standing_price(car, np.array([[0.0, 0.0], [0.0, 0.5]]))
+    inf
+    """
+    price = getattr(model, "standing_price", None)
+    return 0.0 if price is None else float(price(states))
+
+
+def steers_at_rest(model: Model) -> bool:
+    """Whether the vehicle may turn its wheels while it stands, if it has any."""
+    return not math.isinf(getattr(model, "steering_at_rest", 0.0))
+
+
 def lateral_limit(model: Model) -> float:
     """Greatest lateral acceleration of a vehicle [m/s^2]; infinite where it has no limit.
 

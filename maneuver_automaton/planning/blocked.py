@@ -37,7 +37,7 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
         reason = f"the start is outside the bounds: {reason}"
     elif problem.obstacles and not sure[0]:
         said = where_touched(problem, problem.start, problem.start_time)
-        said = said or _part_touched(problem, problem.start_trim, problem.start, problem.start_time)
+        said = said or _part_touched(problem, None, problem.start, problem.start_time)
         reason, notes = (f"at the start {said}", (LEAVES,)) if said else ("", ())
     if reason:
         return PlanResult(
@@ -88,7 +88,7 @@ def why_goal_blocked(problem: Problem, goal: Goal, *, free: bool = False) -> str
         return _why_blocked_all_round(problem, goal)
     said = where_touched(problem, goal.pose, math.inf)
     if not goal.free_heading:
-        said = said or _part_touched(problem, goal.trim, goal.pose, math.inf)
+        said = said or _part_touched(problem, goal, goal.pose, math.inf)
     return f"at the goal {said}" if said else ""
 
 
@@ -119,14 +119,14 @@ def goals_left(problem: Problem) -> tuple[int, ...]:
     return (0,) if len(problem.goals) == 1 else open_goals(problem)
 
 
-def _part_touched(problem: Problem, trim: str | None, pose: Array, time: float) -> str:
-    """Sentence on the obstacle that a carried part touches in a trim at a pose; empty if none."""
-    automaton = problem.automaton
-    if not problem.parts or (trim is None and automaton.rest is None):
+def _part_touched(problem: Problem, goal: Goal | None, pose: Array, time: float) -> str:
+    """Sentence on the obstacle that a carried part touches at the start or a goal; or empty."""
+    automaton, trim = problem.automaton, problem.start_trim if goal is None else goal.trim
+    state = problem.start_state if goal is None else goal.state
+    if not problem.parts or (trim is None and state is None and automaton.rest is None):
         return ""
-    state = (
-        automaton.trims[automaton.rest or 0] if trim is None else automaton[trim]
-    ).reduced_state
+    if state is None:
+        state = automaton.trims[automaton.index_of(trim) if trim else automaton.rest].reduced_state
     offsets = automaton.model.part_poses(state)
     for name, offset in zip(automaton.model.part_names, offsets, strict=True):
         if name in problem.parts:

@@ -102,7 +102,8 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     if cost:
         known = cost.time * min(_quickest(problem, goal) for goal in problem.goals)
         known += cost.length * straight
-    if why_not_polished(problem) and not follows_paths(model):  # all plans are words
+    words = why_not_polished(problem) and not follows_paths(model)
+    if words and not problem.has_states:  # all plans are words of the library
         known = max(known, straight * least_price_per_metre(problem.automaton, problem.cost))
     if not (follows_paths(model) and problem.rests_at_both_ends and cost):
         return LowerBound(value=known, kind="distance")

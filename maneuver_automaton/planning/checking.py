@@ -28,6 +28,7 @@ from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.places import Clearance
 from maneuver_automaton.planning.result import Workspace, workspace_of
 from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.closed_form import may_drive
 from maneuver_automaton.primitives.primitive import Trajectory
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.refinement.fitting import broken_condition
@@ -82,6 +83,10 @@ def check_plan(
     reason = broken_condition(problem, plan)
     if reason:
         return Checked(audit=None, broken=Condition.WORD, reason=reason)
+    for maneuver in plan.maneuvers:
+        if maneuver is not None and not may_drive(problem.automaton.model, maneuver):
+            reason = f"the wheels turn while the vehicle stands, in maneuver {maneuver.name!r}"
+            return Checked(audit=None, broken=Condition.WORD, reason=reason)
     if not stays_inside(plan, problem.bounds):
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
     try:

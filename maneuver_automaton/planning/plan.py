@@ -16,6 +16,7 @@ from maneuver_automaton._kept import kept_with
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.checking import load_checks
+from maneuver_automaton.planning.from_state import between_trims
 from maneuver_automaton.planning.leaving import plan_leaving
 from maneuver_automaton.planning.no_way import with_proof
 from maneuver_automaton.planning.polishing import left_out
@@ -172,6 +173,7 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     """Have ready what every problem on the map of this one needs."""
     workspace = workspace or workspace_of(problem.obstacles)
     _load(problem, workspace)
+    problem = between_trims(problem)
     if uses_lattice(problem):
         goals = tuple(range(len(problem.goals)))
         lattice_query(problem, goals, prepared=workspace.prepared)
@@ -185,6 +187,8 @@ def _load(problem: Problem, workspace: Workspace) -> None:
     if problem.ends not in ready:
         prepare_steps(problem, workspace)
         ready.add(problem.ends)
+    if problem.has_states:
+        return  # each question between trims has a search of its own
     if problem.setting is not problem and uses_lattice(problem):  # others may follow it
         prepare_first_call(problem, workspace.prepared)
 

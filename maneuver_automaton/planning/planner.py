@@ -123,8 +123,13 @@ class Planner:
         *,
         start_time: float = 0.0,
         start_trim: str | None = None,
+        start_state: ArrayLike | Mapping[str, float] | None = None,
     ) -> Problem:
-        """The problem of one query; `start_trim` goes before the planner's own."""
+        """The problem of one query; `start_trim` or `start_state` goes before the planner's own."""
+        if start_state is not None:
+            return self._first.starting_at(
+                start, time=start_time, goals=goals, trim=start_trim, state=start_state
+            )
         trim = self.start_trim if start_trim is None else start_trim
         if trim is None and self._first.start_trim is not None:
             return self._problem(start, goals, start_time=start_time, start_trim=None)
@@ -166,15 +171,19 @@ class Planner:
         alternatives: int = 0,
         start_time: float = 0.0,
         start_trim: str | None = None,
+        start_state: ArrayLike | Mapping[str, float] | None = None,
         gap: float | None = None,
         watch: Watch | None = None,
     ) -> PlanResult:
         """Plan as `plan` does for the problem from `start` (dof,) to `goals`, at `start_time` [s].
 
-        It starts in `start_trim`, or else in the planner's own; a `Goal` names the last trim. What
+        It starts in `start_trim`, or in the reduced state `start_state`, or else in the planner's
+        own trim; a `Goal` names the last one. What
         is proven for a `gap` is kept, and known at once from other starts to the same goals.
         """
-        problem = self.problem(start, goals, start_time=start_time, start_trim=start_trim)
+        problem = self.problem(
+            start, goals, start_time=start_time, start_trim=start_trim, start_state=start_state
+        )
         return plan_in(
             self.workspace,
             problem,

@@ -17,6 +17,7 @@ from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.models.speeds import steers_at_rest
 from maneuver_automaton.planning.along_paths import AlongPaths
 from maneuver_automaton.planning.among_zones import AmongZones
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
@@ -28,6 +29,7 @@ from maneuver_automaton.planning.free_space import (
     TurnedByManeuvers,
     certificate_of,
 )
+from maneuver_automaton.planning.from_state import FromState, between_trims
 from maneuver_automaton.planning.incumbents import Incumbents, Step
 from maneuver_automaton.planning.lattice_words import Lattice
 from maneuver_automaton.planning.on_state_lattice import StateLattice
@@ -93,7 +95,12 @@ def answer(
 
 
 def steps_of(problem: Problem) -> Steps:
-    """The steps of a problem: its graph, if it has one, then those to its goals."""
+    """The steps of a problem: its graph, if it has one, then those to its goals.
+
+    Where it starts or ends in a state of no trim, problems between trims are answered instead.
+    """
+    if problem.has_states:
+        return Steps([FromState(answer, prepare_steps)], POLISHED)
     graph = [StateLattice()] if _may_be_a_graph(problem) else []
     if problem.has_tolerance:
         return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
@@ -127,7 +134,8 @@ def search_steps(problem: Problem) -> Steps:
         lattice = [Lattice()] if method in ("auto", "lattice") else []
         return Steps([NearlyMet(), *first, *lattice], UNFINISHED)
     searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
-    along = searched and follows_paths(automaton.model) and problem.rests_at_both_ends
+    stops = follows_paths(automaton.model) and steers_at_rest(automaton.model)
+    along = searched and stops and problem.rests_at_both_ends
     shortest = along and prices_metres_alone(problem.cost)  # to stop and steer costs no metre
     polish = None if shortest or why_not_polished(problem) else Polish()
     steps: list[Step] = [NearlyMet(), Checks()]
@@ -148,6 +156,9 @@ def prepare_steps(problem: Problem, workspace: Workspace) -> None:
     """Have ready what the steps of a problem need, before the clock runs."""
     if problem.obstacles or problem.zones:
         load_checking()  # what is imported in the first check would make it late
+    if problem.has_states:
+        FromState(answer, prepare_steps).prepare(problem, workspace)
+        return
     if _may_be_a_graph(problem) and StateLattice().prepare(problem, workspace):
         return
     for step in search_steps(problem).steps:
@@ -173,7 +184,7 @@ def uses_lattice(problem: Problem) -> bool:
     rest where the time is fixed. Otherwise words are searched, and those that meet obstacles are
     refused.
     """
-    return _uses_lattice(problem.setting)
+    return _uses_lattice(between_trims(problem).setting)
 
 
 @kept_by_first

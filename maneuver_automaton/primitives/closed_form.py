@@ -14,7 +14,13 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
-from maneuver_automaton.models.speeds import is_too_sharp, lateral_limit, pace_within
+from maneuver_automaton.models.speeds import (
+    is_too_sharp,
+    lateral_limit,
+    pace_within,
+    standing_price,
+    steers_at_rest,
+)
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.primitives.primitive import Maneuver, Trajectory, Trim
 
@@ -142,11 +148,25 @@ def _maneuvers(
     return tuple(
         maneuver
         for k in range(0, len(pairs), BATCH)
-        for maneuver in _batch(model, pairs[k : k + BATCH], late=late)
+        for maneuver in quickest_between(model, pairs[k : k + BATCH], late=late)
     )
 
 
-def _batch(model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool) -> list[Maneuver]:
+def quickest_between(
+    model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool = False
+) -> list[Maneuver]:
+    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> from maneuver_automaton.primitives.equilibrium import trims_of
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
+    ...                             max_angular_acceleration=1.0)
+    >>> rest, ahead = trims_of(robot, {"speed": [0.0, 1.0], "turn_rate": [0.0]}).trims
+    >>> [one.duration for one in quickest_between(robot, [(rest, ahead), (ahead, rest)])]
+    [2.0, 2.0]
+    """
     source = np.array([source.reduced_state for source, _ in pairs])
     target = np.array([target.reduced_state for _, target in pairs])
     same = ~(np.abs(target - source) > EQUAL * np.maximum(1.0, np.abs(source))).any(axis=1)
@@ -456,11 +476,19 @@ def quickest_maneuvers(
     46
     """
     early = connect_bang_bang(model, trims, pairs=pairs)
-    others = connect_bang_bang(model, trims, pairs=pairs, late=True) if late else early
+    both = late or not steers_at_rest(model)  # who brakes last has turned the wheels before
+    others = connect_bang_bang(model, trims, pairs=pairs, late=True) if both else early
     rests = [trim for trim in trims if trim.is_rest]
-    return (
+    every = (
         *early,
         *differing(early, others),
         *_from_rest(model, rests, strokes, "speed"),
         *_from_rest(model, rests, turns, "turn_rate"),
     )
+    return tuple(one for one in every if may_drive(model, one))
+
+
+def may_drive(model: Model, maneuver: Maneuver) -> bool:
+    """Whether a maneuver with a course turns no wheel at rest, or the vehicle may do so."""
+    course = maneuver.course
+    return course is None or math.isfinite(standing_price(model, course.reduced_state))

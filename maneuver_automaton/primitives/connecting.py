@@ -230,7 +230,7 @@ def _checked(
     miss = float(np.abs(course.reduced_state[-1] - target.reduced_state).max())
     if not miss <= CLOSED:
         return replace(nothing, reason=f"it could not be closed: {miss:.2g} is left")
-    excess = _excess(model.reduced_limits, course.reduced_state)
+    excess = beyond_limits(model.reduced_limits, course.reduced_state)
     if excess.max() > WITHIN:
         worst = model.reduced_names[int(excess.argmax())]
         return replace(nothing, reason=f"{worst} leaves its limits by {excess.max():.2g} of them")
@@ -258,6 +258,7 @@ def closed(
     inputs: Inputs,
     limits: Array,
     last: int | None = None,
+    enough: float = 0.0,
 ) -> Inputs:
     """Correct inputs that nearly lead from one reduced state to another, until they do.
 
@@ -276,6 +277,8 @@ def closed(
         The inputs stay within.
     last : int, optional
         Correct the inputs of that many last intervals alone, and no times.
+    enough : float
+        An end that misses by no more is met.
 
     Returns
     -------
@@ -293,7 +296,7 @@ def closed(
         if not size < 0.5 * least:
             break  # rounding
         best, least = tried, size
-        if size == 0.0:
+        if size <= enough:
             break
         gradient, by_duration = _sensitivities(model, start, tried)
         room = np.minimum(control - limits[:, 0], limits[:, 1] - control)
@@ -351,7 +354,7 @@ def _outside(model: Model, trim: Trim) -> str:
                 f"trim {trim.name!r}: {what} has {values.size} components, need {len(names)} "
                 f"({', '.join(names)}) for the {model.name}"
             )
-        excess = _excess(limits, values[None])
+        excess = beyond_limits(limits, values[None])
         if excess.size and excess.max() > WITHIN:
             k = int(excess.argmax())
             return (
@@ -361,7 +364,7 @@ def _outside(model: Model, trim: Trim) -> str:
     return ""
 
 
-def _excess(limits: Array, rows: Array) -> Array:
+def beyond_limits(limits: Array, rows: Array) -> Array:
     """How far rows (n, k) leave limits (k, 2) at worst, as a share of their range, (k,)."""
     inner = drawn_in(limits, 0.0)
     width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 1.0)

@@ -207,7 +207,7 @@ def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneu
     """
     rests = [trim for trim in trims if trim.is_rest]
     low, high = model.control_limits[0].tolist()
-    return _maneuvers(
+    return hitch_maneuvers(
         model,
         [
             (source, target, speed)
@@ -220,10 +220,19 @@ def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneu
     )
 
 
-def _maneuvers(
+def hitch_maneuvers(
     model: CarWithTrailer, wanted: Sequence[tuple[Trim, Trim, float]]
 ) -> tuple[Maneuver, ...]:
-    """The maneuvers from trim to trim at a speed, those that exist, driven all at once."""
+    """The maneuvers from trim to trim at a speed, those that exist, driven all at once.
+
+    Examples
+    --------
+    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
+    >>> straight, bent = (hitch_trims(truck, [hitch])[0] for hitch in (0.0, 0.2))
+    >>> (one,) = hitch_maneuvers(truck, [(bent, straight, 0.5)])
+    >>> one.name, one.target
+    ('ahead from hitch 0.2 to 0', 'rest, hitch 0')
+    """
     begins = np.array([float(source.reduced_state[0]) for source, _, _ in wanted])
     ends = np.array([float(target.reduced_state[0]) for _, target, _ in wanted])
     speeds = np.array([speed for _, _, speed in wanted])

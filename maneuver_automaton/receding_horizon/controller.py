@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, AnyShape, as_obstacles
+from maneuver_automaton.primitives.on_the_spot import state_of
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.at_will import AmongObstacles, InFreeSpace, as_it_stands
 from maneuver_automaton.receding_horizon.candidates import (
@@ -182,6 +183,7 @@ class RecedingHorizon:
     def step(
         self,
         measured_state: ArrayLike,
+        state: ArrayLike | Mapping[str, float] | None = None,
         *,
         elapsed: float | None = None,
         obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape] | None = None,
@@ -192,6 +194,9 @@ class RecedingHorizon:
         ----------
         measured_state : (dof,) array_like
             Pose [m, m, rad(, m)].
+        state : (n_z,) array or mapping of str to float, optional
+            Reduced state, such as the speed and the steering angle; if omitted, what the plan says.
+            From one that is in no trim, a maneuver made on the spot leads back to the plan.
         elapsed : float, optional
             [s] since the last step; if omitted, the time for which its plan was to be applied.
         obstacles : as the obstacles of a `Problem`, optional
@@ -235,9 +240,18 @@ class RecedingHorizon:
         if last is not None:
             last = self._cut(last, passed)
         at = self.problem.start_time if last is None else last.time + passed
-        here = self.problem.starting_at(pose, time=at, horizon=self._horizon(at))
+        automaton = self.problem.automaton
+        known = None if state is None else state_of(automaton.model, state, "measured")
+        trim = automaton.trim_names[automaton.rest or 0]  # where a plan is held, it says which
+        here = self.problem.starting_at(
+            pose,
+            time=at,
+            horizon=self._horizon(at),
+            trim=None if last is None or self.problem.start_state is None else trim,
+            state=known if last is None else None,
+        )
         now, search = _started(
-            self.settings, here, last, passed=passed, budget=budget, changed=changed
+            self.settings, here, last, passed=passed, budget=budget, changed=changed, state=known
         )
         if self.proven is not None:
             now.bound = self._known(now)
@@ -392,6 +406,7 @@ def _started(
     passed: float,
     budget: Budget,
     changed: bool,
+    state: Array | None,
 ) -> tuple[Situation, StepSearch]:
     """A step under way, and where its plans come from; the parameters are those of `Situation`."""
     maneuvers, broken = needs_maneuvers(here), ""
@@ -401,7 +416,9 @@ def _started(
             here, broken = within_its_margin(here)
     elif here.obstacles:
         here, broken = as_it_stands(here)
-    now = Situation(settings, here, last, passed=passed, budget=budget, changed=changed)
+    now = Situation(
+        settings, here, last, passed=passed, budget=budget, changed=changed, state=state
+    )
     if broken:
         now.flag(Guarantee.SAFETY, broken)
     if maneuvers:

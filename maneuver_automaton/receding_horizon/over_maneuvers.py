@@ -114,7 +114,9 @@ class OverManeuvers(StepSearch):
         """
         now, here = self.now, self.here
         problem = self.onward()
-        if problem is None or (now.last is None and (here.obstacles or here.zones)):
+        if problem is None or problem.has_states:
+            return []  # a planner alone knows of states that no trim has
+        if now.last is None and (here.obstacles or here.zones):
             return []
         upper = math.inf  # bound of the cost of a plan
         if kept is not None:
@@ -153,7 +155,7 @@ class OverManeuvers(StepSearch):
         name = self.now.trim.name
         if name not in onward.automaton.trim_names:
             return None  # a plan with trims of its own is driven to its end
-        return settled(replace(onward, start_trim=name))
+        return settled(replace(onward, start_trim=name, start_state=None))
 
     def otherwise(self) -> StepPlan | None:
         """The plan of the lattice, or of a planner, which is asked alone at first.
@@ -168,13 +170,15 @@ class OverManeuvers(StepSearch):
 
     def _on_lattice(self) -> StepPlan | None:
         problem = self.onward()
-        return None if problem is None else self._best_on_lattice(problem, self.is_safe)
+        if problem is None or problem.has_states:
+            return None
+        return self._best_on_lattice(problem, self.is_safe)
 
     def _best_on_lattice(
         self, problem: Problem, is_good: Callable[[Plan], bool], *, first: bool = False
     ) -> StepPlan | None:
         """The cheapest good plan of the lattice, or its first, after the committed part."""
-        if not problem.automaton.maneuvers:
+        if problem.has_states or not problem.automaton.maneuvers:
             return None
         goals = open_goals(problem)
         if not goals:

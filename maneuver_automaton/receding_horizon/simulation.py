@@ -15,10 +15,11 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.audit import Audit, audit_plan
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import NOTHING, tail_of
+from maneuver_automaton.automaton.cutting import NOTHING, end_state, tail_of
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
@@ -36,6 +37,8 @@ class Disturbance:
     per axis, the heading by another. Measurement errors are seen by the controller alone. A push
     is a displacement in the vehicle's own frame after the step of that number. A vehicle that
     differs from its model has other body velocities: `twist_scale` times those of the library.
+    `reduced_state` shifts speeds and steering angles after every step in which the vehicle moves,
+    within its limits: the controller sees it, and goes on from there.
     With `delay` 1 the controller sees every pose a step late, and plans from the predicted end of
     the piece that is driven meanwhile.
     """
@@ -44,6 +47,7 @@ class Disturbance:
     heading_rad: float = 0.0  # standard deviation per step
     measured_position_m: float = 0.0  # standard deviation of the measurement
     measured_heading_rad: float = 0.0
+    reduced_state: tuple[float, ...] | None = None  # (n_z,) standard deviations per step
     twist_scale: tuple[float, ...] | None = None  # (dof,) none if None
     pushes: Mapping[int, tuple[float, ...]] = field(default_factory=lambda: MappingProxyType({}))
     delay: int = 0  # steps, 0 or 1
@@ -57,6 +61,15 @@ class Disturbance:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ValueError(f"disturbance: {name} must be at least 0, got {value}")
+        if any(not (math.isfinite(one) and one >= 0.0) for one in self.reduced_state or ()):
+            raise ValueError(
+                f"disturbance: reduced_state must be numbers of at least 0, got "
+                f"{list(self.reduced_state or ())}"
+            )
+        if self.reduced_state is not None and self.delay:
+            raise ValueError(
+                "disturbance: reduced_state is for a delay of 0, got a delay of 1 step"
+            )
         if self.delay not in (0, 1):
             raise ValueError(f"disturbance: delay must be 0 or 1 steps, got {self.delay}")
         if not (isinstance(self.seed, int | np.integer) and self.seed >= 0):
@@ -71,6 +84,7 @@ class Draw:
 
     noise: Array
     measurement: Array
+    state: Array  # (n_z,) of the reduced state; empty where nothing disturbs it
 
     __repr__ = brief
 
@@ -87,13 +101,29 @@ def checked(upset: Disturbance, dof: int) -> Disturbance:
 def draws(upset: Disturbance, dof: int) -> Iterator[Draw]:
     """Numbers for step after step: the same for a seed, whatever the loop does with them."""
     rng = np.random.default_rng(upset.seed)
+    others = np.random.default_rng((upset.seed, 1))  # so that poses are disturbed as ever
+    shifts = np.array(upset.reduced_state or ())
     spread = np.full(dof, upset.position_m)
     spread[2] = upset.heading_rad
     blur = np.full(dof, upset.measured_position_m)
     blur[2] = upset.measured_heading_rad
     while True:
         numbers = rng.standard_normal((2, dof))
-        yield Draw(spread * numbers[0], blur * numbers[1])
+        shift = shifts * others.standard_normal(shifts.size)
+        yield Draw(spread * numbers[0], blur * numbers[1], shift)
+
+
+def shifted_state(piece: Plan, by: Array, model: Model) -> Array | None:
+    """The reduced state after a piece, shifted within the limits; None where nothing disturbs it.
+
+    A vehicle that stands stays as it is.
+    """
+    if not by.size or not piece.trims:
+        return None
+    state = end_state(piece)
+    if not np.abs(model.body_velocity(state, piece.trims[-1].control)).max() > NOTHING:
+        return state
+    return np.clip(state + by, *model.reduced_limits.T)
 
 
 def pushed(pose: Array, upset: Disturbance, *, after: int) -> Array:
@@ -209,6 +239,12 @@ def simulate(
             "receding horizon: disturbance: twist_scale is for vehicles without inertia: "
             "a maneuver is driven as its model says"
         )
+    names = problem.automaton.model.reduced_names
+    if upset.reduced_state is not None and len(upset.reduced_state) != len(names):
+        raise ValueError(
+            f"disturbance: reduced_state has {len(upset.reduced_state)} numbers, need {len(names)} "
+            f"for the {problem.automaton.model.name}: {', '.join(names) or 'it has no such state'}"
+        )
     begin = 0 if last is None else last.number + 1
     random = itertools.islice(draws(upset, problem.start.size), begin, None)  # after those used
     where = np.array(problem.start)
@@ -234,7 +270,7 @@ def simulate(
             draw = next(random)
             measured = track.poses[-1] + draw.measurement
             there = None if obstacles is None else obstacles(number)
-            _, now = controller.step(track.seen(measured), obstacles=there)
+            _, now = controller.step(track.seen(measured), track.state, obstacles=there)
             if stopped():  # the search of this step was cut short: it never was
                 controller.last = track.log[-1] if track.log else last
                 break
@@ -245,7 +281,7 @@ def simulate(
             track.drive(audit=audit)
             if progress is not None:
                 progress(track.log[-1])
-            track.arrive(draw.noise)
+            track.arrive(draw)
             arrived = track.inside[-1] and _arrives(now, stops=stops)
     reached = any(track.inside) if stay else arrived
     return _closed_loop(track, controller, step=step, reached=reached, seen=obstacles)
@@ -262,6 +298,7 @@ class _Track:
     poses: list[Array]
     times: list[float]
     inside: list[bool]  # whether a pose is within a goal's tolerance
+    state: Array | None = None  # the reduced state, where it is disturbed
     log: list[Step] = field(default_factory=list)
     driven: list[Plan] = field(default_factory=list)
     audits: list[Audit] = field(default_factory=list)
@@ -285,10 +322,11 @@ class _Track:
             real = self.audits[-1] if same else _audited(self.problem, self.driven[-1])
             self.log[-1] = _judged(now, real)
 
-    def arrive(self, noise: Array) -> None:
-        """Note the pose after the last step: the end of its piece, with noise and pushes."""
+    def arrive(self, draw: Draw) -> None:
+        """Note pose and state after the last step: the end of its piece, with noise and pushes."""
         now = self.log[-1]
-        where = pushed(np.array(self.driven[-1].end) + noise, self.upset, after=now.number)
+        where = pushed(np.array(self.driven[-1].end) + draw.noise, self.upset, after=now.number)
+        self.state = shifted_state(self.driven[-1], draw.state, self.problem.automaton.model)
         self.poses.append(where)
         self.times.append(now.time + now.applied)
         self.inside.append(any(within(where, goal) for goal in self.problem.goals))
@@ -313,7 +351,8 @@ def _closed_loop(
         elif applied:  # the value of the step that would have come next
             controller.last = applied[-1]
             then = applied[-1].number + 1
-            value = controller.step(track.poses[-1], obstacles=seen and seen(then))[1].value
+            now = controller.step(track.poses[-1], track.state, obstacles=seen and seen(then))[1]
+            value = now.value
             controller.last = applied[-1]
         if not reached:
             status = "steps_spent"

@@ -6,9 +6,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 
+import numpy as np
+
+from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of, joined
+from maneuver_automaton.automaton.cutting import (
+    NOTHING,
+    begin_state,
+    committed,
+    head_of,
+    joined,
+    tail_of,
+)
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.planning.from_state import leg_from
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem, apart
 from maneuver_automaton.receding_horizon.candidates import (
@@ -38,7 +49,8 @@ class Situation:
     """One step under way: all that is known before a search.
 
     `here` starts where the vehicle was measured, `passed` seconds after the `last` step as it was
-    driven; `budget` is for all of this step; `changed`: other obstacles are seen than before.
+    driven; `budget` is for all of this step; `changed`: other obstacles are seen than before. Where
+    another reduced `state` is measured than the plan says, a maneuver leads from there to the plan.
     """
 
     def __init__(
@@ -50,6 +62,7 @@ class Situation:
         passed: float,
         budget: Budget,
         changed: bool,
+        state: Array | None = None,
     ) -> None:
         self.settings = settings
         self.here = here
@@ -65,12 +78,37 @@ class Situation:
         self.rest: Plan | None = None
         self.bound = 0.0  # no plan costs less, as is known before a search
         self.busy = 0.0  # [s] that are committed: until the maneuver under way ends
+        self.off_state = False  # whether another reduced state was measured than the plan says
         if last is not None:
             off = max(apart(last.plan.pose_at(last.time + passed), here.start))
             self.off_plan = 0.0 if off <= EXACT * self.size else off
             self.rounding = off <= ROUNDING * self.size
             self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
             self.busy = committed(last.plan, passed)
+            if state is not None and self.rest.trims:
+                self._go_on_from(state)
+
+    def _go_on_from(self, state: Array) -> None:
+        """Put a maneuver from the measured state in place of what was committed, if they differ."""
+        assert self.rest is not None
+        off = float(np.abs(begin_state(self.rest) - state).max())
+        if off <= EXACT:
+            return
+        here, after = self.here, tail_of(self.rest, self.busy, start=self.here.start)
+        self.off_plan, self.off_state = max(self.off_plan or 0.0, off), True
+        leg = leg_from(here, state, after.trims[0])
+        if leg is None:
+            self.flag(Guarantee.FEASIBILITY, "no maneuver was found from the measured state")
+            return
+        begun = Plan(
+            here.start,
+            (leg.state, leg.trim),
+            durations=[0.0, 0.0],
+            maneuvers=(leg.maneuver,),
+            start_time=here.start_time,
+        )
+        back = leg.trim is after.trims[0]
+        self.rest, self.busy = joined(begun, after) if back else begun, leg.maneuver.duration
 
     @cached_property
     def size(self) -> float:
@@ -104,7 +142,7 @@ class Situation:
         if not here.has_inertia or (self.trim.is_rest and not self.busy):
             return here
         moving = next((trim.name for trim in automaton.trims if not trim.is_rest), None)
-        return None if moving is None else replace(here, start_trim=moving)
+        return None if moving is None else replace(here, start_trim=moving, start_state=None)
 
     @property
     def onward(self) -> Problem | None:
@@ -191,6 +229,8 @@ class Situation:
         """The rest of the last plan from where it had said the vehicle would be."""
         if self.last is None:
             return Plan(self.here.start, (), durations=[], start_time=self.here.start_time)
+        if self.off_state and self.rest is not None:
+            return self.rest
         return rest_of(self.last.plan, self.passed, pad=self.settings.pad_of(self.here))
 
     def rests(self) -> Iterator[tuple[Plan, Origin]]:

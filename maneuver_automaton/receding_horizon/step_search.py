@@ -262,6 +262,6 @@ class StepSearch:
         """A motion from a pose and a time that is free for as long as is looked ahead."""
         there = replace(self.here, start=pose, start_time=time)
         if trim is not None:
-            there = replace(there, start_trim=trim)
+            there = replace(there, start_trim=trim, start_state=None)
         until = max(self.until, time + LEAST_AHEAD)
         return search_fail_safe(there, until=until, budget=self.now.budget)

@@ -230,7 +230,7 @@ def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Pr
     return Problem(
         automaton,
         problem.start,
-        tuple(replace(goal, trim=None) for goal in problem.goals),
+        tuple(replace(goal, trim=None, state=None) for goal in problem.goals),
         cost=cost,
         horizon=Horizon(),
         start_time=problem.start_time,

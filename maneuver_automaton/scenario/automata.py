@@ -18,7 +18,11 @@ from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
 from maneuver_automaton.models.speeds import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim, trims_of
-from maneuver_automaton.primitives.closed_form import has_limited_rates, quickest_maneuvers
+from maneuver_automaton.primitives.closed_form import (
+    has_limited_rates,
+    may_drive,
+    quickest_maneuvers,
+)
 from maneuver_automaton.scenario.parts import at
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
@@ -27,7 +31,7 @@ from maneuver_automaton.scenario.schema import (
     ManeuversPart,
     NamedTrim,
 )
-from maneuver_automaton.scenario.vehicles import described, is_known
+from maneuver_automaton.scenario.vehicles import AT_REST, described, is_known
 
 MAX_GRID_TRIMS = 100_000
 MAX_STEADY_TRIMS = 2_000  # of a grid that has to be solved for
@@ -248,6 +252,9 @@ def _fitting(automaton: Automaton, model: Model) -> Automaton:
     keys = [key for key in dict.fromkeys((*has, *needs)) if has.get(key) != needs.get(key)]
     if keys == [LATERAL] and lateral_limit(model) < lateral_limit(automaton.model):
         return automaton.within_lateral(model)
+    if keys == [AT_REST]:
+        kept = tuple(one for one in automaton.maneuvers if may_drive(model, one))
+        return replace(automaton, model=model, maneuvers=kept)
     if keys:
         one, other = ({key: what.get(key) for key in keys} for what in (has, needs))
         raise ValueError(f"got a library for {shown(one)}, but the vehicle has {shown(other)}")

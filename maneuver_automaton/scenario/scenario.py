@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
@@ -20,7 +20,15 @@ from maneuver_automaton.formats.statement import MapFile, StatedVehicle, Stateme
 from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import (
+    STATE_TOLERANCE,
+    Bounds,
+    Goal,
+    Horizon,
+    Problem,
+    SearchSettings,
+    settled_state,
+)
 from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.ground import GroundFile, StatedPlaces, places_of
@@ -28,9 +36,11 @@ from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
     CostPart,
+    GoalPart,
     NoisePart,
     RecedingHorizonPart,
     ScenarioFile,
+    StartPart,
 )
 from maneuver_automaton.scenario.shapes import (
     footprint_of,
@@ -38,7 +48,7 @@ from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     zones_of,
 )
-from maneuver_automaton.scenario.vehicles import carried_of, model_of
+from maneuver_automaton.scenario.vehicles import STATE_UNITS, carried_of, model_of
 
 T = TypeVar("T")
 Made: TypeAlias = dict[tuple[object, ...], Any]  # of parts of a file, which several vehicles share
@@ -175,10 +185,19 @@ def scenario_of_document(
         problem = Problem(
             automaton,
             file.start.pose,
-            tuple(made(Goal, one, free_heading=one.heading == "free") for one in file.goals),
+            tuple(
+                made(
+                    Goal,
+                    one,
+                    free_heading=one.heading == "free",
+                    state=_by_name(one.state, automaton),
+                )
+                for one in file.goals
+            ),
             cost=cost,
             horizon=horizon,
             start_trim=file.start.trim,
+            start_state=_by_name(file.start.state, automaton),
             start_time=file.start.time_s,
             bounds=made(Bounds, file.bounds_m),
             search=made(SearchSettings, file.search),
@@ -257,11 +276,40 @@ def _check_ends(document: Document, file: ScenarioFile, automaton: Automaton) ->
             said = f"got {len(end.pose)} numbers, need {dof}: {names}"
             raise document.error((*where, "pose"), said)
         _check_trim(document, (*where, "trim"), end.trim, automaton)
+        if end.state is not None:
+            _check_state(document, (*where, "state"), end, automaton)
     if file.bounds_m.z is not None and dof == 3:
         raise document.error(("bounds_m", "z"), f"the {automaton.model.name} has no height")
     for k, zone in enumerate(file.zones):
         for n, name in enumerate(zone.trims or ()):
             _check_trim(document, ("zones", k, "trims", n), name, automaton)
+
+
+def state_keys(names: Sequence[str]) -> dict[str, str]:
+    """The key in a file of each component of a reduced state: its name, with the unit if known."""
+    return {name: f"{name}_{STATE_UNITS[name]}" if name in STATE_UNITS else name for name in names}
+
+
+def _by_name(state: Mapping[str, float] | None, automaton: Automaton) -> dict[str, float] | None:
+    """A state of a file by the names that the model has."""
+    if state is None:
+        return None
+    keys = state_keys(automaton.model.reduced_names)
+    return {name: state[key] for name, key in keys.items() if key in state}
+
+
+def _check_state(
+    document: Document, where: Where, end: StartPart | GoalPart, automaton: Automaton
+) -> None:
+    """Raise where a state is none of the vehicle."""
+    keys = state_keys(automaton.model.reduced_names)
+    for key in end.state or ():
+        if keys and key not in keys.values():
+            raise document.error(
+                (*where, key), f"is no key here, need some of {', '.join(keys.values())}"
+            )
+    with at(document, where):
+        settled_state(automaton, _by_name(end.state, automaton), where[0], trim=end.trim)
 
 
 def _check_trim(document: Document, where: Where, trim: str | None, automaton: Automaton) -> None:
@@ -300,7 +348,6 @@ def _horizon(document: Document, file: ScenarioFile) -> Horizon:
         return made(Horizon, part, time=None if time_s == "free" else time_s)
 
 
-STATE_TOLERANCE = 1e-9  # between a reduced state that a file states and a trim's, in its units
 TPCAP = """\
 schema: 1
 name: The car of TPCAP

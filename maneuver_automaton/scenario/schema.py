@@ -137,11 +137,30 @@ class AutomatonPart(FilePart):
     maneuvers: ManeuversPart | None = optional("how trims are joined")
 
 
+def _by_names(value: Any) -> Any:
+    numbers = (
+        isinstance(value, dict)
+        and value
+        and all(
+            isinstance(one, int | float) and not isinstance(one, bool) for one in value.values()
+        )
+    )
+    if not numbers:
+        raise need("a mapping of numbers, such as {speed_m_s: 1.37, steering_rad: 0.12}")
+    return value
+
+
+State = Annotated[dict[str, Number], BeforeValidator(_by_names)]
+
+
 class StartPart(FilePart, title="Start"):
     """Where the plan begins."""
 
     pose: Pose = Field(description="[x, y, heading]")
     trim: Name | None = optional("the first trim")
+    state: State | None = optional(
+        "with inertia, in place of a trim: speeds, steering angle, {speed_m_s, steering_rad, ...}"
+    )
     time_s: Number = Field(0.0, description="time at the start")
 
 
@@ -150,6 +169,7 @@ class GoalPart(FilePart):
 
     pose: Pose = Field(description="[x, y, heading]")
     trim: Name | None = optional("the last trim")
+    state: State | None = optional("with inertia, in place of a trim, as of the start")
     heading: Annotated[Literal["free"], Need("free, or no such key")] | None = optional(
         "free: the third number of the pose does not matter"
     )
@@ -370,6 +390,9 @@ class NoisePart(FilePart):
     heading_rad: NotNegative = Field(0.0, description="standard deviation per step")
     measured_position_m: NotNegative = Field(0.0, description="standard deviation, seen alone")
     measured_heading_rad: NotNegative = Field(0.0, description="standard deviation, seen alone")
+    reduced_state: Numbers | None = optional(
+        "standard deviation per step of each speed, angle, ... of a vehicle with inertia"
+    )
     twist_scale: Pose | None = optional("true over nominal body velocity, per component")
     pushes: Annotated[tuple[PushPart, ...], Several("a list of pushes")] = Field(
         (), description="a list of {after_step, by}"

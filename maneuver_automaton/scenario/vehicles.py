@@ -20,9 +20,11 @@ from pydantic import (
     Discriminator,
     Field,
     GetCoreSchemaHandler,
+    PlainValidator,
     Strict,
     Tag,
     ValidationInfo,
+    WithJsonSchema,
     create_model,
 )
 from pydantic_core import CoreSchema
@@ -109,6 +111,31 @@ MEASURES = {  # the parameters of all models, by their units
     "n_m_s": "turn_drag",
     "per_rad": "cornering",
 }
+STATE_UNITS = {  # of what reduced states hold
+    "speed": "m_s",
+    "lateral_speed": "m_s",
+    "climb": "m_s",
+    "turn_rate": "rad_s",
+    **dict.fromkeys(("steering", "hitch", "tilt", "lateral_tilt", "articulation"), "rad"),
+}
+AT_REST = "steering_at_rest"
+
+
+def _at_rest(value: Any) -> Any:
+    known = {"free": 0.0, "forbidden": math.inf}
+    if isinstance(value, str) and value in known:
+        return known[value]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number and 0.0 <= value < math.inf):
+        raise need("free, forbidden, or a price of at least 0 per radian")
+    return float(value)
+
+
+AtRest = Annotated[
+    float,
+    PlainValidator(_at_rest),
+    WithJsonSchema({"anyOf": [{"enum": ["free", "forbidden"]}, {"type": "number", "minimum": 0}]}),
+]
 UNIT_OF = {name: unit for unit, names in MEASURES.items() for name in names.split()}
 WHAT = {  # each model is
     "unicycle": "A robot that drives ahead and turns on the spot; control [v, omega].",
@@ -133,6 +160,7 @@ WORDS = {  # on parameters, of all models or of one, that say more than their li
     "wheelbase": "distance of the axles, a positive number",
     "hitch_length": "from the hitch to the trailer's axle",
     "min_speed": "left out: as fast in reverse",
+    "steering_at_rest": "while it stands: free, forbidden, or a price per radian; left out: free",
     "min_force": "left out: as strong in reverse",
     "max_lateral_acceleration": "greatest speed times turn rate; left out: no limit",
     "footprint": "shape of the body",
@@ -179,6 +207,8 @@ def _part(model: str, what: str) -> type[FilePart]:
         number: Any = Number if one.name.startswith("min_") and one.default is None else Positive
         if one.name in ("max_steering", "max_tilt"):
             number = Sharp
+        elif one.name == AT_REST:
+            number = AtRest
         elif one.default == 0.0:
             number = NotNegative
         limits = SHARP if number is Sharp else "a positive number"
@@ -323,4 +353,6 @@ def described(model: Model) -> dict[str, Any]:
     if not is_known(model):
         raise ValueError(f"vehicle: a file cannot state {model.name!r}, only {', '.join(MODELS)}")
     values = stated(PARTS[model.name], model)
-    return {"model": model.name} | {key: float(value) for key, value in values.items()}
+    return {"model": model.name} | {
+        key: "forbidden" if value == math.inf else float(value) for key, value in values.items()
+    }

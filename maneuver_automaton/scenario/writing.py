@@ -11,14 +11,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import relative
 from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Horizon, Unstated
+from maneuver_automaton.problem import Horizon, Problem, Unstated
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
 from maneuver_automaton.scenario.ground import stated_places
 from maneuver_automaton.scenario.parts import stated
-from maneuver_automaton.scenario.scenario import Scenario
+from maneuver_automaton.scenario.scenario import Scenario, state_keys
 from maneuver_automaton.scenario.schema import (
     BoundsPart,
     CostPart,
@@ -97,12 +98,18 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
     """What a file states of one vehicle, key by key; nothing of what is as if left out."""
     problem = scenario.problem
     goals = [
-        stated(GoalPart, goal, heading="free" if goal.free_heading else None)
+        stated(
+            GoalPart,
+            goal,
+            heading="free" if goal.free_heading else None,
+            state=_state(problem, goal.state),
+        )
         for goal in problem.goals
     ]
     start = {
         "pose": problem.start.tolist(),
         "trim": problem.start_trim,
+        "state": _state(problem, problem.start_state),
         "time_s": problem.start_time or None,
     }
     search = {"method": problem.search.method, "time_limit_s": scenario.time_limit_s}
@@ -124,6 +131,12 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "zones": [stated_zone(one) for one in problem.zones],
         "search": search | stated(SearchPart, problem.search),
     }
+
+
+def _state(problem: Problem, state: Array | None) -> dict[str, float] | None:
+    """A reduced state by the keys of a file."""
+    keys = state_keys(problem.automaton.model.reduced_names).values()
+    return None if state is None else dict(zip(keys, state.tolist(), strict=True))
 
 
 def _one_or_several(entries: list[Any]) -> Any:

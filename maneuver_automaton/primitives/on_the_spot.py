@@ -1,0 +1,206 @@
+"""Maneuvers made when they are asked for: between a reduced state that no trim has, and trims.
+
+Where the controls are the rates of the reduced state they are quickest, in closed form; so are
+those of a hitch. For any other vehicle a small program of optimal control is solved, which is
+written down once for each model.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton.models import CarWithTrailer, Model
+from maneuver_automaton.models.speeds import is_too_sharp
+from maneuver_automaton.optimal_control.ipopt import SolverSettings, SolveStatus
+from maneuver_automaton.optimal_control.maneuvers import (
+    TransferProgram,
+    TransferSettings,
+    duration_guess,
+    solve_transfer,
+    transfer_program,
+)
+from maneuver_automaton.primitives.closed_form import (
+    differing,
+    has_limited_rates,
+    may_drive,
+    quickest_between,
+)
+from maneuver_automaton.primitives.connecting import CLOSED, WITHIN, Inputs, beyond_limits, closed
+from maneuver_automaton.primitives.primitive import Maneuver, Trim
+from maneuver_automaton.primitives.turning import hitch_maneuvers
+
+FEW = TransferSettings(  # intervals: enough for a short way, and solved in some 20 ms
+    intervals=8, solver=SolverSettings(tolerance=1e-7, max_iterations=80)
+)
+GUESSES = ((1.0, 0.0), (2.0, 0.5))  # (factor of the guessed duration, swing), in turn
+MODELS = 16  # whose programs are kept
+LEAST = 1e-9  # [units of the reduced state] a difference that takes time
+
+
+def state_of(model: Model, value: Any, what: str) -> Array:
+    """A reduced state (n_z,) of a model, stated in its order or by names; those left out are 0.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle has none, a name is none of its own, or a number is out of its limits.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5)
+    >>> state_of(car, {"speed": 1.37}, "start").tolist()
+    [1.37, 0.0]
+    """
+    names = model.reduced_names
+    if not names:
+        raise ValueError(
+            f"{what}: a state is given, but the {model.name} has no reduced state: it changes its "
+            "velocity at will"
+        )
+    if isinstance(value, Mapping):
+        unknown = [name for name in value if name not in names]
+        if unknown:
+            raise ValueError(
+                f"{what}: state: the {model.name} has no {unknown[0]!r}, need some of "
+                f"{', '.join(names)}"
+            )
+        value = [value.get(name, 0.0) for name in names]
+    state = as_array(f"{what}: state", value)
+    if state.shape != (len(names),):
+        raise ValueError(
+            f"{what}: state has shape {state.shape}, need {len(names)} numbers: {', '.join(names)}"
+        )
+    for name, number, (low, high) in zip(names, state, model.reduced_limits, strict=True):
+        slack = WITHIN * (high - low if np.isfinite(high - low) else 1.0)
+        if not low - slack <= number <= high + slack:
+            raise ValueError(
+                f"{what}: state: {name} is {number:.6g}, need one of the {model.name} within "
+                f"[{low:.6g}, {high:.6g}]"
+            )
+    state = state.copy()
+    state.setflags(write=False)
+    return state
+
+
+def trim_at(model: Model, state: Array, name: str) -> Trim:
+    """What stands for a reduced state at an end of a plan: a trim that lasts no time.
+
+    Its control is zero, where that is within the limits of the vehicle.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
+    ...                             max_angular_acceleration=1.0)
+    >>> trim_at(robot, np.array([0.3, 0.1]), "start state").body_velocity.tolist()
+    [0.3, 0.0, 0.1]
+    """
+    control = np.clip(np.zeros(len(model.control_names)), *model.control_limits.T)
+    velocity = np.asarray(model.body_velocity(state, control), dtype=np.float64)
+    return Trim(name=name, body_velocity=velocity, control=control, reduced_state=state)
+
+
+def seconds_between(model: Model, state: Array, others: Array) -> Array:
+    """About how long (m,) [s] it takes from a reduced state to others (m, n_z), or back.
+
+    Each component changes at its fastest rate half way; exact where the control is that rate.
+    """
+    corners = np.where(np.isfinite(model.control_limits), model.control_limits, [[-1.0, 1.0]])
+    controls = np.array(list(itertools.product(*corners)))
+    middles = ((state + others) / 2.0)[:, None]
+    shape = (len(others), len(controls))
+    rates = model.reduced_dynamics(
+        np.broadcast_to(middles, (*shape, state.size)),
+        np.broadcast_to(controls, (*shape, controls.shape[1])),
+    )
+    change, fastest = np.abs(others - state), np.abs(rates).max(axis=1)
+    seconds = np.where(change > LEAST, change / np.maximum(fastest, LEAST), 0.0)
+    return np.asarray(seconds.max(axis=1, initial=0.0))
+
+
+def maneuvers_between(model: Model, source: Trim, target: Trim) -> tuple[Maneuver, ...]:
+    """Maneuvers from one reduced state to another, quick ones; none where none was found.
+
+    In closed form the components change at once, or as late as they can; a hitch is bent or
+    straightened ahead and in reverse.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderUnicycle
+    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
+    ...                             max_angular_acceleration=1.0)
+    >>> source, target = (trim_at(robot, np.array([v, 0.0]), name) for v, name in ((0.3, "here"),
+    ...                                                                           (0.8, "there")))
+    >>> [(one.name, round(one.duration, 9)) for one in maneuvers_between(robot, source, target)]
+    [('here to there', 1.0)]
+    """
+    if isinstance(model, CarWithTrailer):
+        low, high = model.control_limits[0].tolist()
+        speeds = [speed for speed in (high, low) if speed]
+        return hitch_maneuvers(model, [(source, target, speed) for speed in speeds])
+    if _limited(model):
+        try:
+            early = quickest_between(model, [(source, target)])
+            late = quickest_between(model, [(source, target)], late=True)
+            both = (*early, *differing(early, late))
+            return tuple(one for one in both if may_drive(model, one))
+        except ValueError:  # a component cannot change that way at all
+            return ()
+    return _by_optimal_control(model, source, target)
+
+
+@functools.lru_cache(maxsize=MODELS)
+def _limited(model: Model) -> bool:
+    return has_limited_rates(model)
+
+
+@functools.lru_cache(maxsize=MODELS)
+def program_of(model: Model) -> TransferProgram:
+    """The program of short maneuvers of a model, written down once."""
+    return transfer_program(model, settings=FEW)
+
+
+def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneuver, ...]:
+    """The quickest maneuver that the solver finds, closed to rounding; none if it finds none."""
+    start, end = source.reduced_state, target.reduced_state
+    for factor, swing in GUESSES:
+        found = solve_transfer(
+            program_of(model),
+            start=start,
+            end=end,
+            controls=np.stack([target.control, target.control]),
+            tightening=WITHIN**0.5,
+            duration=factor * duration_guess(model, start, end),
+            swing=swing,
+        )
+        if found.status is not SolveStatus.SOLVED:
+            continue
+        raw = Inputs(control=found.control, interval=found.duration / len(found.control))
+        enough = CLOSED / 100.0
+        inputs = closed(model, start, end, inputs=raw, limits=model.control_limits, enough=enough)
+        course = inputs.drive(model, start)
+        missed = float(np.abs(course.reduced_state[-1] - end).max())
+        if (
+            not missed <= CLOSED
+            or beyond_limits(model.reduced_limits, course.reduced_state).max() > WITHIN
+        ):
+            continue
+        if is_too_sharp(model, course.twists(model)).any():
+            continue
+        name = f"{source.name} to {target.name}"
+        return (Maneuver.along(course, name=name, source=source.name, target=target.name),)
+    return ()
+
+
+def prepare_maneuvers(model: Model) -> None:
+    """Have the program of a model ready, before a clock runs."""
+    if not (isinstance(model, CarWithTrailer) or _limited(model)):
+        program_of(model)
