@@ -30,10 +30,13 @@ from maneuver_automaton.costs import Cost, StageCost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.via import Via as Via
 
 _Element: TypeAlias = SE2 | SE2xR | Translations
 MOST_KNOWN = 1 << 14  # maneuvers of a library whose costs are kept
 STANDING = 1e-3  # [m/s] slower is no direction of travel
+ORDERS = ("given", "free")
+MOST_UNORDERED = 12  # poses on the way whose order is free
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
 
@@ -221,6 +224,10 @@ class Problem:
         Distance [m] that the body keeps from every obstacle.
     zones : sequence of Zone
         Where only some motions are admitted.
+    via : Via, pose, or a sequence of these
+        What the plan passes on its way to the goal.
+    order : str
+        Whether that is passed in the order ``given``, or in the best one: ``free``.
 
     Raises
     ------
@@ -253,6 +260,8 @@ class Problem:
     body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
+    via: tuple[Via, ...] = field(default=(), kw_only=True)  # what is passed on the way
+    order: str = field(default="given", kw_only=True)  # in which: given | free
 
     __repr__ = brief
 
@@ -276,6 +285,8 @@ class Problem:
             body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
+            via: Via | ArrayLike | Sequence[Via] = (),
+            order: str = "given",
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -315,6 +326,44 @@ class Problem:
                 self.automaton.index_of(trim)
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
+        object.__setattr__(self, "via", _as_vias(self.via))
+        if self.order not in ORDERS:
+            raise ValueError(f"order must be one of {', '.join(ORDERS)}, got {self.order!r}")
+        if self.via:
+            self._check_via()
+
+    def _check_via(self) -> None:
+        """What is on the way are poses of the vehicle, which can stand where it is to stay."""
+        if self.horizon.time is not None:
+            raise ValueError(
+                f"via: the time is fixed, {self.horizon.time:g} s, and nothing says how it is "
+                "shared out on the way; need a free final time"
+            )
+        if self.order == "free" and len(self.via) > MOST_UNORDERED:
+            raise ValueError(
+                f"via: got {len(self.via)} in a free order, need at most {MOST_UNORDERED}"
+            )
+        automaton, dof = self.automaton, self.start.size
+        if (model := automaton.translated) is not None:  # any heading of a trim, if none is stated
+            unstated = model.stated.group.dof
+            vias = (
+                replace(one, pose=np.insert(one.pose, 2, 0.0), free_heading=True)
+                if one.pose.size == unstated
+                else one
+                for one in self.via
+            )
+            object.__setattr__(self, "via", tuple(vias))
+        for k, via in enumerate(self.via, 1):
+            if via.pose.size != dof:
+                raise ValueError(
+                    f"via {k}: pose has {via.pose.size} numbers, need {dof} "
+                    f"for the {automaton.model.name}"
+                )
+            if automaton.rest is None and (via.stay_s or (via.stop and self.has_inertia)):
+                raise ValueError(
+                    f"via {k}: the {automaton.model.name} has no trim that stands still, so it "
+                    "cannot stop there"
+                )
 
     def _check_start(self) -> None:
         dof = self.automaton.model.group.dof
@@ -610,6 +659,7 @@ class Problem:
             goals=tuple(replace(goal, pose=(by @ group(goal.pose)).pose) for goal in self.goals),
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
             zones=tuple(zone.moved(by) for zone in self.zones),
+            via=tuple(one.moved(by) for one in self.via),
         )
 
     @property
@@ -707,6 +757,16 @@ def _pose_of(value: Any) -> Any:
     """The pose of a group element; anything else as it is."""
     known = isinstance(value, np.ndarray | list | tuple)  # to look for attributes takes longer
     return value.pose if not known and isinstance(value, _Element) else value
+
+
+def _as_vias(value: Any) -> tuple[Via, ...]:
+    if isinstance(value, Via):
+        return (value,)
+    if isinstance(value, Sequence) and all(isinstance(one, Via) for one in value):
+        return tuple(value)
+    if isinstance(value, Sequence) and any(isinstance(one, Via) for one in value):
+        return tuple(via for one in value for via in _as_vias(one))
+    return tuple(Via(pose) for pose in np.atleast_2d(as_array("via: pose", value)))
 
 
 def _as_goals(value: Any) -> tuple[Goal, ...]:

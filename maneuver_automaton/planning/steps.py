@@ -18,6 +18,7 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.along_paths import AlongPaths
+from maneuver_automaton.planning.along_poses import AlongPoses
 from maneuver_automaton.planning.among_zones import AmongZones
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
 from maneuver_automaton.planning.bounds import bound_along_paths, least_price_per_metre
@@ -93,7 +94,14 @@ def answer(
 
 
 def steps_of(problem: Problem) -> Steps:
-    """The steps of a problem: its graph, if it has one, then those to its goals."""
+    """The steps of a problem: along the poses on its way, or those to its goals."""
+    if problem.via:
+        return Steps([AlongPoses(functools.partial(answer, course=goal_steps))])
+    return goal_steps(problem)
+
+
+def goal_steps(problem: Problem) -> Steps:
+    """The steps to the goals of a problem: its graph, if it has one, then its searches."""
     graph = [StateLattice()] if _may_be_a_graph(problem) else []
     if problem.has_tolerance:
         return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
