@@ -2,20 +2,20 @@
 
 An arrival is a pose at which a pose on the way is passed, and the trim in which it is: one, or many
 where the heading, the place or the trim is free. Between two arrivals lies a leg: a problem without
-poses on the way, whose exact plan `answer` finds. The search is best-first over (what was passed,
-arrival). A leg enters the queue with a bound of its cost, and is planned when it comes out.
-Afterwards free headings and places are varied continuously, both neighbouring legs planned again,
-and each leg gets more time. Plans are checked and priced as a whole: prices of switches count once.
+poses on the way, whose exact plan `answer` finds. Legs are estimated at first. The cheapest way
+through the arrivals, by dynamic programming over what was passed, has its legs planned; what they
+cost takes the place of the estimates, until the cheapest way is all planned. Then free headings and
+places are varied continuously, both neighbouring legs planned again, and each leg gets more time.
+Plans are checked and priced as a whole: prices of switches count once.
 
-Source: Cohen, Phillips, Likhachev (2014), *Planning single-arm manipulations with n-arm robots*,
-for edges that are planned when they come out of the queue; Held, Karp (1962), *A dynamic
-programming approach to sequencing problems*, for what remains in the best order.
+Source: Dellin, Srinivasa (2016), *A unifying formalism for shortest path problems with expensive
+edge evaluations via lazy best-first search over paths with edge selectors*; Held, Karp (1962), *A
+dynamic programming approach to sequencing problems*.
 """
 
 from __future__ import annotations
 
 import functools
-import heapq
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -23,11 +23,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.automaton.headings import posed
 from maneuver_automaton.budget import Budget
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.blocked import (
     blocked_ends,
     goals_off_lattice,
@@ -41,17 +42,23 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Via
 from maneuver_automaton.search.lattice_goals import nodes_within
 from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.words._kernels_steering import steer_batch
+from maneuver_automaton.words.library import most_different, moving_trims
 
-HEADINGS = 12  # that stand for a free one at first, beside those along the lines to neighbours
+HEADINGS = 12  # that stand for a free one at least, beside those along the lines to neighbours
+MOST_HEADINGS = 144  # the same where legs are estimated in a moment
+MOST_ESTIMATES = 2_000_000  # words of three trims that are tried in all to estimate legs
 ALONG_GATE = (0.5, 0.2, 0.8)  # shares of a gate at which it is crossed at first
 AROUND = 4  # places at the rim of a tolerance
 MOST_SPEEDS = 3  # straight trims in which a vehicle with inertia passes, beside rest
-HURRY = 3.0  # weight of what remains, in the search for a first plan
 LEG_SHARE = 0.2  # of the time left, for a leg that is planned for the first time
 SEARCHED = 0.4  # of the time, for the search over arrivals
 VARIED = 0.6  # of the time left then, for free headings and places
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 FINE = 1e-4  # of a heading or place, as a share of where it was looked for, at the last
+MOST_LETTERS = 7  # trims of which words are tried to estimate a leg
+STEERED = 1e-12  # relative, for circles that touch
+NEARLY = 1e-6  # [rad, s] of a turn that is none
 GAIN = 1e-7  # share of a cost that is a gain
 GOAL = -1  # number of the goal among poses on the way
 
@@ -114,10 +121,8 @@ class AlongPoses(Step):
                 return
             ways.append(Way(via, arrivals))
         search = _Search(found, _Legs(found, between, self.answer), ways)
-        first = search.best(HURRY, budget)
-        if first is not None and found.wants_more:
-            part = budget.before((1.0 - SEARCHED) * budget.left)
-            best = search.best(1.0, part, below=first) or first
+        best = search.best(budget.before((1.0 - SEARCHED) * budget.left))
+        if best is not None and found.wants_more:
             best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
             search.with_more_time(best)
         if not found.plans:
@@ -231,136 +236,117 @@ class _Search:
     legs: _Legs
     ways: Sequence[Way]
     failed: dict[tuple[int, int], PlanResult] = field(default_factory=dict)
-    is_proven: bool = False  # nothing in the queue is cheaper than the best
-    bounds: Array = field(init=False)  # (n + 1, n + 1) of legs: from the start or i, to k or goal
-    wanted: dict[tuple[int, int], float] = field(default_factory=dict)
+    is_proven: bool = False  # no other arrivals of those searched are cheaper
+    numbers: dict[tuple[int, object], int] = field(init=False)  # of arrivals, by way and key
+    arrivals: list[tuple[int, Arrival]] = field(init=False)  # all of them, with their way
+    costs: Array = field(init=False)  # (A + 1, A + 1) of legs: estimates until they are planned
+    bounds: Array = field(init=False)  # (n + 1, n + 1) the same between ways: nothing is cheaper
 
     def __post_init__(self) -> None:
-        n = len(self.ways)
+        n, middle, goals = len(self.ways), self.legs.middle, self.legs.between.goals
+        self.arrivals = [(k, to) for k, way in enumerate(self.ways) for to in way.arrivals]
+        self.numbers = {(k, to.key): a for a, (k, to) in enumerate(self.arrivals)}
         self.bounds = np.zeros((n + 1, n + 1))
-        problem = self.legs.middle
-        for i, k in itertools.product(range(-1, n), range(n + 1)):
-            if i == k:
-                continue
-            goals = self.legs.between.goals if k == n else (self.ways[k].around,)
-            from_way = self.ways[i].around if i >= 0 else None
-            self.bounds[i, k] = min(_set_bound(problem, from_way, goal) for goal in goals)
-        self._price_what_remains()
+        for i, k in self._pairs():
+            ends = goals if k == n else (self.ways[k].around,)
+            begin = None if i == n else self.ways[i].around
+            self.bounds[i, k] = min(_set_bound(middle, begin, end) for end in ends)
+        self.costs = np.full((len(self.arrivals) + 1,) * 2, np.inf)
+        rows: list[list[int]] = [[] for _ in range(n)]
+        for a, (k, _) in enumerate(self.arrivals):
+            rows[k].append(a)
+        rows.append([len(self.arrivals)])
+        poses = [*(to.pose for _, to in self.arrivals), self.found.problem.start]
+        for i, k in self._pairs():
+            begins = np.array([poses[a] for a in rows[i]])
+            ends = [*goals] if k == n else [Goal(poses[a]) for a in rows[k]]
+            priced = _estimates(middle, begins, ends)
+            if k == n:
+                priced = priced.min(axis=1, keepdims=True)
+            self.costs[np.ix_(rows[i], rows[k])] = np.maximum(priced, self.bounds[i, k])
+
+    def _pairs(self) -> Iterator[tuple[int, int]]:
+        """Which ways may follow each other; n is the start of a pair, or the goal at its end."""
+        n = len(self.ways)
+        for i, k in itertools.product(range(n + 1), repeat=2):
+            if (k == (i + 1) % (n + 1)) if self.in_order else (i != k or n == 0):
+                yield i, k
 
     @property
     def in_order(self) -> bool:
         """Whether the poses on the way are passed in the order given."""
         return self.found.problem.order == "given"
 
-    def _next(self, mask: int) -> list[int]:
-        """The poses on the way that may be passed next."""
-        left = [k for k in range(len(self.ways)) if not mask >> k & 1]
-        return left[:1] if self.in_order else left
+    def best(self, budget: Budget) -> Chain | None:
+        """The cheapest whole chain of the arrivals, as far as the time lets their legs be planned.
 
-    def _price_what_remains(self) -> None:
-        """No plan on from a pose on the way costs less, by what was passed: Held and Karp's sum."""
-        n, self.wanted = len(self.ways), {}
-        for mask in range((1 << n) - 1, -1, -1):
-            given = self.in_order
-            if given and mask & (mask + 1):
-                continue  # in order, those that were passed are the first ones
-            left = self._next(mask)
-            here = [k for k in range(n) if mask >> k & 1] if mask else [GOAL]
-            for i in here[-1:] if given else here:
-                costs = [
-                    self.bounds[i, k] + self._stay(k) + self.wanted[mask | 1 << k, k] for k in left
-                ]
-                self.wanted[mask, i] = min(costs, default=float(self.bounds[i, n]))
+        The cheapest by what is known and estimated is planned; what that takes is known then.
+        """
+        best: Chain | None = None
+        while not self.legs.is_over(budget) or best is None:
+            least, chosen = self._cheapest()
+            if least == math.inf or (best and least >= best.cost * (1.0 - GAIN)):
+                self.is_proven = best is not None
+                break
+            before = self.costs.copy()
+            chain = self.driven(chosen, budget)
+            if (
+                chain is not None
+                and (best is None or chain.cost < best.cost)
+                and self._offer(chain)
+            ):
+                best = chain
+            if np.array_equal(before, self.costs):
+                self.is_proven = best is not None
+                break
+            if not self.found.wants_more and (best or self.legs.is_over(self.found.budget)):
+                break
+        return best
+
+    def _cheapest(self) -> tuple[float, list[tuple[int, Arrival]]]:
+        """The cheapest way through the arrivals by what legs cost or are estimated to."""
+        of_way = np.array([k for k, _ in self.arrivals])
+        remains = _remaining(self.costs, of_way, self._stays, in_order=self.in_order)
+        at, mask, chosen = len(self.arrivals), 0, list[tuple[int, Arrival]]()
+        while len(chosen) < len(self.ways):
+            after = _following(remains, mask, of_way, self._stays, in_order=self.in_order)
+            at = int(np.argmin(self.costs[at, :-1] + after))
+            chosen.append(self.arrivals[at])
+            mask |= 1 << int(of_way[at])
+        return float(remains[0][-1]), chosen
 
     @functools.cached_property
-    def _rest_rate(self) -> float:
+    def _stays(self) -> Array:
+        """Cost (n,) of standing at each pose on the way."""
         problem = self.found.problem
         rest = problem.automaton.rest
-        return 0.0 if rest is None else float(problem.rates[rest])
-
-    def _stay(self, k: int) -> float:
-        return self._rest_rate * self.ways[k].via.stay_s
-
-    def best(self, weight: float, budget: Budget, *, below: Chain | None = None) -> Chain | None:
-        """The cheapest whole chain of the arrivals, or the first where what remains has a weight.
-
-        Each leg is in the queue by a bound until it comes out; then it is planned, and is in by its
-        cost. What costs no less than the chain `below` is left out.
-        """
-        problem, n = self.found.problem, len(self.ways)
-        start = Chain(Plan(problem.start, (), durations=[], start_time=problem.start_time))
-        count, settled = itertools.count(), dict[tuple[int, int, object], float]()
-        most = math.inf if below is None else below.cost * (1.0 - GAIN)
-        queue: list[tuple[float, int, Chain, tuple[int, Arrival | None] | None]] = []
-        heapq.heappush(queue, (0.0, next(count), start, None))
-        while queue:
-            estimate, _, chain, leg = heapq.heappop(queue)
-            if weight == 1.0 and estimate >= most:
-                self.is_proven = True
-                return None
-            if leg is None and chain.goal_index is not None:
-                if self._offer(chain):
-                    self.is_proven = weight == 1.0
-                    return chain
-                continue
-            mask = chain.mask
-            if leg is not None:  # planned only now that nothing else is more promising
-                k, to = leg
-                if k != GOAL and settled.get((mask | 1 << k, k, to and to.key)) is not None:
-                    continue
-                longer = self._extended(chain, k, to, budget)
-                if longer is None:
-                    if self.legs.is_over(budget):
-                        return None
-                    continue
-                remains = 0.0 if k == GOAL else self.wanted[longer.mask, k]
-                heapq.heappush(queue, (longer.cost + weight * remains, next(count), longer, None))
-                continue
-            last = chain.passed[-1] if chain.passed else GOAL
-            label = mask, last, chain.arrivals[-1].key if chain.arrivals else None
-            if label in settled:
-                continue
-            settled[label] = chain.cost
-            following = self._next(mask)
-            for k in following:
-                for to in self.ways[k].arrivals:
-                    least = self._leg_bound(chain, k, to)
-                    remains = least + self._stay(k) + self.wanted[mask | 1 << k, k]
-                    entry = (chain.cost + weight * remains, next(count), chain, (k, to))
-                    heapq.heappush(queue, entry)
-            if not following:
-                remains = float(self.bounds[last, n])
-                entry = (chain.cost + weight * remains, next(count), chain, (GOAL, None))
-                heapq.heappush(queue, entry)
-        self.is_proven = weight == 1.0
-        return None
-
-    def _leg_bound(self, chain: Chain, k: int, to: Arrival) -> float:
-        """No leg from the end of a chain to an arrival costs less."""
-        last = chain.passed[-1] if chain.passed else GOAL
-        pose = chain.arrivals[-1].pose if chain.arrivals else self.found.problem.start
-        here = self.legs.middle.starting_at(pose, time=0.0)
-        return max(float(self.bounds[last, k]), _least(here, Goal(to.pose)))
+        rate = 0.0 if rest is None else float(problem.rates[rest])
+        return np.array([rate * way.via.stay_s for way in self.ways])
 
     def _extended(self, chain: Chain, k: int, to: Arrival | None, budget: Budget) -> Chain | None:
         """A chain and one leg more, to a pose on the way or the goal; None where there is none."""
         result = self.legs.planned(chain, to, budget)
         if result is None:
             return None
-        if result.plan is None or result.cost is None:
+        self._learn(chain, k, to, result)
+        if result.plan is None:
             last = chain.passed[-1] if chain.passed else GOAL
             self.failed.setdefault((last, k), result)
             return None
-        self._learn(chain, k, result)
         return self._with_leg(chain, k, to, result)
 
-    def _learn(self, chain: Chain, k: int, result: PlanResult) -> None:
-        """Raise the bound of a leg between poses that are passed in one way only."""
-        last, n = (chain.passed[-1] if chain.passed else GOAL), len(self.ways)
-        soles = [self.ways[i].is_sole for i in (last, k) if i != GOAL]
-        if all(soles) and result.lower_bound is not None and not self.legs.is_timed:
-            to = n if k == GOAL else k
-            self.bounds[last, to] = max(self.bounds[last, to], result.lower_bound)
+    def _learn(self, chain: Chain, k: int, to: Arrival | None, result: PlanResult) -> None:
+        """Keep what a leg costs, and its bound if it is that of all plans between two ways."""
+        n, every = len(self.ways), len(self.arrivals)
+        last = chain.passed[-1] if chain.passed else n
+        row = self.numbers.get((last, chain.arrivals[-1].key)) if chain.arrivals else every
+        column = every if to is None else self.numbers.get((k, to.key))
+        if row is not None and column is not None:
+            self.costs[row, column] = math.inf if result.cost is None else result.cost
+        sole = all(self.ways[i].is_sole for i in (last, k) if i not in (GOAL, n))
+        if sole and result.lower_bound is not None and not self.legs.is_timed:
+            at = last, n if to is None else k
+            self.bounds[at] = max(self.bounds[at], result.lower_bound)
 
     def _with_leg(self, chain: Chain, k: int, to: Arrival | None, result: PlanResult) -> Chain:
         assert result.plan is not None
@@ -408,7 +394,7 @@ class _Search:
         goal, plan = self.found.problem.goals[chain.goal_index or 0], chain.plan
         if max(goal.off(plan.end)) <= max(goal.tolerance_m, goal.tolerance_rad, 1e-10):
             return None
-        begun = Chain(Plan(plan.start, (), durations=[], start_time=plan.start_time))
+        begun = self._begun()
         for k, to in (*zip(chain.passed, chain.arrivals, strict=True), (GOAL, None)):
             if begun.arrivals:
                 here = replace(begun.arrivals[-1], pose=begun.plan.end)
@@ -419,13 +405,15 @@ class _Search:
             begun = self._with_leg(begun, k, to, result)
         return begun.plan
 
-    def driven(self, chain: Chain, arrivals: Sequence[Arrival], budget: Budget) -> Chain | None:
-        """A chain through other arrivals in the same order; None where a leg is not found."""
-        start = self.found.problem.start
-        found: Chain | None = Chain(
-            Plan(start, (), durations=[], start_time=self.found.problem.start_time)
-        )
-        for k, to in (*zip(chain.passed, arrivals, strict=True), (GOAL, None)):
+    def _begun(self) -> Chain:
+        """A chain of nothing, at the start."""
+        problem = self.found.problem
+        return Chain(Plan(problem.start, (), durations=[], start_time=problem.start_time))
+
+    def driven(self, chosen: Sequence[tuple[int, Arrival]], budget: Budget) -> Chain | None:
+        """The whole chain through some arrivals; None where a leg is not found."""
+        found: Chain | None = self._begun()
+        for k, to in (*chosen, (GOAL, None)):
             assert found is not None
             found = self._extended(found, k, to, budget)
             if found is None:
@@ -434,27 +422,37 @@ class _Search:
 
     def varied(self, chain: Chain, budget: Budget) -> Chain:
         """The chain with other arrivals, then with headings and places varied continuously."""
-        best, gained = chain, True
+        best, gained, first = chain, True, True
         while gained and not self.legs.is_over(budget):
             before = best.cost
             for n in range(len(best.passed)):
-                if not self.is_proven:
+                if first and not self.is_proven:
                     best = self._other_arrival(best, n, budget)
                 best = self._varied_at(best, n, budget)
             gained = best.cost < before * (1.0 - GAIN)
+            first = False
             if gained:
                 self._offer(best)
         return best
 
     def _other_arrival(self, best: Chain, n: int, budget: Budget) -> Chain:
-        """The cheapest chain in which one arrival may be another one of those searched."""
-        for to in self.ways[best.passed[n]].arrivals:
-            if to.key != best.arrivals[n].key and not self.legs.is_over(budget):
-                arrivals = (*best.arrivals[:n], to, *best.arrivals[n + 1 :])
-                other = self.driven(best, arrivals, budget)
-                if other is not None and other.cost < best.cost * (1.0 - GAIN):
-                    best = other
+        """The cheapest chain in which one arrival may be another of the same trim, or pose."""
+        here = best.arrivals[n]
+        others = [
+            to
+            for to in self.ways[best.passed[n]].arrivals
+            if (to.trim == here.trim) != np.array_equal(to.pose, here.pose)
+        ]
+        for to in sorted(others, key=lambda one: float(np.abs(one.pose - here.pose).sum())):
+            if self.legs.is_over(budget):
+                break
+            best = min((best, self._with(best, n, to, budget)), key=_price)
         return best
+
+    def _with(self, chain: Chain, n: int, to: Arrival, budget: Budget) -> Chain | None:
+        """A chain with another arrival."""
+        arrivals = (*chain.arrivals[:n], to, *chain.arrivals[n + 1 :])
+        return self.driven(list(zip(chain.passed, arrivals, strict=True)), budget)
 
     def _varied_at(self, best: Chain, n: int, budget: Budget) -> Chain:
         """The chain with one arrival varied along each direction in which it is free."""
@@ -462,29 +460,28 @@ class _Search:
         if problem.automaton.lattice is not None or problem.automaton.translated is not None:
             return best
         for moved, reach in _freedoms(problem, way.via):
-            if self.legs.is_over(budget):
-                break
             here, tried = best, dict[float, Chain | None]()
 
-            def price(by: float) -> float:
-                to = replace(here.arrivals[n], pose=moved(here.arrivals[n].pose, by))  # noqa: B023
-                arrivals = (*here.arrivals[:n], to, *here.arrivals[n + 1 :])  # noqa: B023
-                tried[by] = self.driven(here, arrivals, budget)  # noqa: B023
-                one = tried[by]  # noqa: B023
-                return math.inf if one is None else one.cost
+            def price(
+                by: float,
+                here: Chain = here,
+                moved: Callable[[Array, float], Array] = moved,
+                tried: dict[float, Chain | None] = tried,
+            ) -> float:
+                to = replace(here.arrivals[n], pose=moved(here.arrivals[n].pose, by))
+                tried[by] = self._with(here, n, to, budget)
+                return _price(tried[by])
 
+            if self.legs.is_over(budget):
+                break
             at = golden_section(price, -reach, reach, lambda: self.legs.is_over(budget))
-            one = tried.get(at)
-            if one is not None and one.cost < best.cost:
-                best = one
+            best = min((best, tried.get(at)), key=_price)
         return best
 
     def with_more_time(self, chain: Chain) -> None:
         """Offer the chain with its legs planned once more, each with its share of the time left."""
         ends = (*zip(chain.passed, chain.arrivals, strict=True), (GOAL, None))
-        problem = self.found.problem
-        begun = Chain(Plan(problem.start, (), durations=[], start_time=problem.start_time))
-        gained = False
+        begun, gained = self._begun(), False
         for n, ((k, to), leg) in enumerate(zip(ends, chain.legs, strict=True)):
             left = self.found.for_better
             better: PlanResult | None = leg
@@ -494,16 +491,16 @@ class _Search:
             if better is None or better.plan is None:
                 better = leg
             gained |= better is not leg
-            self._learn(begun, k, better)
+            self._learn(begun, k, to, better)
             begun = self._with_leg(begun, k, to, better)
         if gained:
             self._offer(begun)
 
     def bound(self) -> LowerBound:
         """No plan is cheaper: the sum of the bounds of legs, in the best order."""
-        self._price_what_remains()
-        least = self.wanted[0, GOAL]
-        return LowerBound(value=max(0.0, least), kind="distance")
+        ways = np.arange(len(self.ways))
+        remains = _remaining(self.bounds, ways, self._stays, in_order=self.in_order)
+        return LowerBound(value=max(0.0, float(remains[0][-1])), kind="distance")
 
     def why_none(self) -> tuple[PlanStatus, str]:
         """How it ended without a plan, and why."""
@@ -601,8 +598,20 @@ def _headings(problem: Problem, number: int) -> list[float]:
     if problem.order == "free":
         angles = angles[:1]
     first = angles[0] if angles else float(problem.start[2])
-    angles += [first + 2.0 * math.pi * k / HEADINGS for k in range(HEADINGS)]
+    count = _headings_tried(problem)
+    angles += [first + 2.0 * math.pi * k / count for k in range(count)]
     return list(dict.fromkeys(math.remainder(angle, 2.0 * math.pi) for angle in angles))
+
+
+def _headings_tried(problem: Problem) -> int:
+    """How many headings stand for a free one: more where a leg is estimated in a moment."""
+    if problem.has_inertia or problem.start.size != 3:
+        return HEADINGS
+    n = len(problem.via)
+    letters = len(moving_trims(problem.automaton, problem.cost).twists)
+    legs = (n + 1) * (1 if problem.order == "given" else n) * min(letters, MOST_LETTERS) ** 3
+    places = max(sum(1 for _ in _places(via)) for via in problem.via)
+    return int(np.clip(math.sqrt(MOST_ESTIMATES / legs) / places, HEADINGS, MOST_HEADINGS))
 
 
 def _trims(problem: Problem, via: Via) -> list[str | None]:
@@ -651,7 +660,7 @@ def _freedoms(
         return shifted
 
     if via.free_heading and problem.automaton.body_velocities[:, 2].any():
-        yield turned, 2.0 * math.pi / HEADINGS
+        yield turned, 2.0 * math.pi / _headings_tried(problem)
     if via.gate is not None:
         length = float(np.linalg.norm(via.gate[1] - via.gate[0]))
         yield along((via.gate[1] - via.gate[0]) / length), length / 2.0
@@ -699,6 +708,68 @@ def _least(problem: Problem, goal: Goal) -> float:
     if problem.has_inertia:
         return straight_bound(problem, (goal,))
     return closed_bound(problem, goal)
+
+
+def _price(chain: Chain | None) -> float:
+    return math.inf if chain is None else chain.cost
+
+
+def _estimates(problem: Problem, begins: Array, ends: Sequence[Goal]) -> Array:
+    """What legs (m, n) from poses (m, dof) to goals cost about, where nothing is in the way.
+
+    For a vehicle that switches at will in a plane, the cheapest word of three trims; else a bound.
+    """
+    exact = not any(one.free_heading or one.tolerance_m or one.tolerance_rad for one in ends)
+    if problem.has_inertia or begins.shape[1] != 3 or not exact:
+        heres = [problem.starting_at(begin, time=problem.start_time) for begin in begins]
+        return np.array([[_least(here, end) for end in ends] for here in heres])
+    library = moving_trims(problem.automaton, problem.cost)
+    few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
+    twists, rates = library.twists[few][:, :3].copy(), library.rates[few]
+    words = np.array(list(itertools.product(range(len(few)), repeat=3)), dtype=np.int64)
+    goals = np.array([one.pose for one in ends])
+    seen = (SE2(begins[:, None]).inverse() @ SE2(goals[None])).pose.reshape(-1, 3)
+    k = len(seen)
+    times = steer_batch(
+        twists,
+        np.repeat(words, k, axis=0),
+        np.zeros((len(words) * k, 2, 3)),
+        np.tile(seen, (len(words), 1)),
+        STEERED,
+    ).reshape(len(words), k, 2, 3)
+    turns = np.abs(twists[words, 2])[:, None, None]
+    times = np.where(times * turns > 2.0 * math.pi - NEARLY, 0.0, times)
+    times = np.where(times < -NEARLY, np.nan, times)
+    sums = (times * rates[words][:, None, None]).sum(axis=-1)
+    least = np.where(np.isnan(sums), np.inf, sums).min(axis=(0, 2))
+    return np.where(np.isfinite(least), least, 0.0).reshape(len(begins), len(ends))
+
+
+def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) -> dict[int, Array]:
+    """The least cost (A + 1,) from every arrival to the goal, by what was passed: the last, start.
+
+    Costs (A + 1, A + 1) are those of legs from arrivals, the last row from the start, to arrivals,
+    the last column to the goal; what was passed is written in bits.
+    """
+    n = len(stays)
+    remains = {(1 << n) - 1: costs[:, -1]}
+    masks = [(1 << k) - 1 for k in range(n)] if in_order else range((1 << n) - 1)
+    for mask in reversed(masks):
+        after = _following(remains, mask, of_way, stays, in_order=in_order)
+        remains[mask] = (costs[:, :-1] + after).min(axis=1)
+    return remains
+
+
+def _following(
+    remains: dict[int, Array], mask: int, of_way: IntArray, stays: Array, *, in_order: bool
+) -> Array:
+    """What follows (A,) once each arrival comes next; inf for one that may not."""
+    after = np.full(len(of_way), np.inf)
+    left = [k for k in range(len(stays)) if not mask >> k & 1]
+    for k in left[:1] if in_order else left:
+        rows = of_way == k
+        after[rows] = stays[k] + remains[mask | 1 << k][:-1][rows]
+    return after
 
 
 def _joined(first: Plan, second: Plan) -> Plan:

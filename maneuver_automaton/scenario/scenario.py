@@ -20,7 +20,7 @@ from maneuver_automaton.formats.statement import MapFile, StatedVehicle, Stateme
 from maneuver_automaton.formats.yaml_source import Document, Where, parse, shown
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings, Via
 from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
 from maneuver_automaton.scenario.parts import at, checked, made
@@ -164,6 +164,10 @@ def scenario_of_document(
         lambda: zones_of(document, file.zones, folder, fastest=fastest),
     )
     horizon = _horizon(document, file)
+    vias = []
+    for k, part in enumerate(file.via):
+        with at(document, ("via", k), about="via"):
+            vias.append(made(Via, part))
     with at(document, ()):
         problem = Problem(
             automaton,
@@ -178,6 +182,8 @@ def scenario_of_document(
             obstacles=obstacles,
             margin=file.margin_m,
             zones=zones,
+            via=tuple(vias),
+            order=file.order,
             **bodies,
         )
     return Scenario(

@@ -14,7 +14,7 @@ from typing import Any
 from maneuver_automaton._files import relative
 from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Horizon, Unstated
+from maneuver_automaton.problem import Horizon, Unstated, Via
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
 from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario
@@ -25,6 +25,7 @@ from maneuver_automaton.scenario.schema import (
     HorizonPart,
     ScenarioFile,
     SearchPart,
+    ViaPart,
 )
 from maneuver_automaton.scenario.shapes import (
     stated_footprint,
@@ -116,8 +117,22 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "margin_m": problem.margin,
         "obstacles": [stated_obstacle(one, scenario.maps, folder) for one in problem.obstacles],
         "zones": [stated_zone(one) for one in problem.zones],
+        "via": [_via(one) for one in problem.via],
+        "order": problem.order if problem.order != "given" else None,
         "search": search | stated(SearchPart, problem.search),
     }
+
+
+def _via(via: Via) -> dict[str, Any]:
+    """What is on the way; a gate whose heading is free needs no pose."""
+    free = via.gate is not None and via.free_heading
+    stop = via.stop and not via.stay_s
+    return stated(
+        ViaPart,
+        via,
+        stop=stop,
+        **({"pose": None, "free_heading": False} if free else {}),
+    )
 
 
 def _one_or_several(entries: list[Any]) -> Any:
