@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     from maneuver_automaton.problem import Horizon as Horizon
     from maneuver_automaton.problem import Problem as Problem
     from maneuver_automaton.problem import SearchSettings as SearchSettings
+    from maneuver_automaton.problem import Via as Via
     from maneuver_automaton.receding_horizon import Disturbance as Disturbance
     from maneuver_automaton.receding_horizon import RecedingHorizon as RecedingHorizon
     from maneuver_automaton.receding_horizon import simulate as simulate
@@ -158,6 +159,7 @@ _HOMES = {
     "Unicycle": "models",
     "UserModel": "models",
     "Verdict": "planning.verdict",
+    "Via": "problem",
     "Zone": "collision",
     "build_library": "automaton.building",
     "design_library": "design",

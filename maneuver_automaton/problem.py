@@ -34,11 +34,14 @@ from maneuver_automaton.places import PlaceCost, bound, check_place_costs, moved
 from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.on_the_spot import state_of, trim_at
+from maneuver_automaton.via import Via as Via
 
 _Element: TypeAlias = SE2 | SE2xR | Translations
 MOST_KNOWN = 1 << 14  # maneuvers of a library whose costs are kept
 STANDING = 1e-3  # [m/s] slower is no direction of travel
 STATE_TOLERANCE = 1e-9  # between a reduced state that is stated and a trim's, in its units
+ORDERS = ("given", "free")
+MOST_UNORDERED = 12  # poses on the way whose order is free
 SEARCH_METHODS = ("auto", "words", "insertion", "lattice")
 
 
@@ -235,6 +238,10 @@ class Problem:
         Where only some motions are admitted.
     place_costs : PlaceCost, or a sequence of these
         What a motion costs beside `cost` because of where it goes: `Clearance`, `Ground`.
+    via : Via, pose, or a sequence of these
+        What the plan passes on its way to the goal.
+    order : str
+        Whether that is passed in the order ``given``, or in the best one: ``free``.
 
     Raises
     ------
@@ -269,6 +276,8 @@ class Problem:
     margin: float = field(default=0.0, kw_only=True)  # [m] distance kept from every obstacle
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)  # where not every motion is admitted
     place_costs: tuple[PlaceCost, ...] = field(default=(), kw_only=True)  # beside the invariant one
+    via: tuple[Via, ...] = field(default=(), kw_only=True)  # what is passed on the way
+    order: str = field(default="given", kw_only=True)  # in which: given | free
 
     __repr__ = brief
 
@@ -294,6 +303,8 @@ class Problem:
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
             place_costs: PlaceCost | Sequence[PlaceCost] = (),
+            via: Via | ArrayLike | Sequence[Via] = (),
+            order: str = "given",
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -335,6 +346,44 @@ class Problem:
                 self.automaton.index_of(trim)
         if not (math.isfinite(self.margin) and self.margin >= 0.0):
             raise ValueError(f"margin must be a number of at least 0, got {self.margin} m")
+        object.__setattr__(self, "via", _as_vias(self.via))
+        if self.order not in ORDERS:
+            raise ValueError(f"order must be one of {', '.join(ORDERS)}, got {self.order!r}")
+        if self.via:
+            self._check_via()
+
+    def _check_via(self) -> None:
+        """What is on the way are poses of the vehicle, which can stand where it is to stay."""
+        if self.horizon.time is not None:
+            raise ValueError(
+                f"via: the time is fixed, {self.horizon.time:g} s, and nothing says how it is "
+                "shared out on the way; need a free final time"
+            )
+        if self.order == "free" and len(self.via) > MOST_UNORDERED:
+            raise ValueError(
+                f"via: got {len(self.via)} in a free order, need at most {MOST_UNORDERED}"
+            )
+        automaton, dof = self.automaton, self.start.size
+        if (model := automaton.translated) is not None:  # any heading of a trim, if none is stated
+            unstated = model.stated.group.dof
+            vias = (
+                replace(one, pose=np.insert(one.pose, 2, 0.0), free_heading=True)
+                if one.pose.size == unstated
+                else one
+                for one in self.via
+            )
+            object.__setattr__(self, "via", tuple(vias))
+        for k, via in enumerate(self.via, 1):
+            if via.pose.size != dof:
+                raise ValueError(
+                    f"via {k}: pose has {via.pose.size} numbers, need {dof} "
+                    f"for the {automaton.model.name}"
+                )
+            if automaton.rest is None and (via.stay_s or (via.stop and self.has_inertia)):
+                raise ValueError(
+                    f"via {k}: the {automaton.model.name} has no trim that stands still, so it "
+                    "cannot stop there"
+                )
 
     def _check_start(self) -> None:
         dof = self.automaton.model.group.dof
@@ -695,6 +744,7 @@ class Problem:
             obstacles=tuple(obstacle.moved(by) for obstacle in self.obstacles),
             zones=tuple(zone.moved(by) for zone in self.zones),
             place_costs=tuple(moved(cost, by) for cost in self.place_costs),
+            via=tuple(one.moved(by) for one in self.via),
         )
 
     @property
@@ -830,6 +880,16 @@ def _pose_of(value: Any) -> Any:
     """The pose of a group element; anything else as it is."""
     known = isinstance(value, np.ndarray | list | tuple)  # to look for attributes takes longer
     return value.pose if not known and isinstance(value, _Element) else value
+
+
+def _as_vias(value: Any) -> tuple[Via, ...]:
+    if isinstance(value, Via):
+        return (value,)
+    if isinstance(value, Sequence) and all(isinstance(one, Via) for one in value):
+        return tuple(value)
+    if isinstance(value, Sequence) and any(isinstance(one, Via) for one in value):
+        return tuple(via for one in value for via in _as_vias(one))
+    return tuple(Via(pose) for pose in np.atleast_2d(as_array("via: pose", value)))
 
 
 def _as_goals(value: Any) -> tuple[Goal, ...]:

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton._arrays import Array, IntArray, wrapped
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
 from maneuver_automaton.audit.drive import DrivenPlan, driven
@@ -34,7 +34,8 @@ from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import PlaceCost
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.problem import Goal, Via
+from maneuver_automaton.via import passages
 
 DEFECT_TOLERANCE = 1e-8  # [m, rad] between plan and integration, per metre, radian, second driven
 TERMINAL_TOLERANCE = 1e-9  # [m, rad] of the last pose, beyond the goal's own tolerance
@@ -42,6 +43,8 @@ LIMIT_TOLERANCE = 1e-9  # relative to the limit, at least to 1, by which a value
 STATE_TOLERANCE = 1e-9  # [model's units] of the first and the last reduced state
 MOST_TURNED = 2e4  # [rad] of a plan that is driven again, in elements of less than a radian each
 EXCEEDED = 1e-9  # relative, by which a limit may be exceeded
+WAY_SHARES = 33  # of an element, between which poses on the way are looked for
+AT_REST = 1e-6  # [m/s, rad/s] of a vehicle that stops
 UNRESOLVED = 1e-3  # [m] by which a distance may not be known sharply enough to decide
 
 Around: TypeAlias = Callable[[tuple[AnyObstacle, ...], tuple[float, float]], Surroundings]
@@ -120,6 +123,8 @@ def audit_plan(
     states: tuple[Array, Array] | None = None,
     zones: tuple[Zone, ...] = (),
     places: StatedPrices | None = None,
+    via: tuple[Via, ...] = (),
+    order: str = "given",
     around: Around = surroundings_of,
     ask: Callable[[], None] = lambda: None,
 ) -> Audit:
@@ -149,6 +154,9 @@ def audit_plan(
         Where not every motion is admitted.
     places : StatedPrices, optional
         What it costs because of where it goes: integrated anew, to within 1e-3 of the whole cost.
+    via : tuple of Via
+        What must be passed on the way, in the order given or, if that is ``free``, in any.
+    order : str
     around : callable
         The surroundings of some obstacles, say from a store of those of the map.
     ask : callable
@@ -215,6 +223,7 @@ def audit_plan(
             if not abs(prices[-1] - stated) <= AGREED * places.whole:
                 what = type(cost).__name__
                 reasons.append(f"{what} costs {prices[-1]:.6g}, not {stated:.6g} as stated")
+    reasons += _missed_on_the_way(drive, goal, via, in_order=order == "given")
     return Audit(
         passed=not reasons,
         max_dynamics_defect=drive.off,
@@ -224,6 +233,37 @@ def audit_plan(
         reason="; ".join(reasons),
         place_price=sum(prices) if prices else None,
     )
+
+
+def _missed_on_the_way(
+    drive: DrivenPlan, goal: Goal, via: tuple[Via, ...], *, in_order: bool
+) -> list[str]:
+    """Which poses on the way are not met where the plan is driven, counted from the goal."""
+    if not via:
+        return []
+    frames, places = drive.frames, [0, 1, *range(3, drive.end.size)]
+    shares = np.linspace(0.0, 1.0, WAY_SHARES)
+    begins, lengths = frames.times[:-1, None], np.diff(frames.times)[:, None]
+    # no step turns or moves by more than a share of an element
+    times = np.append((begins + shares[:-1] * lengths).ravel(), frames.times[-1])
+
+    def located(times: Array) -> tuple[IntArray, Array]:
+        element = np.searchsorted(frames.times, times, side="right") - 1
+        element = np.clip(element, 0, lengths.size - 1)
+        share = (times - frames.times[element]) / lengths[element, 0]
+        return element, np.clip(share, 0.0, 1.0)
+
+    def rests(time: float) -> bool:
+        speeds = np.abs(drive.twists_at(*located(np.array([time]))))
+        return not drive.model.reduced_names or float(speeds.max()) <= AT_REST
+
+    seen = [one.shifted(goal.pose[places]) for one in via]
+    met = passages(seen, times, lambda at: frames.at(*located(at)), rests, in_order=in_order)
+    return [
+        f"pose {k} on the way is not passed" + (", or not in its order" if in_order else "")
+        for k, at in enumerate(met, 1)
+        if at is None
+    ]
 
 
 def _not_driven(near: Plan, goal: Goal, reason: str) -> Audit:

@@ -105,6 +105,11 @@ class FleetProblem:
                 raise ValueError(
                     f"fleet: vehicle {name!r} has a fixed time, need a free final time"
                 )
+            if problem.via:
+                raise ValueError(
+                    f"fleet: vehicle {name!r} has poses on its way, which several vehicles cannot "
+                    "plan together; need none, or a plan of that vehicle alone"
+                )
         self._check_ends()
 
     def _check_ends(self) -> None:

@@ -116,6 +116,14 @@ class AlternativeEntry(TypedDict):
     terminal_error: TerminalErrorEntry
 
 
+class PassedEntry(TypedDict):
+    """A pose on the way that the plan passes."""
+
+    number: Annotated[Whole, says("of the pose on the way, from 1")]
+    time_s: Annotated[Number, says("on the clock of the trajectory")]
+    pose: Annotated[list[Number], says("[x, y, heading(, z)] there")]
+
+
 class PlanDocument(DocumentHead):
     """The answer to a problem."""
 
@@ -131,6 +139,7 @@ class PlanDocument(DocumentHead):
     certificate: NotRequired[Annotated[Known, says("smallest reduced cost over the library")]]
     primitives: Annotated[list[PrimitiveEntry], says("they add up to duration_s")]
     terminal_error: NotRequired[TerminalErrorEntry | None]
+    via: NotRequired[Annotated[list[PassedEntry], says("passed on the way, if anything is")]]
     clearance_m: NotRequired[Annotated[Known, says("least distance to an obstacle")]]
     trajectory: TrajectoryEntry
     audit: NotRequired[AuditEntry | None]
@@ -167,6 +176,7 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
         **library_entries(result.problem.automaton),
         **motion_entries(result.plan),
         terminal_error=entry(TerminalErrorEntry, result.terminal_error),
+        via=[entry(PassedEntry, one, time_s=one.time) for one in result.via],
         audit=entry(AuditEntry, result.audit),
         alternatives=[
             entry(
@@ -183,6 +193,8 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
     )
     if result.narrowest is None:
         del document["narrowest"]
+    if not result.problem.via:
+        del document["via"]
     return document
 
 

@@ -83,28 +83,37 @@ def least_price_per_metre(automaton: Automaton, cost: StageCost) -> float:
     return max(0.0, min(prices, default=0.0))
 
 
+def straight_bound(problem: Problem, goals: Sequence[Goal]) -> float:
+    """No plan to one of some goals costs less: at the greatest speed, or the best price of words.
+
+    It holds whatever the trims at both ends are.
+    """
+    from maneuver_automaton.planning.polishing import why_not_polished
+    from maneuver_automaton.refinement.stop_and_steer import follows_paths
+
+    model, cost = problem.automaton.model, terms_of(problem.cost)
+    straight = min(max(0.0, goal.off(problem.start)[0] - goal.tolerance_m) for goal in goals)
+    known = 0.0
+    if cost:
+        known = cost.time * min(_quickest(problem, goal) for goal in goals)
+        known += cost.length * straight
+    words = why_not_polished(problem) and not follows_paths(model)
+    if words and not problem.has_states:  # all plans are words of the library
+        known = max(known, straight * least_price_per_metre(problem.automaton, problem.cost))
+    return known
+
+
 def bound_along_paths(problem: Problem) -> LowerBound:
     """No plan is cheaper: the shortest path, driven from rest to rest at the limits.
 
     A path that the kinematic vehicle needs B seconds for at full speed v takes ``B + v / a`` with
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
-    from maneuver_automaton.planning.polishing import why_not_polished
     from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
     from maneuver_automaton.search.lattice_query import lattice_query
 
     model, cost = problem.automaton.model, terms_of(problem.cost)
-    # the straight line to the nearest goal: at the greatest speed, or the best price of words
-    straight = min(
-        max(0.0, goal.off(problem.start)[0] - goal.tolerance_m) for goal in problem.goals
-    )
-    known = 0.0
-    if cost:
-        known = cost.time * min(_quickest(problem, goal) for goal in problem.goals)
-        known += cost.length * straight
-    words = why_not_polished(problem) and not follows_paths(model)
-    if words and not problem.has_states:  # all plans are words of the library
-        known = max(known, straight * least_price_per_metre(problem.automaton, problem.cost))
+    known = straight_bound(problem, problem.goals)
     if not (follows_paths(model) and problem.rests_at_both_ends and cost):
         return LowerBound(value=known, kind="distance")
     simpler = kinematic_problem(problem, switch=0.0)

@@ -26,6 +26,7 @@ from maneuver_automaton.collision.layers import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.places import Clearance
+from maneuver_automaton.planning.on_the_way import what_is_missed
 from maneuver_automaton.planning.result import Workspace, workspace_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.closed_form import may_drive
@@ -44,6 +45,7 @@ class Condition(enum.Enum):
 
     WORD = "word"  # the horizon, the number of trims, and how long each of them lasts
     BOUNDS = "bounds"
+    VIA = "via"  # a pose on the way is missed
     COLLISION = "collision"  # with an obstacle, or with a zone that does not admit the motion
     AUDIT = "audit"
     TIME = "time"  # of the checks themselves: nothing else is known to be broken
@@ -75,7 +77,7 @@ def check_plan(
     *,
     budget: Budget = UNLIMITED,
 ) -> Checked:
-    """Horizon and limits, bounds, FCL, audit, in this order; the first that fails ends it.
+    """Horizon and limits, bounds, poses on the way, FCL, audit; the first that fails ends it.
 
     They are given up, too, a moment after the time of a `budget` is over.
     """
@@ -89,6 +91,9 @@ def check_plan(
             return Checked(audit=None, broken=Condition.WORD, reason=reason)
     if not stays_inside(plan, problem.bounds):
         return Checked(audit=None, broken=Condition.BOUNDS, reason="it leaves the bounds")
+    reason = what_is_missed(problem, plan)
+    if reason:
+        return Checked(audit=None, broken=Condition.VIA, reason=reason)
     try:
         reason = _static_hit(problem, plan, goal, workspace, budget=budget)
         reason = reason or what_passes_later(problem, plan)
@@ -122,6 +127,8 @@ def check_plan(
             states=_end_states(problem, plan, goal),
             zones=problem.zones,
             places=places,
+            via=problem.via,
+            order=problem.order,
             around=workspace.surroundings,
             ask=lambda: _ask(budget),
         )

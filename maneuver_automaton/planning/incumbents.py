@@ -296,8 +296,8 @@ class Incumbents:
             late += self.budget.is_over
 
     def _with_lasting_coasts(self, plan: Plan, goal: Goal) -> Plan:
-        """The plan without very short trims, if there is time to check it."""
-        if self.budget.left_to_check < LONGER * self.longest_check:
+        """The plan without very short trims, if there is time to check it; its legs are without."""
+        if self.problem.via or self.budget.left_to_check < LONGER * self.longest_check:
             return plan
 
         def is_free(one: Plan) -> bool:

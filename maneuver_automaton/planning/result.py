@@ -16,6 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.fcl_checker import FclChecker
+from maneuver_automaton.planning.on_the_way import Passed, passed_on_the_way
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.prepared import RECENT, Prepared
 
@@ -163,6 +164,11 @@ class PlanResult(Played):
     notes: tuple[str, ...] = ()  # what was left out or done otherwise, and why: a sentence each
 
     __repr__ = brief
+
+    @property
+    def via(self) -> tuple[Passed, ...]:
+        """When the plan passes the poses on the way, in its order; empty without a plan."""
+        return () if self.plan is None else passed_on_the_way(self.problem, self.plan)
 
 
 class Answer(Protocol):

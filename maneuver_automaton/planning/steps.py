@@ -19,6 +19,7 @@ from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINI
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models.speeds import steers_at_rest
 from maneuver_automaton.planning.along_paths import AlongPaths
+from maneuver_automaton.planning.along_poses import AlongPoses
 from maneuver_automaton.planning.among_zones import AmongZones
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice
 from maneuver_automaton.planning.bounds import bound_along_paths, least_price_per_metre
@@ -95,12 +96,21 @@ def answer(
 
 
 def steps_of(problem: Problem) -> Steps:
-    """The steps of a problem: its graph, if it has one, then those to its goals.
+    """The steps of a problem: along the poses on its way, or those of a leg to its goals."""
+    if problem.via:
+        return Steps([AlongPoses(functools.partial(answer, course=leg_steps))])
+    return leg_steps(problem)
+
+
+def leg_steps(problem: Problem) -> Steps:
+    """The steps to the goals of a problem: its graph, if it has one, then its searches.
 
     Where it starts or ends in a state of no trim, problems between trims are answered instead.
     """
     if problem.has_states:
-        return Steps([FromState(answer, prepare_steps)], POLISHED)
+        return Steps(
+            [FromState(functools.partial(answer, course=leg_steps), prepare_steps)], POLISHED
+        )
     graph = [StateLattice()] if _may_be_a_graph(problem) else []
     if problem.has_tolerance:
         return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
@@ -199,7 +209,9 @@ def _uses_lattice(problem: Problem) -> bool:
     if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
         return False
     method = problem.search.method
-    return method == "lattice" or (method == "auto" and bool(problem.obstacles or problem.place_costs))
+    return method == "lattice" or (
+        method == "auto" and bool(problem.obstacles or problem.place_costs)
+    )
 
 
 class Ends(Step):

@@ -141,10 +141,17 @@ def _facts(result: PlanResult) -> list[Fact]:
             margin=result.problem.margin,
             error=None if error is None else (error.position_m, error.heading_rad),
         ),
+        *_passed(result),
         Fact(label="turning points", value=turns, heads=False),
         *effort_facts(result.timing_s, result.counts),
         Fact(label="notes", value="; ".join(result.notes), heads=False),
     ]
+
+
+def _passed(result: PlanResult) -> list[Fact]:
+    """When each pose on the way is passed."""
+    told = ", ".join(f"{one.number} at {one.time:.4g} s" for one in result.via)
+    return [Fact(label="on the way", value=told, heads=False)] if told else []
 
 
 def tables(result: PlanResult) -> list[Table]:

@@ -27,6 +27,7 @@ from maneuver_automaton.problem import (
     Horizon,
     Problem,
     SearchSettings,
+    Via,
     settled_state,
 )
 from maneuver_automaton.receding_horizon.simulation import Disturbance
@@ -181,6 +182,10 @@ def scenario_of_document(
         lambda: zones_of(document, file.zones, folder, fastest=fastest),
     )
     horizon = _horizon(document, file)
+    vias = []
+    for k, part in enumerate(file.via):
+        with at(document, ("via", k), about="via"):
+            vias.append(made(Via, part))
     with at(document, ()):
         problem = Problem(
             automaton,
@@ -205,6 +210,8 @@ def scenario_of_document(
             margin=file.margin_m,
             zones=zones,
             place_costs=places.costs,
+            via=tuple(vias),
+            order=file.order,
             **bodies,
         )
     return Scenario(

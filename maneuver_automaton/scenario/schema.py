@@ -21,6 +21,7 @@ from pydantic import (
     Tag,
     ValidationInfo,
     field_validator,
+    model_validator,
 )
 
 from maneuver_automaton.scenario.parts import (
@@ -42,6 +43,7 @@ from maneuver_automaton.scenario.parts import (
     need,
     one_or_many,
     optional,
+    told,
 )
 from maneuver_automaton.scenario.vehicles import VehiclePart
 
@@ -175,6 +177,37 @@ class GoalPart(FilePart):
     )
     tolerance_m: NotNegative = Field(0.0, description="distance that is near enough; 0: exact")
     tolerance_rad: NotNegative = Field(0.0, description="heading that is near enough; 0: exact")
+
+
+ViaPose = Annotated[
+    tuple[Number, ...],
+    Several("a pose [x, y, heading], or [x, y] with free_heading", at_least=2, at_most=4),
+]
+GatePoint = Annotated[
+    tuple[Number, ...], Several("a point [x, y], two numbers", at_least=2, at_most=3)
+]
+Gate = Annotated[
+    tuple[GatePoint, GatePoint], Several("a list of two points [x, y]", at_least=2, at_most=2)
+]
+
+
+class ViaPart(FilePart, title="Via"):
+    """What the plan passes on its way: a pose, or a gate."""
+
+    pose: ViaPose | None = optional("[x, y, heading]; of a gate it lies on it, for the heading")
+    free_heading: bool = Field(False, description="true: any heading will do")
+    tolerance_m: NotNegative = Field(0.0, description="distance that is near enough; 0: exact")
+    stop: bool = Field(False, description="true: it comes to rest there")
+    stay_s: NotNegative = Field(0.0, description="how long it stands there")
+    gate: Gate | None = optional("[[x, y], [x, y]]: a segment that is crossed anywhere")
+
+    @model_validator(mode="after")
+    def _somewhere(self) -> ViaPart:
+        if self.pose is None and self.gate is None:
+            raise told("got neither pose nor gate, need one of them")
+        if self.pose is not None and len(self.pose) == 2 and not self.free_heading:
+            raise told("got 2 numbers, need [x, y, heading], or free_heading: true", key="pose")
+        return self
 
 
 Goals = Annotated[
@@ -471,6 +504,7 @@ class ZonePart(FilePart):
 
 Obstacles = Annotated[tuple[ObstaclePart, ...], Several("a list of obstacles")]
 Zones = Annotated[tuple[ZonePart, ...], Several("a list of zones")]
+Vias = Annotated[tuple[ViaPart, ...], Several("a list of poses and gates on the way")]
 
 
 class ScenarioFile(FilePart):
@@ -492,6 +526,10 @@ class ScenarioFile(FilePart):
     margin_m: NotNegative = Field(0.0, description="distance kept from everything")
     obstacles: Obstacles = Field((), description="what the vehicle must not touch")
     zones: Zones = Field((), description="where not every motion is admitted")
+    via: Vias = Field((), description="poses and gates that are passed on the way")
+    order: Annotated[Literal["given", "free"], Need("given or free")] = Field(
+        "given", description="in which what is on the way is passed: given, or free, the best one"
+    )
     search: SearchPart = Field(default_factory=SearchPart, description="how to search")
     receding_horizon: RecedingHorizonPart | None = optional("only for mpc")
 

@@ -15,7 +15,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import relative
 from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
-from maneuver_automaton.problem import Horizon, Problem, Unstated
+from maneuver_automaton.problem import Horizon, Problem, Unstated, Via
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
 from maneuver_automaton.scenario.ground import stated_places
 from maneuver_automaton.scenario.parts import stated
@@ -27,6 +27,7 @@ from maneuver_automaton.scenario.schema import (
     HorizonPart,
     ScenarioFile,
     SearchPart,
+    ViaPart,
 )
 from maneuver_automaton.scenario.shapes import (
     stated_footprint,
@@ -129,6 +130,8 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
             if all(one is not file.walls for file in scenario.ground_files)
         ],
         "zones": [stated_zone(one) for one in problem.zones],
+        "via": [_via(one) for one in problem.via],
+        "order": problem.order if problem.order != "given" else None,
         "search": search | stated(SearchPart, problem.search),
     }
 
@@ -137,6 +140,18 @@ def _state(problem: Problem, state: Array | None) -> dict[str, float] | None:
     """A reduced state by the keys of a file."""
     keys = state_keys(problem.automaton.model.reduced_names).values()
     return None if state is None else dict(zip(keys, state.tolist(), strict=True))
+
+
+def _via(via: Via) -> dict[str, Any]:
+    """What is on the way; a gate whose heading is free needs no pose."""
+    free = via.gate is not None and via.free_heading
+    stop = via.stop and not via.stay_s
+    return stated(
+        ViaPart,
+        via,
+        stop=stop,
+        **({"pose": None, "free_heading": False} if free else {}),
+    )
 
 
 def _one_or_several(entries: list[Any]) -> Any:

@@ -37,7 +37,9 @@ NOTHING = PlaceArrays(
 )
 
 
-def place_arrays(problem: Problem, library: LatticeLibrary, frame: Array, box: Array) -> PlaceArrays:
+def place_arrays(
+    problem: Problem, library: LatticeLibrary, frame: Array, box: Array
+) -> PlaceArrays:
     """What places cost within a box (4,), seen from a frame (3,); of what is beyond, the border.
 
     The first clearance is that of the body that there is, whatever its parts. All other costs are

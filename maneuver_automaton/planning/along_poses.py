@@ -1,0 +1,783 @@
+"""Plans along poses on the way: one search over what was passed and how the vehicle arrived there.
+
+An arrival is a pose at which a pose on the way is passed, and the trim in which it is: one, or many
+where the heading, the place or the trim is free. Between two arrivals lies a leg: a problem without
+poses on the way, whose exact plan `answer` finds. Legs are estimated at first. The cheapest way
+through the arrivals, by dynamic programming over what was passed, has its legs planned; what they
+cost takes the place of the estimates, until the cheapest way is all planned. Then free headings and
+places are varied continuously, both neighbouring legs planned again, and each leg gets more time.
+Plans are checked and priced as a whole: prices of switches count once.
+
+Source: Dellin, Srinivasa (2016), *A unifying formalism for shortest path problems with expensive
+edge evaluations via lazy best-first search over paths with edge selectors*; Held, Karp (1962), *A
+dynamic programming approach to sequencing problems*.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.cutting import joined
+from maneuver_automaton.automaton.headings import posed
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.planning.blocked import (
+    blocked_ends,
+    goals_off_lattice,
+    why_goal_blocked,
+    why_off_lattice,
+)
+from maneuver_automaton.planning.bounds import straight_bound
+from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, Step
+from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
+from maneuver_automaton.primitives import Trim
+from maneuver_automaton.problem import Goal, Problem, Via
+from maneuver_automaton.search.lattice_goals import nodes_within
+from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.words._kernels_steering import steer_batch
+from maneuver_automaton.words.library import most_different, moving_trims
+
+HEADINGS = 12  # that stand for a free one at least, beside those along the lines to neighbours
+MOST_HEADINGS = 144  # the same where legs are estimated in a moment
+MOST_ESTIMATES = 2_000_000  # words of three trims that are tried in all to estimate legs
+ALONG_GATE = (0.5, 0.2, 0.8)  # shares of a gate at which it is crossed at first
+AROUND = 4  # places at the rim of a tolerance
+MOST_SPEEDS = 3  # straight trims in which a vehicle with inertia passes, beside rest
+LEG_SHARE = 0.2  # of the time left, for a leg that is planned for the first time
+SEARCHED = 0.4  # of the time, for the search over arrivals
+VARIED = 0.6  # of the time left then, for free headings and places
+GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+FINE = 1e-4  # of a heading or place, as a share of where it was looked for, at the last
+MOST_LETTERS = 7  # trims of which words are tried to estimate a leg
+STEERED = 1e-12  # relative, for circles that touch
+NEARLY = 1e-6  # [rad, s] of a turn that is none
+GAIN = 1e-7  # share of a cost that is a gain
+GOAL = -1  # number of the goal among poses on the way
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arrival:
+    """How a pose on the way is passed: where, and in which trim."""
+
+    pose: Array  # (dof,)
+    trim: str | None = None  # rest, or any for a vehicle that switches at will
+
+    @property
+    def key(self) -> tuple[bytes, str | None]:
+        """Equal for equal arrivals."""
+        return self.pose.tobytes(), self.trim
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Chain:
+    """A plan from the start through some arrivals; with the goal at its end it is whole."""
+
+    plan: Plan
+    cost: float = 0.0
+    passed: tuple[int, ...] = ()  # numbers of the poses on the way, in order
+    arrivals: tuple[Arrival, ...] = ()
+    legs: tuple[PlanResult, ...] = ()
+    goal_index: int | None = None
+
+    @property
+    def mask(self) -> int:
+        """The poses on the way that were passed, as bits."""
+        return sum(1 << k for k in self.passed)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AlongPoses(Step):
+    """Plans that pass the poses on the way of a problem, by `answer` to problems without."""
+
+    answer: Answer
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Always: each leg has a moment."""
+        return True
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer a first plan, then the best of the search, then what varying it gains."""
+        problem, budget, ended = found.problem, found.budget, found.ended
+        ended.is_complete = True
+        between = replace(problem, via=(), order="given")
+        for why in (blocked_ends, goals_off_lattice):
+            verdict = None if problem.has_tolerance else why(between)
+            if verdict is not None:
+                ended.verdict = replace(verdict, problem=problem)
+                return
+        ways = []
+        for k, via in enumerate(problem.via):
+            arrivals, said = arrivals_of(problem, k)
+            if said is not None:
+                ended.why = said[0], f"pose {k + 1} on the way: {said[1]}"
+                return
+            ways.append(Way(via, arrivals))
+        search = _Search(found, _Legs(found, between, self.answer), ways)
+        best = search.best(budget.before((1.0 - SEARCHED) * budget.left))
+        if best is not None and found.wants_more:
+            best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
+            search.with_more_time(best)
+        if not found.plans:
+            ended.why = search.why_none()
+            return
+        ended.bound = search.bound()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Way:
+    """A pose on the way, and the arrivals that stand for it in the search."""
+
+    via: Via
+    arrivals: tuple[Arrival, ...]
+
+    @property
+    def is_sole(self) -> bool:
+        """Whether there is one way to pass it, and no other."""
+        return len(self.arrivals) == 1 and not (self.via.free_heading or self.via.radius)
+
+    @property
+    def around(self) -> Goal:
+        """A goal that is met wherever and however it is passed."""
+        free = self.via.free_heading
+        return Goal(pose=self.via.pose, free_heading=free, tolerance_m=self.via.radius)
+
+
+@dataclass(slots=True, eq=False)
+class _Legs:
+    """Plans between arrivals, each planned once."""
+
+    found: Incumbents
+    between: Problem  # without poses on the way
+    answer: Answer
+    known: dict[tuple[object, ...], PlanResult] = field(default_factory=dict)
+    spent: int = 0  # expansions
+    middle: Problem = field(init=False)  # of a leg to a pose on the way
+    last: Problem = field(init=False)  # of the leg to a goal
+
+    def __post_init__(self) -> None:
+        stays = replace(self.between.horizon, stay=False)
+        self.last = replace(self.between, start_trim=None, start_state=None)
+        self.middle = replace(self.last, goals=self.between.start, horizon=stays)
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether a leg depends on what was driven before it."""
+        horizon = self.between.horizon
+        limited = horizon.max_time is not None or horizon.max_trims is not None
+        return self.between.moves or limited
+
+    def is_over(self, budget: Budget) -> bool:
+        """Whether no leg may be planned any more."""
+        most = self.between.search.max_expansions
+        return budget.is_over or (most is not None and self.spent >= most)
+
+    def question(self, chain: Chain, to: Arrival | None) -> Problem:
+        """The problem of a leg from the end of a chain to an arrival, or to the goals."""
+        here = chain.arrivals[-1] if chain.arrivals else None
+        base = self.last if to is None else self.middle
+        pose = self.between.start if here is None else here.pose
+        trim = self.between.start_trim if here is None else here.trim
+        goals = self.between.goals if to is None else (Goal(to.pose, trim=to.trim),)
+        horizon, plan = base.horizon, chain.plan
+        if horizon.max_time is not None:
+            horizon = replace(horizon, max_time=max(horizon.max_time - plan.duration, LEAST_TIME))
+        if horizon.max_trims is not None and plan.trims:
+            left = horizon.max_trims - int((plan.durations > 0.0).sum()) + 1  # of equal ones one
+            horizon = replace(horizon, max_trims=max(left, 1))
+        leg = base.starting_at(
+            pose,
+            time=plan.start_time + plan.duration,
+            goals=goals,
+            trim=trim,
+            horizon=horizon if self.is_timed else None,
+        )
+        state = self.between.start_state if here is None else None
+        return leg if state is None else replace(leg, start_state=state)
+
+    def planned(
+        self, chain: Chain, to: Arrival | None, budget: Budget, *, more: bool = False
+    ) -> PlanResult | None:
+        """The answer for a leg; None where there is no time for it. It looks for `more`."""
+        ends = (chain.arrivals[-1].key if chain.arrivals else None, to and to.key)
+        before = (chain.plan.duration, len(chain.plan.trims)) if self.is_timed else ()
+        key = (*ends, *before)
+        known = self.known.get(key)
+        if known is not None and not more:
+            return known
+        if self.is_over(budget):
+            return known
+        question = self.question(chain, to)
+        most = self.between.search.max_expansions
+        if most is not None:
+            most = max(1, most // (1 + len(self.found.problem.via)))
+        search = replace(question.search, improve=more and question.search.improve)
+        question = replace(question, search=replace(search, max_expansions=most))
+        part = budget if more else budget.part(LEG_SHARE, at_least=LEAST_TIME)
+        part = replace(part, shows=None, watch=None, expansions=most)
+        result = self.answer(question, part, self.found.workspace, alternatives=0)
+        self.spent += result.counts.get("expansions", 0)
+        self.found.counts.update(result.counts)
+        if known is None or known.cost is None or (result.cost or math.inf) < known.cost:
+            self.known[key] = result
+        return self.known[key]
+
+
+@dataclass(eq=False)
+class _Search:
+    """The search over what was passed and how."""
+
+    found: Incumbents
+    legs: _Legs
+    ways: Sequence[Way]
+    failed: dict[tuple[int, int], PlanResult] = field(default_factory=dict)
+    is_proven: bool = False  # no other arrivals of those searched are cheaper
+    numbers: dict[tuple[int, object], int] = field(init=False)  # of arrivals, by way and key
+    arrivals: list[tuple[int, Arrival]] = field(init=False)  # all of them, with their way
+    costs: Array = field(init=False)  # (A + 1, A + 1) of legs: estimates until they are planned
+    bounds: Array = field(init=False)  # (n + 1, n + 1) the same between ways: nothing is cheaper
+
+    def __post_init__(self) -> None:
+        n, middle, goals = len(self.ways), self.legs.middle, self.legs.between.goals
+        self.arrivals = [(k, to) for k, way in enumerate(self.ways) for to in way.arrivals]
+        self.numbers = {(k, to.key): a for a, (k, to) in enumerate(self.arrivals)}
+        self.bounds = np.zeros((n + 1, n + 1))
+        for i, k in self._pairs():
+            ends = goals if k == n else (self.ways[k].around,)
+            begin = None if i == n else self.ways[i].around
+            self.bounds[i, k] = min(_set_bound(middle, begin, end) for end in ends)
+        self.costs = np.full((len(self.arrivals) + 1,) * 2, np.inf)
+        rows: list[list[int]] = [[] for _ in range(n)]
+        for a, (k, _) in enumerate(self.arrivals):
+            rows[k].append(a)
+        rows.append([len(self.arrivals)])
+        poses = [*(to.pose for _, to in self.arrivals), self.found.problem.start]
+        for i, k in self._pairs():
+            begins = np.array([poses[a] for a in rows[i]])
+            ends = [*goals] if k == n else [Goal(poses[a]) for a in rows[k]]
+            priced = _estimates(middle, begins, ends)
+            if k == n:
+                priced = priced.min(axis=1, keepdims=True)
+            self.costs[np.ix_(rows[i], rows[k])] = np.maximum(priced, self.bounds[i, k])
+
+    def _pairs(self) -> Iterator[tuple[int, int]]:
+        """Which ways may follow each other; n is the start of a pair, or the goal at its end."""
+        n = len(self.ways)
+        for i, k in itertools.product(range(n + 1), repeat=2):
+            if (k == (i + 1) % (n + 1)) if self.in_order else (i != k or n == 0):
+                yield i, k
+
+    @property
+    def in_order(self) -> bool:
+        """Whether the poses on the way are passed in the order given."""
+        return self.found.problem.order == "given"
+
+    def best(self, budget: Budget) -> Chain | None:
+        """The cheapest whole chain of the arrivals, as far as the time lets their legs be planned.
+
+        The cheapest by what is known and estimated is planned; what that takes is known then.
+        """
+        best: Chain | None = None
+        while not self.legs.is_over(budget) or best is None:
+            least, chosen = self._cheapest()
+            if least == math.inf or (best and least >= best.cost * (1.0 - GAIN)):
+                self.is_proven = best is not None
+                break
+            before = self.costs.copy()
+            chain = self.driven(chosen, budget)
+            if (
+                chain is not None
+                and (best is None or chain.cost < best.cost)
+                and self._offer(chain)
+            ):
+                best = chain
+            if np.array_equal(before, self.costs):
+                self.is_proven = best is not None
+                break
+            if not self.found.wants_more and (best or self.legs.is_over(self.found.budget)):
+                break
+        return best
+
+    def _cheapest(self) -> tuple[float, list[tuple[int, Arrival]]]:
+        """The cheapest way through the arrivals by what legs cost or are estimated to."""
+        of_way = np.array([k for k, _ in self.arrivals])
+        remains = _remaining(self.costs, of_way, self._stays, in_order=self.in_order)
+        at, mask, chosen = len(self.arrivals), 0, list[tuple[int, Arrival]]()
+        while len(chosen) < len(self.ways):
+            after = _following(remains, mask, of_way, self._stays, in_order=self.in_order)
+            at = int(np.argmin(self.costs[at, :-1] + after))
+            chosen.append(self.arrivals[at])
+            mask |= 1 << int(of_way[at])
+        return float(remains[0][-1]), chosen
+
+    @functools.cached_property
+    def _stays(self) -> Array:
+        """Cost (n,) of standing at each pose on the way."""
+        problem = self.found.problem
+        rest = problem.automaton.rest
+        rate = 0.0 if rest is None else float(problem.rates[rest])
+        return np.array([rate * way.via.stay_s for way in self.ways])
+
+    def _extended(self, chain: Chain, k: int, to: Arrival | None, budget: Budget) -> Chain | None:
+        """A chain and one leg more, to a pose on the way or the goal; None where there is none."""
+        result = self.legs.planned(chain, to, budget)
+        if result is None:
+            return None
+        self._learn(chain, k, to, result)
+        if result.plan is None:
+            last = chain.passed[-1] if chain.passed else GOAL
+            self.failed.setdefault((last, k), result)
+            return None
+        return self._with_leg(chain, k, to, result)
+
+    def _learn(self, chain: Chain, k: int, to: Arrival | None, result: PlanResult) -> None:
+        """Keep what a leg costs, and its bound if it is that of all plans between two ways."""
+        n, every = len(self.ways), len(self.arrivals)
+        last = chain.passed[-1] if chain.passed else n
+        row = self.numbers.get((last, chain.arrivals[-1].key)) if chain.arrivals else every
+        column = every if to is None else self.numbers.get((k, to.key))
+        if row is not None and column is not None:
+            self.costs[row, column] = math.inf if result.cost is None else result.cost
+        sole = all(self.ways[i].is_sole for i in (last, k) if i not in (GOAL, n))
+        if sole and result.lower_bound is not None and not self.legs.is_timed:
+            at = last, n if to is None else k
+            self.bounds[at] = max(self.bounds[at], result.lower_bound)
+
+    def _with_leg(self, chain: Chain, k: int, to: Arrival | None, result: PlanResult) -> Chain:
+        assert result.plan is not None
+        plan = _joined(chain.plan, result.plan)
+        if to is None:
+            return replace(
+                chain,
+                plan=plan,
+                cost=self.legs.between.cost_of(plan),
+                legs=(*chain.legs, result),
+                goal_index=result.goal_index,
+            )
+        stay = self.ways[k].via.stay_s
+        if stay:
+            plan = _joined(plan, self._standing(plan, stay))
+        return Chain(
+            plan,
+            self.legs.between.cost_of(plan),
+            (*chain.passed, k),
+            (*chain.arrivals, to),
+            (*chain.legs, result),
+        )
+
+    def _standing(self, plan: Plan, seconds: float) -> Plan:
+        """A plan that stands where another one ends."""
+        automaton = self.found.problem.automaton
+        rests = plan.trims and plan.trims[-1].is_rest
+        rest = plan.trims[-1] if rests else automaton.trims[automaton.rest or 0]
+        return Plan(plan.end, (rest,), durations=[seconds])
+
+    def _offer(self, chain: Chain) -> bool:
+        """Offer a whole chain; whether it passes the checks."""
+        assert chain.goal_index is not None
+        passed = self.found.may_check and self.found.offer(chain.plan, chain.goal_index)
+        if passed:
+            return True
+        again = self._from_its_ends(chain)
+        return again is not None and self.found.offer(again, chain.goal_index)
+
+    def _from_its_ends(self, chain: Chain) -> Plan | None:
+        """The legs planned once more, each from the very end of the one before it.
+
+        What each misses its end by, some 1e-12, would turn what follows.
+        """
+        goal, plan = self.found.problem.goals[chain.goal_index or 0], chain.plan
+        if max(goal.off(plan.end)) <= max(goal.tolerance_m, goal.tolerance_rad, 1e-10):
+            return None
+        begun = self._begun()
+        for k, to in (*zip(chain.passed, chain.arrivals, strict=True), (GOAL, None)):
+            if begun.arrivals:
+                here = replace(begun.arrivals[-1], pose=begun.plan.end)
+                begun = replace(begun, arrivals=(*begun.arrivals[:-1], here))
+            result = self.legs.planned(begun, to, self.found.budget)
+            if result is None or result.plan is None:
+                return None
+            begun = self._with_leg(begun, k, to, result)
+        return begun.plan
+
+    def _begun(self) -> Chain:
+        """A chain of nothing, at the start."""
+        problem = self.found.problem
+        return Chain(Plan(problem.start, (), durations=[], start_time=problem.start_time))
+
+    def driven(self, chosen: Sequence[tuple[int, Arrival]], budget: Budget) -> Chain | None:
+        """The whole chain through some arrivals; None where a leg is not found."""
+        found: Chain | None = self._begun()
+        for k, to in (*chosen, (GOAL, None)):
+            assert found is not None
+            found = self._extended(found, k, to, budget)
+            if found is None:
+                return None
+        return found
+
+    def varied(self, chain: Chain, budget: Budget) -> Chain:
+        """The chain with other arrivals, then with headings and places varied continuously."""
+        best, gained, first = chain, True, True
+        while gained and not self.legs.is_over(budget):
+            before = best.cost
+            for n in range(len(best.passed)):
+                if first and not self.is_proven:
+                    best = self._other_arrival(best, n, budget)
+                best = self._varied_at(best, n, budget)
+            gained = best.cost < before * (1.0 - GAIN)
+            first = False
+            if gained:
+                self._offer(best)
+        return best
+
+    def _other_arrival(self, best: Chain, n: int, budget: Budget) -> Chain:
+        """The cheapest chain in which one arrival may be another of the same trim, or pose."""
+        here = best.arrivals[n]
+        others = [
+            to
+            for to in self.ways[best.passed[n]].arrivals
+            if (to.trim == here.trim) != np.array_equal(to.pose, here.pose)
+        ]
+        for to in sorted(others, key=lambda one: float(np.abs(one.pose - here.pose).sum())):
+            if self.legs.is_over(budget):
+                break
+            best = min((best, self._with(best, n, to, budget)), key=_price)
+        return best
+
+    def _with(self, chain: Chain, n: int, to: Arrival, budget: Budget) -> Chain | None:
+        """A chain with another arrival."""
+        arrivals = (*chain.arrivals[:n], to, *chain.arrivals[n + 1 :])
+        return self.driven(list(zip(chain.passed, arrivals, strict=True)), budget)
+
+    def _varied_at(self, best: Chain, n: int, budget: Budget) -> Chain:
+        """The chain with one arrival varied along each direction in which it is free."""
+        problem, way = self.found.problem, self.ways[best.passed[n]]
+        if problem.automaton.lattice is not None or problem.automaton.translated is not None:
+            return best
+        for moved, reach in _freedoms(problem, way.via):
+            here, tried = best, dict[float, Chain | None]()
+
+            def price(
+                by: float,
+                here: Chain = here,
+                moved: Callable[[Array, float], Array] = moved,
+                tried: dict[float, Chain | None] = tried,
+            ) -> float:
+                to = replace(here.arrivals[n], pose=moved(here.arrivals[n].pose, by))
+                tried[by] = self._with(here, n, to, budget)
+                return _price(tried[by])
+
+            if self.legs.is_over(budget):
+                break
+            at = golden_section(price, -reach, reach, lambda: self.legs.is_over(budget))
+            best = min((best, tried.get(at)), key=_price)
+        return best
+
+    def with_more_time(self, chain: Chain) -> None:
+        """Offer the chain with its legs planned once more, each with its share of the time left."""
+        ends = (*zip(chain.passed, chain.arrivals, strict=True), (GOAL, None))
+        begun, gained = self._begun(), False
+        for n, ((k, to), leg) in enumerate(zip(ends, chain.legs, strict=True)):
+            left = self.found.for_better
+            better: PlanResult | None = leg
+            if leg.bound is None or not leg.bound.optimal:
+                part = left.part(1.0 / (len(ends) - n), at_least=LEAST_TIME)
+                better = self.legs.planned(begun, to, part, more=True)
+            if better is None or better.plan is None:
+                better = leg
+            gained |= better is not leg
+            self._learn(begun, k, to, better)
+            begun = self._with_leg(begun, k, to, better)
+        if gained:
+            self._offer(begun)
+
+    def bound(self) -> LowerBound:
+        """No plan is cheaper: the sum of the bounds of legs, in the best order."""
+        ways = np.arange(len(self.ways))
+        remains = _remaining(self.bounds, ways, self._stays, in_order=self.in_order)
+        return LowerBound(value=max(0.0, float(remains[0][-1])), kind="distance")
+
+    def why_none(self) -> tuple[PlanStatus, str]:
+        """How it ended without a plan, and why."""
+        found = self.found
+        if found.why_refused and not self.failed:
+            return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
+        if not self.failed or found.budget.is_over:
+            late = found.why_unchecked or f"no plan within {found.budget.seconds:.4g} s"
+            return PlanStatus.OUT_OF_BUDGET, late
+        (last, k), result = max(self.failed.items(), key=lambda one: one[0][0])
+        begin = "the start" if last == GOAL else f"pose {last + 1} on the way"
+        end = "the goal" if k == GOAL else f"pose {k + 1} on the way"
+        sole = all(self.ways[i].is_sole for i in (last, k) if i != GOAL) and self.in_order
+        status = result.status if sole else PlanStatus.NO_PLAN
+        return status, f"from {begin} to {end}: {result.reason}"
+
+
+def arrivals_of(
+    problem: Problem, number: int
+) -> tuple[tuple[Arrival, ...], tuple[PlanStatus, str] | None]:
+    """The arrivals that stand for a pose on the way, or why there is none: a status, a sentence."""
+    via, automaton = problem.via[number], problem.automaton
+    around = Goal(via.pose, free_heading=via.free_heading, tolerance_m=via.radius)
+    if automaton.lattice is not None:
+        nodes = [one for one in nodes_within(problem, around) if max(via.off(one.pose)) <= 1e-9]
+        if not nodes:
+            said = why_off_lattice(problem, replace(around, tolerance_m=via.tolerance_m))
+            return (), (PlanStatus.NO_PLAN, _about(said or "no node of the lattice is on it"))
+        found = [Arrival(one.pose, one.trim) for one in nodes]
+    elif automaton.translated is not None:
+        found = [
+            Arrival(pose, trim)
+            for place in _places(via)
+            for pose, trim in posed(automaton, place, "via", free=via.free_heading)
+        ]
+    else:
+        poses = [
+            _with_heading(place, heading)
+            for place in _places(via)
+            for heading in _headings(problem, number)
+        ]
+        found = [Arrival(pose, trim) for pose in poses for trim in _trims(problem, via)]
+    said = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
+    if all(said):
+        proven = len(found) == 1 and not via.radius
+        status = PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN
+        return (), (status, _about(said[0]))
+    free = (one for one, why in zip(found, said, strict=True) if not why)
+    return tuple(free), None
+
+
+def _about(said: str) -> str:
+    """What is said of a goal, said of a pose on the way."""
+    return said.replace("at the goal ", "").replace("the goal is", "it is")
+
+
+def _places(via: Via) -> Iterator[Array]:
+    """Poses (dof,) at its places, with the heading that is stated; its own pose first."""
+    places = [0, 1, *range(3, via.pose.size)]
+    if via.gate is None:
+        yield via.pose
+    else:
+        for share in ALONG_GATE:
+            pose = np.array(via.pose)
+            pose[places] = via.gate[0] + share * (via.gate[1] - via.gate[0])
+            yield pose
+    for k in range(AROUND if via.tolerance_m else 0):
+        angle = 2.0 * math.pi * k / AROUND
+        pose = np.array(via.pose)
+        pose[:2] += (1.0 - GAIN) * via.tolerance_m * np.array([math.cos(angle), math.sin(angle)])
+        yield pose
+
+
+def _with_heading(pose: Array, heading: float) -> Array:
+    turned = np.array(pose)
+    turned[2] = heading
+    return turned
+
+
+def _headings(problem: Problem, number: int) -> list[float]:
+    """Headings at a pose on the way: its own, or along the lines to neighbours and all around."""
+    via = problem.via[number]
+    if not via.free_heading:
+        return [float(via.pose[2])]
+    automaton = problem.automaton
+    turns = automaton.body_velocities[:, 2].any() or any(
+        one.displacement[2] for one in automaton.maneuvers
+    )
+    if not turns:
+        return [float(problem.start[2])]
+    ends = [problem.start, *(one.pose for one in problem.via), problem.goals[0].pose]
+    before, here, after = ends[number : number + 3]
+    lines = [after - before, here - before, after - here]
+    angles = [math.atan2(line[1], line[0]) for line in lines if line[:2].any()]
+    if problem.order == "free":
+        angles = angles[:1]
+    first = angles[0] if angles else float(problem.start[2])
+    count = _headings_tried(problem)
+    angles += [first + 2.0 * math.pi * k / count for k in range(count)]
+    return list(dict.fromkeys(math.remainder(angle, 2.0 * math.pi) for angle in angles))
+
+
+def _headings_tried(problem: Problem) -> int:
+    """How many headings stand for a free one: more where a leg is estimated in a moment."""
+    if problem.has_inertia or problem.start.size != 3:
+        return HEADINGS
+    n = len(problem.via)
+    letters = len(moving_trims(problem.automaton, problem.cost).twists)
+    legs = (n + 1) * (1 if problem.order == "given" else n) * min(letters, MOST_LETTERS) ** 3
+    places = max(sum(1 for _ in _places(via)) for via in problem.via)
+    return int(np.clip(math.sqrt(MOST_ESTIMATES / legs) / places, HEADINGS, MOST_HEADINGS))
+
+
+def _trims(problem: Problem, via: Via) -> list[str | None]:
+    """Trims in which a pose on the way may be passed, None for rest, or for switching at will."""
+    automaton = problem.automaton
+    if not problem.has_inertia or via.stop:
+        return [None]
+    moving = [trim for trim in automaton.trims if not trim.is_rest]
+    straight = [trim for trim in moving if not trim.body_velocity[2]] or moving
+
+    def speed(trim: Trim) -> float:
+        return float(np.linalg.norm(trim.body_velocity[[0, 1, *range(3, problem.start.size)]]))
+
+    ahead = sorted((one for one in straight if one.body_velocity[0] >= 0.0), key=speed)
+    few = ahead[:: -max(1, math.ceil(len(ahead) / MOST_SPEEDS))]
+    rest: list[str | None] = [None] if automaton.rest is not None else []
+    return rest + [trim.name for trim in few]
+
+
+def _freedoms(
+    problem: Problem, via: Via
+) -> Iterator[tuple[Callable[[Array, float], Array], float]]:
+    """How a pose may be moved within what a pose on the way admits, and how far at first."""
+    places = [0, 1, *range(3, via.pose.size)]
+
+    def turned(pose: Array, by: float) -> Array:
+        return _with_heading(pose, pose[2] + by)
+
+    def along(direction: Array) -> Callable[[Array, float], Array]:
+        def shifted(pose: Array, by: float) -> Array:
+            to = np.array(pose)
+            to[places] += by * direction
+            if via.gate is not None and not via.tolerance_m:
+                way = via.gate[1] - via.gate[0]
+                share = min(1.0, max(0.0, float((to[places] - via.gate[0]) @ way / (way @ way))))
+                to[places] = via.gate[0] + share * way
+                return to
+            beyond = via.offs(to)[0]
+            off = to[places] - via.place
+            if beyond > 0.0 and via.gate is None:
+                to[places] = via.place + off * (
+                    (1.0 - GAIN) * via.tolerance_m / np.linalg.norm(off)
+                )
+            return pose if beyond > 0.0 and via.gate is not None else to
+
+        return shifted
+
+    if via.free_heading and problem.automaton.body_velocities[:, 2].any():
+        yield turned, 2.0 * math.pi / _headings_tried(problem)
+    if via.gate is not None:
+        length = float(np.linalg.norm(via.gate[1] - via.gate[0]))
+        yield along((via.gate[1] - via.gate[0]) / length), length / 2.0
+    if via.tolerance_m:
+        for direction in np.eye(len(places)):
+            yield along(direction), via.tolerance_m
+
+
+def golden_section(
+    price: Callable[[float], float], low: float, high: float, is_over: Callable[[], bool]
+) -> float:
+    """Where a function of one number is least, as far as it falls and then rises.
+
+    Examples
+    --------
+    >>> round(golden_section(lambda x: (x - 0.3) ** 2, -1.0, 1.0, lambda: False), 3)
+    0.3
+    """
+    width = FINE * (high - low)
+    one, other = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    prices = price(one), price(other)
+    while high - low > width and not is_over():
+        if prices[0] <= prices[1]:
+            high, other = other, one
+            one = high - GOLDEN * (high - low)
+            prices = price(one), prices[0]
+        else:
+            low, one = one, other
+            other = low + GOLDEN * (high - low)
+            prices = prices[1], price(other)
+    return one if prices[0] <= prices[1] else other
+
+
+def _set_bound(problem: Problem, way: Goal | None, goal: Goal) -> float:
+    """No leg costs less that begins within the tolerance of a pose, or at the start."""
+    if way is None:
+        return _least(problem, goal)
+    free = goal.free_heading or way.free_heading
+    to = replace(goal, free_heading=free, tolerance_m=goal.tolerance_m + way.tolerance_m)
+    return _least(problem.starting_at(way.pose, time=problem.start_time), to)
+
+
+def _least(problem: Problem, goal: Goal) -> float:
+    """No plan to a goal costs less, whatever its trims: by distance and turn alone."""
+    if problem.has_inertia:
+        return straight_bound(problem, (goal,))
+    return closed_bound(problem, goal)
+
+
+def _price(chain: Chain | None) -> float:
+    return math.inf if chain is None else chain.cost
+
+
+def _estimates(problem: Problem, begins: Array, ends: Sequence[Goal]) -> Array:
+    """What legs (m, n) from poses (m, dof) to goals cost about, where nothing is in the way.
+
+    For a vehicle that switches at will in a plane, the cheapest word of three trims; else a bound.
+    """
+    exact = not any(one.free_heading or one.tolerance_m or one.tolerance_rad for one in ends)
+    if problem.has_inertia or begins.shape[1] != 3 or not exact:
+        heres = [problem.starting_at(begin, time=problem.start_time) for begin in begins]
+        return np.array([[_least(here, end) for end in ends] for here in heres])
+    library = moving_trims(problem.automaton, problem.cost)
+    few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
+    twists, rates = library.twists[few][:, :3].copy(), library.rates[few]
+    words = np.array(list(itertools.product(range(len(few)), repeat=3)), dtype=np.int64)
+    goals = np.array([one.pose for one in ends])
+    seen = (SE2(begins[:, None]).inverse() @ SE2(goals[None])).pose.reshape(-1, 3)
+    k = len(seen)
+    times = steer_batch(
+        twists,
+        np.repeat(words, k, axis=0),
+        np.zeros((len(words) * k, 2, 3)),
+        np.tile(seen, (len(words), 1)),
+        STEERED,
+    ).reshape(len(words), k, 2, 3)
+    turns = np.abs(twists[words, 2])[:, None, None]
+    times = np.where(times * turns > 2.0 * math.pi - NEARLY, 0.0, times)
+    times = np.where(times < -NEARLY, np.nan, times)
+    sums = (times * rates[words][:, None, None]).sum(axis=-1)
+    least = np.where(np.isnan(sums), np.inf, sums).min(axis=(0, 2))
+    return np.where(np.isfinite(least), least, 0.0).reshape(len(begins), len(ends))
+
+
+def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) -> dict[int, Array]:
+    """The least cost (A + 1,) from every arrival to the goal, by what was passed: the last, start.
+
+    Costs (A + 1, A + 1) are those of legs from arrivals, the last row from the start, to arrivals,
+    the last column to the goal; what was passed is written in bits.
+    """
+    n = len(stays)
+    remains = {(1 << n) - 1: costs[:, -1]}
+    masks = [(1 << k) - 1 for k in range(n)] if in_order else range((1 << n) - 1)
+    for mask in reversed(masks):
+        after = _following(remains, mask, of_way, stays, in_order=in_order)
+        remains[mask] = (costs[:, :-1] + after).min(axis=1)
+    return remains
+
+
+def _following(
+    remains: dict[int, Array], mask: int, of_way: IntArray, stays: Array, *, in_order: bool
+) -> Array:
+    """What follows (A,) once each arrival comes next; inf for one that may not."""
+    after = np.full(len(of_way), np.inf)
+    left = [k for k in range(len(stays)) if not mask >> k & 1]
+    for k in left[:1] if in_order else left:
+        rows = of_way == k
+        after[rows] = stays[k] + remains[mask | 1 << k][:-1][rows]
+    return after
+
+
+def _joined(first: Plan, second: Plan) -> Plan:
+    """One plan after another; either may be nothing at all."""
+    if not second.trims:
+        return first
+    if not first.trims:
+        return replace(second, start=first.start, start_time=first.start_time)
+    return joined(first, second)

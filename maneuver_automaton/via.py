@@ -1,0 +1,265 @@
+"""Poses on the way: what a plan passes between its start and its goal, and when it does."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
+from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import check_heading, check_size
+from maneuver_automaton.groups import LieGroup
+
+MET = 1e-9  # [m, rad] from a pose on the way, beyond its tolerance, as of goals
+FINER = 8  # parts of a stretch of time in which a nearest instant is sought, again and again
+FINEST = 1e-14  # of the time of a plan, at which that ends
+STILL = 1e-9  # [m, rad] that a vehicle moves which stands
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Via:
+    """What a plan passes on its way: a pose, exactly or within a tolerance, or a gate.
+
+    Parameters
+    ----------
+    pose : (dof,) array, optional
+        [m, m, rad(, m)]; two numbers, the place in the plane, if any heading will do. Of a gate it
+        states the heading, and must lie on it.
+    free_heading : bool
+        Whether any heading will do.
+    tolerance_m : float
+        Distance [m] that is near enough.
+    stop : bool
+        Whether the vehicle comes to rest there. One that switches at will may stop for no time.
+    stay_s : float
+        How long [s] it stands there.
+    gate : two points, optional
+        Ends (2 or 3 numbers each) [m] of a segment that is to be crossed anywhere; without a pose
+        at any heading.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range, there is neither a pose nor a gate, or the pose is beside it.
+
+    Examples
+    --------
+    >>> Via([1, 2], free_heading=True).pose.tolist()
+    [1.0, 2.0, 0.0]
+    >>> Via(gate=[[0, 0], [2, 0]]).off(np.array([1.5, 0.5, 2.0]))
+    (0.5, 0.0)
+    """
+
+    pose: Array = None  # type: ignore[assignment]  # of a gate: its middle, the heading across
+    free_heading: bool = field(default=False, kw_only=True)
+    tolerance_m: float = field(default=0.0, kw_only=True)
+    stop: bool = field(default=False, kw_only=True)
+    stay_s: float = field(default=0.0, kw_only=True)
+    gate: Array | None = field(default=None, kw_only=True)  # (2, 2 or 3) [m]
+
+    __repr__ = brief
+
+    if TYPE_CHECKING:  # any numbers will do
+
+        def __init__(
+            self,
+            pose: ArrayLike | None = None,
+            *,
+            free_heading: bool = False,
+            tolerance_m: float = 0.0,
+            stop: bool = False,
+            stay_s: float = 0.0,
+            gate: ArrayLike | None = None,
+        ) -> None: ...
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
+        if self.gate is not None:
+            self._check_gate()
+        elif self.pose is None:
+            raise ValueError("via: has neither a pose nor a gate, need one of them")
+        pose = as_array("via: pose", self.pose)
+        if pose.shape == (2,) and self.free_heading:
+            pose = np.append(pose, 0.0)
+        object.__setattr__(self, "pose", pose)
+        freeze(self, "pose", last=(2, 3, 4))
+        if self.pose.ndim != 1:
+            raise ValueError(f"via: pose has shape {self.pose.shape}, need one pose")
+        check_size("via: pose", self.place)
+        check_heading("via: pose", self.pose)
+        for name in ("tolerance_m", "stay_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise ValueError(f"via: {name} must be a number of at least 0, got {value}")
+        object.__setattr__(self, "stop", bool(self.stop or self.stay_s > 0.0))
+        if self.gate is None:
+            return
+        if self.gate.shape[1] != self.place.size:
+            raise ValueError(
+                f"via: gate: its ends have {self.gate.shape[1]} numbers, the place of the pose "
+                f"{self.place.size}; need as many"
+            )
+        beside = self.off(self.pose)[0]
+        if beside > 1e-6 * (1.0 + float(np.abs(self.gate).max())):
+            raise ValueError(
+                f"via: pose is {beside:.6g} m beside the gate, need one on it, whose heading is "
+                "that of the crossing"
+            )
+
+    def _check_gate(self) -> None:
+        """Two ends that are apart; without a pose the middle, with a heading across."""
+        gate = as_array("via: gate", self.gate)
+        if gate.shape not in ((2, 2), (2, 3)):
+            raise ValueError(f"via: gate has shape {gate.shape}, need two points [x, y]")
+        check_size("via: gate", gate)
+        along = gate[1] - gate[0]
+        if not along[:2].any():
+            raise ValueError(f"via: gate: its ends are both {gate[0].tolist()}, need two places")
+        object.__setattr__(self, "gate", gate)
+        freeze(self, "gate")
+        if self.pose is None:
+            middle = (gate[0] + gate[1]) / 2.0
+            across = math.atan2(along[0], -along[1])
+            object.__setattr__(self, "pose", np.insert(middle, 2, across))
+            object.__setattr__(self, "free_heading", True)
+
+    @property
+    def place(self) -> Array:
+        """Its place [m], of a gate that of its pose, without the heading."""
+        return self.pose[[0, 1, *range(3, self.pose.size)]]
+
+    @property
+    def radius(self) -> float:
+        """No place that will do is further from that of its pose [m]."""
+        reach = 0.0
+        if self.gate is not None:
+            reach = float(np.linalg.norm(self.gate - self.place, axis=1).max())
+        return reach + self.tolerance_m
+
+    def offs(self, poses: Array) -> tuple[Array, Array]:
+        """How far poses (..., dof) are off: distance beyond the tolerance [m] and turn [rad]."""
+        places = poses[..., [0, 1, *range(3, poses.shape[-1])]]
+        nearest: Array = self.place
+        if self.gate is not None:
+            along = self.gate[1] - self.gate[0]
+            share = np.clip((places - self.gate[0]) @ along / (along @ along), 0.0, 1.0)
+            nearest = self.gate[0] + share[..., None] * along
+        distance = np.maximum(np.linalg.norm(places - nearest, axis=-1) - self.tolerance_m, 0.0)
+        off = poses[..., 2] - self.pose[2]
+        turn = np.abs(off - 2.0 * math.pi * np.round(off / (2.0 * math.pi)))
+        return distance, np.zeros_like(turn) if self.free_heading else turn
+
+    def off(self, pose: Array) -> tuple[float, float]:
+        """How far a pose (dof,) is off: distance beyond the tolerance [m], and turn [rad]."""
+        distance, turn = self.offs(pose)
+        return float(distance), float(turn)
+
+    def moved(self, by: LieGroup) -> Via:
+        """The same, moved by the group element `by`."""
+        group = type(by)
+        gate = self.gate
+        if gate is not None:
+            ends = np.insert(gate, 2, 0.0, axis=1)
+            gate = np.delete((by @ group(ends)).pose, 2, axis=1)
+        return replace(self, pose=(by @ group(self.pose)).pose, gate=gate)
+
+    def shifted(self, by: Array) -> Via:
+        """The same, its place less `by` [m]: near an origin no digit is lost."""
+        pose = np.array(self.pose)
+        pose[[0, 1, *range(3, pose.size)]] -= by
+        return replace(self, pose=pose, gate=None if self.gate is None else self.gate - by)
+
+
+def instants_met(via: Via, times: Array, pose_at: Callable[[Array], Array]) -> list[float]:
+    """Times [s] at which poses meet a pose on the way: of `times` (n,), and the nearest between.
+
+    The distance and turn are least at an instant in the midst of three times; around it the times
+    are made finer until nothing is left between them.
+    """
+    off = np.add(*via.offs(pose_at(times)))
+    found = times[off <= MET].tolist()
+    padded = np.concatenate([[np.inf], off, [np.inf]])
+    lowest = (padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]) & (off > MET)
+    scale = FINEST * (1.0 + float(np.abs(times).max(initial=0.0)))
+    steps = np.diff(times)
+    for k in np.flatnonzero(lowest & (off < 2.0 * _reach(times, pose_at))).tolist():
+        low, high = times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)]
+        if not len(steps):
+            continue
+        while high - low > scale:
+            fine = np.linspace(low, high, 2 * FINER + 1)
+            off_fine = np.add(*via.offs(pose_at(fine)))
+            least = int(np.argmin(off_fine))
+            if off_fine[least] <= MET:
+                found.append(float(fine[least]))
+                break
+            low, high = fine[max(least - 1, 0)], fine[min(least + 1, 2 * FINER)]
+    return sorted(found)
+
+
+def _reach(times: Array, pose_at: Callable[[Array], Array]) -> float:
+    """The greatest change of a pose between neighbouring times, distance and turn [m, rad]."""
+    steps = np.abs(np.diff(pose_at(times), axis=0))
+    return float(steps.sum(axis=1).max(initial=0.0))
+
+
+def passages(
+    vias: Sequence[Via],
+    times: Array,
+    pose_at: Callable[[Array], Array],
+    rests: Callable[[float], bool],
+    *,
+    in_order: bool,
+) -> list[float | None]:
+    """When [s] each pose on the way is passed, as early as can be; None: it is missed.
+
+    Parameters
+    ----------
+    vias : sequence of Via
+    times : (n,) array
+        [s] between which the motion goes on smoothly, in small steps.
+    pose_at : callable
+        Poses (n, dof) at times (n,).
+    rests : callable
+        Whether the vehicle is at rest at a time, or may be.
+    in_order : bool
+        Whether they are to be passed one after the other.
+
+    Examples
+    --------
+    >>> along = lambda times: np.column_stack([times, 0 * times, 0 * times])
+    >>> ways = [Via([2, 0, 0]), Via(gate=[[0.5, -1], [0.5, 1]])]
+    >>> passages(ways, np.linspace(0, 3, 10), along, lambda time: False, in_order=False)
+    [2.0, 0.5]
+    >>> passages(ways, np.linspace(0, 3, 10), along, lambda time: False, in_order=True)
+    [2.0, None]
+    """
+    found: list[float | None] = []
+    earliest = -math.inf
+    for via in vias:
+        at = None
+        for time in instants_met(via, times, pose_at):
+            if time < earliest - MET or (via.stop and not rests(time)):
+                continue
+            last = time + via.stay_s
+            if via.stay_s and not _stands(pose_at, time, last, float(times[-1])):
+                continue
+            at = time
+            break
+        found.append(at)
+        if in_order and at is not None:
+            earliest = at + via.stay_s
+    return found
+
+
+def _stands(pose_at: Callable[[Array], Array], first: float, last: float, end: float) -> bool:
+    """Whether poses stay the same from one time to another [s]."""
+    if last > end + MET:
+        return False
+    poses = pose_at(np.linspace(first, min(last, end), FINER + 1))
+    return float(np.abs(poses - poses[0]).max()) <= STILL
