@@ -58,14 +58,18 @@ if TYPE_CHECKING:
     from maneuver_automaton.groups import SE2 as SE2
     from maneuver_automaton.groups import SE2xR as SE2xR
     from maneuver_automaton.groups import translations as translations
+    from maneuver_automaton.models import ArticulatedVehicle as ArticulatedVehicle
     from maneuver_automaton.models import Car as Car
     from maneuver_automaton.models import CarWithTrailer as CarWithTrailer
+    from maneuver_automaton.models import FourWheelSteeringCar as FourWheelSteeringCar
     from maneuver_automaton.models import Helicopter as Helicopter
     from maneuver_automaton.models import Hovercraft as Hovercraft
     from maneuver_automaton.models import Omnidirectional as Omnidirectional
+    from maneuver_automaton.models import RearSteeredCar as RearSteeredCar
     from maneuver_automaton.models import SecondOrderCar as SecondOrderCar
     from maneuver_automaton.models import SecondOrderUnicycle as SecondOrderUnicycle
     from maneuver_automaton.models import SingleTrack as SingleTrack
+    from maneuver_automaton.models import TractorWithTrailers as TractorWithTrailers
     from maneuver_automaton.models import Unicycle as Unicycle
     from maneuver_automaton.models import UserModel as UserModel
     from maneuver_automaton.places import Clearance as Clearance
@@ -108,6 +112,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 _HOMES = {
+    "ArticulatedVehicle": "models",
     "Automaton": "automaton",
     "Bounds": "problem",
     "Box": "collision",
@@ -125,6 +130,7 @@ _HOMES = {
     "FleetProblem": "fleet",
     "FleetResult": "fleet",
     "FleetScenario": "scenario",
+    "FourWheelSteeringCar": "models",
     "Goal": "problem",
     "Ground": "places",
     "Helicopter": "models",
@@ -143,6 +149,7 @@ _HOMES = {
     "PlanStatus": "planning",
     "Polygon": "collision",
     "Problem": "problem",
+    "RearSteeredCar": "models",
     "RecedingHorizon": "receding_horizon",
     "RoadScenario": "scenario",
     "RoadScene": "roads",
@@ -154,6 +161,7 @@ _HOMES = {
     "SecondOrderCar": "models",
     "SecondOrderUnicycle": "models",
     "SingleTrack": "models",
+    "TractorWithTrailers": "models",
     "Trajectory": "primitives",
     "Trim": "primitives",
     "Unicycle": "models",

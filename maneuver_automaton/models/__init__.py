@@ -1,5 +1,8 @@
 """Vehicles: how a reduced state and a control become a body velocity."""
 
+from maneuver_automaton.models.axles import ArticulatedVehicle as ArticulatedVehicle
+from maneuver_automaton.models.axles import FourWheelSteeringCar as FourWheelSteeringCar
+from maneuver_automaton.models.axles import RearSteeredCar as RearSteeredCar
 from maneuver_automaton.models.cars import AcceleratingCar as AcceleratingCar
 from maneuver_automaton.models.cars import Car as Car
 from maneuver_automaton.models.cars import CarWithTrailer as CarWithTrailer
@@ -25,5 +28,6 @@ from maneuver_automaton.models.state import moved_rates as moved_rates
 from maneuver_automaton.models.state import moved_state as moved_state
 from maneuver_automaton.models.state import rollout as rollout
 from maneuver_automaton.models.state import vector_field as vector_field
+from maneuver_automaton.models.trailers import TractorWithTrailers as TractorWithTrailers
 from maneuver_automaton.models.user import UserModel as UserModel
 from maneuver_automaton.models.user import model_of_vector_field as model_of_vector_field

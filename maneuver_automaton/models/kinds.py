@@ -5,6 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from maneuver_automaton.models.axles import (
+    ArticulatedVehicle,
+    FourWheelSteeringCar,
+    RearSteeredCar,
+)
 from maneuver_automaton.models.cars import AcceleratingCar, Car, CarWithTrailer, SecondOrderCar
 from maneuver_automaton.models.dynamic import Helicopter, Hovercraft, SingleTrack
 from maneuver_automaton.models.model import Model
@@ -14,6 +19,7 @@ from maneuver_automaton.models.robots import (
     SecondOrderUnicycle,
     Unicycle,
 )
+from maneuver_automaton.models.trailers import TractorWithTrailers
 
 KINDS: Mapping[str, Any] = {
     kind.name: kind
@@ -29,6 +35,10 @@ KINDS: Mapping[str, Any] = {
         AcceleratingCar,
         LatticeBody,
         Omnidirectional,
+        RearSteeredCar,
+        FourWheelSteeringCar,
+        ArticulatedVehicle,
+        TractorWithTrailers,
     )
 }
 

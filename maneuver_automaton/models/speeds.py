@@ -138,8 +138,11 @@ class Interval:
         ends = [_times(a, b) for a in (self.low, self.high) for b in (by.low, by.high)]
         return Interval(min(ends), max(ends))
 
-    def __truediv__(self, other: float) -> Interval:
-        return self * (1.0 / other)
+    def __truediv__(self, other: Interval | float) -> Interval:
+        by = _interval(other)
+        if by.low <= 0.0 <= by.high:
+            return Interval(-math.inf, math.inf)
+        return self * Interval(1.0 / by.high, 1.0 / by.low)
 
     __radd__ = __add__
     __rmul__ = __mul__

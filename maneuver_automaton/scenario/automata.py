@@ -15,7 +15,15 @@ import numpy as np
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library, load_stock_library, stock_libraries
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
-from maneuver_automaton.models import Car, Model, SecondOrderCar, SecondOrderUnicycle, Unicycle
+from maneuver_automaton.models import (
+    Car,
+    FourWheelSteeringCar,
+    Model,
+    RearSteeredCar,
+    SecondOrderCar,
+    SecondOrderUnicycle,
+    Unicycle,
+)
 from maneuver_automaton.models.speeds import lateral_limit, pace_within
 from maneuver_automaton.primitives import Trim, trims_of
 from maneuver_automaton.primitives.closed_form import (
@@ -261,12 +269,12 @@ def _fitting(automaton: Automaton, model: Model) -> Automaton:
     return automaton
 
 
-Controls = Mapping[str, tuple[float, float]]
+Controls = Mapping[str, tuple[float, ...]]
 
 KINEMATIC = ("table2", "reeds_shepp", "dubins")
 INERTIAL = ("parking", "road")
 LATTICES = {"lattice_ackermann": False, "lattice_diff": True}  # whether they turn on the spot
-PRESETS = (*KINEMATIC, *INERTIAL, *LATTICES)
+PRESETS = (*KINEMATIC, *INERTIAL, *LATTICES, "crab")
 TABLE_2: Controls = {
     "rest": (0.0, 0.0),
     "straight": (1.5, 0.0),
@@ -286,8 +294,8 @@ def preset_automaton(name: str, model: Model) -> Automaton:
 
     `table2` is the paper's Table 2, for the unicycle. `dubins` (3 trims) and `reeds_shepp` (6)
     drive at 1 m/s, or at the greatest speed where that is less, on the tightest circles; those
-    of a unicycle turn at 1 rad/s, or at the greatest turn rate. Left and right are as the wheels
-    point, in reverse too.
+    of a unicycle turn at 1 rad/s, or at the greatest turn rate. Left and right are as the front
+    wheels point, in reverse too.
 
     `parking` and `road` are for the second-order unicycle and car. For parking, 0, 20, 50 and
     100 % of the speed both ways, straight, half and full turns, maneuvers between neighbours, and
@@ -295,6 +303,9 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     kinematic cars turn more slowly. For the road, rest and five speeds ahead, turns as sharp as a
     lateral acceleration of 4 m/s^2 allows, maneuvers between neighbours, early and late. The
     libraries that come with the package have names of their own; see `load_stock_library`.
+
+    `crab` is for the four-wheel-steering car, at 1 m/s or slower: straight, aside at half and all
+    of its steering, and turns about points near its middle, no faster than 1 rad/s, both ways.
 
     `lattice_ackermann` and `lattice_diff` are lattice primitives of a least turning radius, the
     second with turns on the spot; see `lattice_of_arcs`.
@@ -320,13 +331,19 @@ def preset_automaton(name: str, model: Model) -> Automaton:
         known = (*PRESETS, *stock_libraries())
         raise ValueError(f"got {name!r}, need one of {', '.join(known)}")
     if name in KINEMATIC:
-        if not isinstance(model, Unicycle | Car):
+        if not isinstance(model, Unicycle | Car | RearSteeredCar):
             raise ValueError(
                 f"got {name!r}, which is for vehicles without inertia, not the {model.name}"
             )
         return Automaton.of_controls(model, _controls(name, model))
     if name in LATTICES:
         return _lattice(name, model)
+    if name == "crab":
+        if not isinstance(model, FourWheelSteeringCar):
+            raise ValueError(
+                f"got 'crab', which is for a four_wheel_steering_car, not the {model.name}"
+            )
+        return Automaton.of_controls(model, _crab(model))
     if not isinstance(model, SecondOrderUnicycle | SecondOrderCar):
         need = "second_order_unicycle and second_order_car"
         raise ValueError(f"got {name!r}, which is for {need}, not the {model.name}")
@@ -347,7 +364,23 @@ def _lattice(name: str, model: Model) -> Automaton:
     return automaton_of_lattice(lattice)
 
 
-def _controls(name: str, vehicle: Unicycle | Car) -> Controls:
+def _crab(car: FourWheelSteeringCar) -> Controls:
+    """Straight, aside and turning, each ahead and back, and how the wheels stand for it."""
+    fastest, most = min(1.0, car.max_speed or 1.0), car.max_steering
+    modes = {"straight": (0.0, 0.0)}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        for name, angle in (("", most), ("half ", 0.5 * most)):
+            modes[f"{name}aside to the {side}"] = (sign * angle, sign * angle)
+            modes[f"{name}turn to the {side}"] = (sign * angle, -sign * angle)
+    controls: dict[str, tuple[float, ...]] = {}
+    for name, wheels in modes.items():
+        turn = abs(float(car.velocity((), (1.0, *wheels))[2]))
+        speed = min(fastest, 1.0 / turn) if turn else fastest
+        controls |= {name: (speed, *wheels), f"reverse {name}": (-speed, *wheels)}
+    return controls
+
+
+def _controls(name: str, vehicle: Unicycle | Car | RearSteeredCar) -> Controls:
     if name == "table2":
         if not isinstance(vehicle, Unicycle):
             raise ValueError(f"got 'table2', which is for the unicycle, not the {vehicle.name}")
@@ -359,7 +392,7 @@ def _controls(name: str, vehicle: Unicycle | Car) -> Controls:
     return ahead | {f"reverse {word}": c for word, c in _turns(vehicle, -speed).items()}
 
 
-def _turns(vehicle: Unicycle | Car, speed: float) -> dict[str, tuple[float, float]]:
+def _turns(vehicle: Unicycle | Car | RearSteeredCar, speed: float) -> dict[str, tuple[float, ...]]:
     """Left, straight and right at a speed, as tight as the vehicle can."""
     if isinstance(vehicle, Unicycle):
         rate = min(1.0, vehicle.max_turn_rate or 1.0)
@@ -368,6 +401,8 @@ def _turns(vehicle: Unicycle | Car, speed: float) -> dict[str, tuple[float, floa
         raise ValueError("needs the tightest circle of the car, state vehicle.max_steering_rad")
     else:
         left = vehicle.max_steering
+        if isinstance(vehicle, RearSteeredCar):
+            left = -left  # the wheels behind the pose point to the other side
     pace = pace_within(vehicle, vehicle.body_velocity(np.zeros(0), np.array([speed, left])))
     slow = speed * min(1.0, pace)  # only a car has such a limit: its wheels stay as they are
     return {"left": (slow, left), "straight": (speed, 0.0), "right": (slow, -left)}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
 from annotated_types import Ge
 from pydantic import AfterValidator, AllowInfNan, BeforeValidator, Field, Strict
 
@@ -247,13 +248,24 @@ def build_file_of_text(text: str, *, name: str) -> BuildFile:
         model=model,
         grid=file.trims,
         max_lateral_acceleration=file.max_lateral_acceleration_m_s2,
-        trims=found.trims,
+        trims=_at_rest_once(found.trims),
         missing=found.missing,
         maneuvers=file.maneuvers,
         design=file.design,
     )
     _check_maneuvers(document, asked)
     return asked
+
+
+def _at_rest_once(trims: tuple[Trim, ...]) -> tuple[Trim, ...]:
+    """The trims; of those at rest in one reduced state the one with the least control."""
+    best: dict[bytes, Trim] = {}
+    for trim in trims:
+        if trim.is_rest:
+            here = best.setdefault(trim.reduced_state.tobytes(), trim)
+            if np.abs(trim.control).sum() < np.abs(here.control).sum():
+                best[trim.reduced_state.tobytes()] = trim
+    return tuple(t for t in trims if not t.is_rest or t is best[t.reduced_state.tobytes()])
 
 
 def build(

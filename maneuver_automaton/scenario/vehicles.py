@@ -97,10 +97,11 @@ NO_TYRES = {  # of a vehicle that is no car
     "accelerating_car, car_with_trailer and single_track have; a zone limits it for any vehicle"
 }
 MEASURES = {  # the parameters of all models, by their units
-    "m": "wheelbase hitch_length front rear height resolution turning_radius",
-    "rad": "max_steering max_hitch max_tilt",
+    "m": "wheelbase hitch_length hitch_length_2 hitch_length_3 hitch_offset hitch_offset_2 "
+    "hitch_offset_3 front rear height resolution turning_radius",
+    "rad": "max_steering max_hitch max_tilt max_articulation",
     "m_s": "max_speed min_speed max_lateral_speed max_climb",
-    "rad_s": "max_turn_rate max_steering_rate max_tilt_rate",
+    "rad_s": "max_turn_rate max_steering_rate max_tilt_rate max_articulation_rate",
     "m_s2": "max_acceleration max_lateral_acceleration max_climb_acceleration gravity",
     "rad_s2": "max_angular_acceleration",
     "kg": "mass",
@@ -155,6 +156,14 @@ WHAT = {  # each model is
     "of a preset.",
     "omnidirectional": "A platform that moves ahead, aside and turns at once; "
     "control [v, v aside, omega].",
+    "rear_steered_car": "A forklift, its pose on the front axle, that steers its rear axle; "
+    "control [v, angle of the rear wheels].",
+    "four_wheel_steering_car": "A car that steers both axles, its pose between them; "
+    "control [v, angle in front, angle at the rear].",
+    "articulated_vehicle": "A wheel loader that bends in its middle, its pose on the front axle; "
+    "state [articulation], control [v, its rate].",
+    "tractor_with_trailers": "A tractor with one to three trailers; state [hitch, ...], "
+    "control [v, steering].",
 }
 WORDS = {  # on parameters, of all models or of one, that say more than their limits
     "wheelbase": "distance of the axles, a positive number",
@@ -187,6 +196,21 @@ WORDS = {  # on parameters, of all models or of one, that say more than their li
     "helicopter.footprint": "shape of the body, seen from above",
     "helicopter.footprint_height_m": "[low, high] of the body about its altitude; left out: "
     "a flat body",
+    "articulated_vehicle.front": "from the joint to the front axle",
+    "articulated_vehicle.rear": "from the joint to the rear axle",
+    "articulated_vehicle.footprint": "shape of the front part",
+    "articulated_vehicle.rear_part": "shape of the rear part, seen from the middle of its axle",
+    "tractor_with_trailers.hitch_length": "from the first hitch to the axle of its trailer",
+    **{
+        f"tractor_with_trailers.hitch_length_{k}": f"of trailer {k}; left out: no such trailer"
+        for k in (2, 3)
+    },
+    **{
+        f"tractor_with_trailers.hitch_offset{k}": "from the axle in front back to the hitch; "
+        "left out: 0"
+        for k in ("", "_2", "_3")
+    },
+    "tractor_with_trailers.footprint": "shape of the tractor",
     "lattice_body.resolution": "side of a cell, a positive number",
     "lattice_body.turning_radius": "as the file of primitives has it",
 }
@@ -205,10 +229,12 @@ def _part(model: str, what: str) -> type[FilePart]:
         unit = "per_s" if (model, one.name) == ("helicopter", "drag") else UNIT_OF.get(one.name)
         key = one.name if unit is None else f"{one.name}_{unit}"
         number: Any = Number if one.name.startswith("min_") and one.default is None else Positive
-        if one.name in ("max_steering", "max_tilt"):
+        if one.name in ("max_steering", "max_tilt", "max_articulation"):
             number = Sharp
         elif one.name == AT_REST:
             number = AtRest
+        elif one.name.startswith("hitch_offset"):
+            number = Number
         elif one.default == 0.0:
             number = NotNegative
         limits = SHARP if number is Sharp else "a positive number"
@@ -219,8 +245,8 @@ def _part(model: str, what: str) -> type[FilePart]:
             fields[key] = (number | None, optional(said))
     for key, shape in (("footprint", Footprint), ("footprint_height_m", Interval)):
         fields[key] = (shape | None, optional(text(key)))
-    if model == "car_with_trailer":
-        fields["trailer"] = (Footprint | None, optional(TRAILER))
+    for carried in KINDS[model].part_names:
+        fields[carried] = (Footprint | None, optional(text(carried, TRAILER)))
     name = "".join(word.title() for word in model.split("_"))
     part = create_model(f"{name}Part", __base__=FilePart, __doc__=what, **fields)
     is_car = any(one.name == "max_lateral_acceleration" for one in parameters)
@@ -241,6 +267,11 @@ MEANT = {  # what others call them: Nav2, OMPL, CommonRoad, dynobench; letters a
     "single_track": "dynamicbicycle dynamicsingletrack st",
     "helicopter": "drone quadrotor quadcopter multirotor uav",
     "omnidirectional": "omni omnidrive holonomic mecanum swerve",
+    "rear_steered_car": "forklift forklifttruck fork rearsteering reachtruck counterbalance",
+    "four_wheel_steering_car": "4ws fourwheelsteering fourwheelsteer doubleackermann "
+    "dualackermann crab allwheelsteering",
+    "articulated_vehicle": "wheelloader loader articulated centerarticulated lhd dumper",
+    "tractor_with_trailers": "ntrailer generalntrailer roadtrain twotrailers tuggertrain",
 }
 
 
@@ -327,8 +358,8 @@ def carried_of(part: Any) -> Mapping[str, Any]:
     """Bodies of what a vehicle carries, as the file states them."""
     if isinstance(part, OwnPart):
         return part.parts or {}
-    trailer = getattr(part, "trailer", None)
-    return {} if trailer is None else {"trailer": trailer}
+    bodies = {name: getattr(part, name) for name in KINDS[part.model].part_names}
+    return {name: body for name, body in bodies.items() if body is not None}
 
 
 def is_known(model: Model) -> bool:

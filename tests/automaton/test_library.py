@@ -28,7 +28,8 @@ from tests import inertia
 
 KINDS = (
     "unicycle, car, second_order_unicycle, second_order_car, car_with_trailer, single_track, "
-    "hovercraft, helicopter, accelerating_car, lattice_body, omnidirectional"
+    "hovercraft, helicopter, accelerating_car, lattice_body, omnidirectional, "
+    "rear_steered_car, four_wheel_steering_car, articulated_vehicle, tractor_with_trailers"
 )
 ROBOT = Automaton.of_controls(Unicycle(max_speed=2.0), {"ahead": (1.5, 0.0), "spin": (0.0, 1.0)})
 

@@ -15,12 +15,15 @@ from maneuver_automaton.primitives.connecting import maneuver_defect
 from tests.reference_dynamics import trim_defect
 
 LEAST = {  # trims, maneuvers
+    "articulated_vehicle": (15, 40),
     "car_with_trailer": (20, 80),
     "helicopter": (20, 250),
     "hovercraft": (20, 150),
     "second_order_car": (40, 300),
     "second_order_unicycle": (25, 300),
     "single_track": (20, 200),
+    "tractor_with_three_trailers": (11, 40),
+    "tractor_with_trailers": (11, 40),
 }
 MOST_BYTES = 350_000
 SAMPLED = 12  # maneuvers of each that are driven again; all of them in benchmarks
@@ -34,7 +37,8 @@ def test_there_is_one_for_every_stock_vehicle():
 def test_a_stock_library(name):
     automaton = ma.load_stock_library(name)
     model = automaton.model
-    assert model.name == automaton.name == name
+    assert automaton.name == name
+    assert model.name == name.replace("three_", "")
     trims, maneuvers = LEAST[name]
     assert len(automaton) >= trims
     assert len(automaton.maneuvers) >= maneuvers

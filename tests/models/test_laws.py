@@ -13,15 +13,19 @@ from hypothesis.extra.numpy import arrays
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import (
     AcceleratingCar,
+    ArticulatedVehicle,
     Car,
     CarWithTrailer,
+    FourWheelSteeringCar,
     Helicopter,
     Hovercraft,
     LatticeBody,
     Omnidirectional,
+    RearSteeredCar,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
+    TractorWithTrailers,
     Unicycle,
     UserModel,
     equivariance_defect,
@@ -92,6 +96,22 @@ MODELS = [
     AcceleratingCar(wheelbase=2.3, max_steering=0.8, max_speed=3.0, max_acceleration=2.0),
     LatticeBody(resolution=0.1),
     Omnidirectional(max_speed=1.0, max_lateral_speed=0.5, max_turn_rate=2.0),
+    RearSteeredCar(wheelbase=1.5, max_steering=1.2),
+    FourWheelSteeringCar(wheelbase=3.0, max_steering=1.2),
+    ArticulatedVehicle(
+        front=1.5, rear=1.9, max_articulation=0.7, max_articulation_rate=0.35, max_speed=2.0
+    ),
+    TractorWithTrailers(
+        wheelbase=1.2,
+        hitch_length=1.4,
+        hitch_offset=0.4,
+        hitch_length_2=1.4,
+        hitch_offset_2=-0.2,
+        hitch_length_3=2.0,
+        max_steering=0.8,
+        max_hitch=1.2,
+        max_speed=1.5,
+    ),
     BOAT,
     BALLOON,
 ]

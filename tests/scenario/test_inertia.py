@@ -132,7 +132,7 @@ def test_every_parameter_has_a_key_with_its_unit(name, part):
     fields = {field.name for field in dataclasses.fields(KINDS[name])}
     keys = keys_of(part, KINDS[name])
     assert keys.keys() == fields
-    bodies = {"model", "footprint", "footprint_height_m", "trailer"}
+    bodies = {"model", "footprint", "footprint_height_m", *KINDS[name].part_names}
     assert set(keys.values()) == part.model_fields.keys() - bodies
 
 

@@ -18,7 +18,8 @@ TOP = (
 MODELS = (
     "unicycle, car, second_order_unicycle, second_order_car, accelerating_car, "
     "car_with_trailer, single_track, "
-    "hovercraft, helicopter, lattice_body, omnidirectional"
+    "hovercraft, helicopter, lattice_body, omnidirectional, rear_steered_car, "
+    "four_wheel_steering_car, articulated_vehicle, tractor_with_trailers"
 )
 OWN = "; a vehicle of your own needs --model MODULE:OBJECT"
 SECOND_ORDER = (
@@ -220,8 +221,9 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "unknown preset": (
         automaton("preset: dubbins"),
         ":5: automaton.preset: got 'dubbins', need one of table2, reeds_shepp, dubins, parking, "
-        "road, lattice_ackermann, lattice_diff, car_with_trailer, helicopter, hovercraft, "
-        "second_order_car, second_order_unicycle, single_track",
+        "road, lattice_ackermann, lattice_diff, crab, articulated_vehicle, car_with_trailer, "
+        "helicopter, hovercraft, second_order_car, second_order_unicycle, single_track, "
+        "tractor_with_three_trailers, tractor_with_trailers",
     ),
     "stock library of another vehicle": (
         inertia(automaton("preset: second_order_car")).replace("2.8", "3.0"),
