@@ -546,6 +546,15 @@ def export(
         float | None,
         typer.Option("--rate", metavar="HZ", help="Rows per second, instead of --step."),
     ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(
+            "--origin",
+            metavar="LAT,LON",
+            help="Of the point 0, 0 [deg]: longitudes and latitudes as well (csv), or instead of "
+            "metres (geojson); x is east.",
+        ),
+    ] = None,
 ) -> int:
     """Write a plan.json, or a closed_loop.json, for another program.
 
@@ -561,7 +570,7 @@ def export(
         if step is not None or not 0.0 < rate < math.inf:
             raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
         step = 1.0 / rate
-    return result_commands.export(file, to, out, parts=parts, step=step)
+    return result_commands.export(file, to, out, parts=parts, step=step, origin=origin)
 
 
 @app.command(epilog=ending("schema"))
