@@ -214,6 +214,7 @@ class FieldResult:
 
     problem: FieldProblem
     swaths: Array  # (n, 2, 3) poses at begin and end, in order
+    turns: tuple[Plan, ...]  # between them; fewer where one is missing
     result: PlanResult  # of the whole, as of any problem: `plan`, `cost`, `audit`, `status`
     order_bound: float | None = None  # no order of these swaths has cheaper turns; None: not known
     turns_cost: float | None = None
@@ -241,12 +242,8 @@ class FieldResult:
     def lengths(self) -> tuple[float, float]:
         """Metres of all swaths, and of all turns between them."""
         swaths = float(np.linalg.norm(np.diff(self.swaths[:, :, :2], axis=1), axis=-1).sum())
-        plan = self.result.plan
-        driven = 0.0
-        if plan is not None:
-            in_metres = replace(self.result.problem, cost=Cost(length=1.0))
-            driven = in_metres.cost_of(plan) - swaths
-        return swaths, driven
+        in_metres = replace(self.result.problem, cost=Cost(length=1.0))
+        return swaths, sum(in_metres.cost_of(turn) for turn in self.turns)
 
 
 def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> FieldResult:
@@ -301,6 +298,7 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
     return FieldResult(
         problem=problem,
         swaths=turns.states[order],
+        turns=tuple(turns.plans[pair] for pair in pairs if pair in turns.plans),
         result=turns.joined(order),
         turns_cost=cost,
         order_bound=bound if problem.planner.automaton.is_kinematic else None,

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Polygon as Shape
 from maneuver_automaton.errors import InvalidScenario
@@ -190,22 +189,9 @@ def _features(covered: FieldResult) -> Iterator[dict[str, Any]]:
     for k, poses in enumerate(covered.swaths):
         line = shapely.LineString(poses[:, :2])
         yield feature(line, kind="swath", number=k + 1, width_m=problem.width)
-    for k, places in enumerate(turns_of(covered)):
-        yield feature(shapely.LineString(places), kind="turn", number=k + 1)
-
-
-def turns_of(covered: FieldResult) -> list[Array]:
-    """The path (n, 2) of each turn, in order; none without a plan."""
-    plan, swaths = covered.result.plan, covered.swaths
-    if plan is None:
-        return []
-    samples = plan.sample()
-    places, begin, turns = samples.pose[:, :2], 0, []
-    for before, after in zip(swaths[:-1, 1, :2], swaths[1:, 0, :2], strict=True):
-        first = begin + int(np.argmin(np.linalg.norm(places[begin:] - before, axis=1)))
-        begin = first + int(np.argmin(np.linalg.norm(places[first:] - after, axis=1)))
-        turns.append(np.concatenate([[before], places[first + 1 : begin], [after]]))
-    return turns
+    for k, turn in enumerate(covered.turns):
+        line = shapely.LineString(turn.sample().pose[:, :2])
+        yield feature(line, kind="turn", number=k + 1, duration_s=turn.duration)
 
 
 def save_field_picture(covered: FieldResult, path: Path, *, name: str) -> None:
@@ -243,8 +229,9 @@ def save_field_picture(covered: FieldResult, path: Path, *, name: str) -> None:
             page.plane.add_patch(PathPatch(shape_path(Shape(part)), facecolor=color, linewidth=0.0))
     page.plane.add_patch(PathPatch(shape_path(problem.shape), facecolor="none", linewidth=1.2))
     draw_obstacles(page.plane, problem.planner.obstacles)
-    for lines, color in ((covered.swaths[:, :, :2], SEQUENCE[0]), (turns_of(covered), SEQUENCE[1])):
-        page.plane.add_collection(LineCollection(list(lines), colors=[color], linewidths=1.4))
+    turns = [turn.sample().pose[:, :2] for turn in covered.turns]
+    for lines, color in ((list(covered.swaths[:, :, :2]), SEQUENCE[0]), (turns, SEQUENCE[1])):
+        page.plane.add_collection(LineCollection(lines, colors=[color], linewidths=1.4))
     page.plane.plot(*covered.swaths[0, 0, :2], "s", color="black", markerfacecolor="white")
     page.plane.set_xlim(low[0] - margin, high[0] + margin)
     page.plane.set_ylim(low[1] - margin, high[1] + margin)
