@@ -41,6 +41,9 @@ if TYPE_CHECKING:
     from maneuver_automaton.exports import save_geojson as save_geojson
     from maneuver_automaton.exports import save_rerun as save_rerun
     from maneuver_automaton.exports import save_ros2_bag as save_ros2_bag
+    from maneuver_automaton.field import FieldProblem as FieldProblem
+    from maneuver_automaton.field import FieldResult as FieldResult
+    from maneuver_automaton.field import cover as cover
     from maneuver_automaton.fleet import DaskWorkers as DaskWorkers
     from maneuver_automaton.fleet import FleetHorizon as FleetHorizon
     from maneuver_automaton.fleet import FleetLog as FleetLog
@@ -125,6 +128,8 @@ _HOMES = {
     "Disc": "collision",
     "DispersedLibrary": "design",
     "Disturbance": "receding_horizon",
+    "FieldProblem": "field",
+    "FieldResult": "field",
     "FleetHorizon": "fleet",
     "FleetLog": "fleet",
     "FleetProblem": "fleet",
@@ -170,6 +175,7 @@ _HOMES = {
     "Via": "problem",
     "Zone": "collision",
     "build_library": "automaton.building",
+    "cover": "field",
     "design_library": "design",
     "disperse_library": "design",
     "drive_road": "roads",

@@ -246,6 +246,61 @@ def plan(
         return run_jobs("plan", file, out, options, parts)
 
 
+@app.command(epilog=ending("cover"))
+@exits
+def cover(
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FIELD", help="A scenario with `field` (YAML), or GeoJSON."),
+    ],
+    out: Out = Path("out"),
+    with_file: With = None,
+    width: Annotated[
+        float | None, typer.Option("--width", metavar="M", help="Working width [m].")
+    ] = None,
+    headland: Annotated[
+        float | None, typer.Option("--headland", metavar="M", help="Of the strip to turn in [m].")
+    ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(
+            "--origin", metavar="LAT,LON", help="Of the point 0, 0 [deg], for the GeoJSON written."
+        ),
+    ] = None,
+    time_limit: Annotated[
+        float | None,
+        typer.Option("--time-limit", metavar="S", help="For each turn [s]; left out: 1."),
+    ] = None,
+    plot: Plot = True,
+    quiet: Quiet = False,
+    jobs: Annotated[
+        int, typer.Option("--jobs", min=1, metavar="N", help="Turns that are planned at a time.")
+    ] = 1,
+    model: OwnModel = None,
+    as_json: Json = False,
+) -> int:
+    """Cover a field in swaths, with turns inside its headland, as one plan.
+
+    Writes plan.json, field.png and field.geojson.
+    """
+    from maneuver_automaton.cli.cover_command import cover_file
+
+    with _document(out / "plan.json", file, asked=as_json):
+        return cover_file(
+            file,
+            out,
+            beside=with_file,
+            origin=origin,
+            model=model,
+            time_limit=time_limit,
+            jobs=jobs,
+            plot=plot,
+            quiet=quiet,
+            width_m=width,
+            headland_m=headland,
+        )
+
+
 @app.command(epilog=ending("mpc"))
 @exits
 def mpc(
@@ -546,6 +601,15 @@ def export(
         float | None,
         typer.Option("--rate", metavar="HZ", help="Rows per second, instead of --step."),
     ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option(
+            "--origin",
+            metavar="LAT,LON",
+            help="Of the point 0, 0 [deg]: longitudes and latitudes as well (csv), or instead of "
+            "metres (geojson); x is east.",
+        ),
+    ] = None,
 ) -> int:
     """Write a plan.json, or a closed_loop.json, for another program.
 
@@ -561,7 +625,7 @@ def export(
         if step is not None or not 0.0 < rate < math.inf:
             raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
         step = 1.0 / rate
-    return result_commands.export(file, to, out, parts=parts, step=step)
+    return result_commands.export(file, to, out, parts=parts, step=step, origin=origin)
 
 
 @app.command(epilog=ending("schema"))

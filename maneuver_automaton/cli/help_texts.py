@@ -10,6 +10,7 @@ CODES = {
     "of a folder: 0 all found, 1 some not, 2 some file bad",
     "mpc": f"0 the goal was reached, 1 not, or a collision, {BAD}, {STOPPED}; "
     "of several vehicles: 0 all arrived but those that broke down, and no guarantee was broken",
+    "cover": f"0 the field is covered and the plan audited, 1 no plan (one line says why), {BAD}",
     "check": f"0 all holds, 1 something does not, {BAD}",
     "automaton build": f"0 all maneuvers were found, 1 some not, {BAD}, "
     "130 interrupted (called again, it goes on)",
@@ -34,6 +35,10 @@ EXAMPLES = {
         "maneuver-automaton mpc scenarios/parking_noise.yaml --seeds 20 --jobs 2",
         "maneuver-automaton mpc scenarios --jobs 2",
         "maneuver-automaton mpc scenarios/fleets/depot_loop.yaml --animate",
+    ),
+    "cover": (
+        "maneuver-automaton cover scenarios/fields/meadow.yaml",
+        "maneuver-automaton cover field.geojson --with tractor.yaml --width 4.5",
     ),
     "check": (
         "maneuver-automaton check scenarios/parking.yaml",

@@ -24,6 +24,7 @@ from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
+from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.formats.closed_loop_json import (
     driven_document,
     load_closed_loop,
@@ -48,6 +49,7 @@ class Format:
     function: str  # of `exports`, that writes it
     name: str  # of what is written: that of the file stands for {}
     steps: bool  # whether it has rows in time
+    places: bool = False  # whether it can hold longitudes and latitudes
 
     @property
     def ending(self) -> str:
@@ -59,15 +61,21 @@ FORMATS: Mapping[str, Format] = {
     "commonroad": Format(
         function="save_commonroad_solution", name="{}_commonroad.xml", steps=False
     ),
-    "csv": Format(function="save_csv", name="{}.csv", steps=True),
-    "geojson": Format(function="save_geojson", name="{}.geojson", steps=False),
+    "csv": Format(function="save_csv", name="{}.csv", steps=True, places=True),
+    "geojson": Format(function="save_geojson", name="{}.geojson", steps=False, places=True),
     "rerun": Format(function="save_rerun", name="{}.rrd", steps=True),
     "ros2": Format(function="save_ros2_bag", name="{}_ros2", steps=True),
 }
 
 
 def export(
-    file: Path, kind: str, out: Path | None, *, parts: Parts, step: float | None = None
+    file: Path,
+    kind: str,
+    out: Path | None,
+    *,
+    parts: Parts,
+    step: float | None = None,
+    origin: str | None = None,
 ) -> int:
     """Write the plans or loops of `file` in a format; say where a goal was not reached."""
     if kind not in FORMATS:
@@ -75,9 +83,13 @@ def export(
     form = FORMATS[kind]
     if step is not None and not form.steps:
         raise InvalidScenario(f"--step: {kind} has no rows in time; leave it out")
+    options: dict[str, Any] = {} if step is None else {"step": step}
+    if origin is not None:
+        if not form.places:
+            raise InvalidScenario(f"--origin: {kind} has no longitudes; leave it out")
+        options["origin"] = origin_of(origin)
     recording = _recording(file, parts)
     path = _export_target(file, out, form, kind)
-    options: dict[str, Any] = {} if step is None else {"step": step}
     write: Callable[..., None] = getattr(exports, form.function)
     make_folder(path.parent)
     try:
@@ -93,6 +105,17 @@ def export(
     if kind == "commonroad" and not clean:
         complain(f"{file}: it is no clean drive to a goal: the official checker refuses {path}")
     return FOUND
+
+
+def origin_of(text: str) -> tuple[float, float]:
+    """Latitude and longitude [deg] of the text LAT,LON; raises InvalidScenario."""
+    try:
+        latitude, longitude = (float(part) for part in text.split(","))
+        degrees_of([0.0, 0.0], origin=(latitude, longitude))
+    except ValueError as error:
+        what = str(error) if str(error).startswith("origin: ") else f"origin: got {text!r}"
+        raise InvalidScenario(f"--{what}; need LAT,LON in degrees, as 52.1,13.4") from error
+    return latitude, longitude
 
 
 def _recording(file: Path, parts: Parts) -> Recording:

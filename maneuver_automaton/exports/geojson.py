@@ -3,37 +3,41 @@
 Source: Butler et al. (2016), *The GeoJSON Format*, RFC 7946. That document wants longitude and
 latitude; plans have metres in a frame of their own. The member `crs` of the format's first version
 (2008) says so in well-known text, which GDAL reads, and with it QGIS and geopandas; others ignore
-it. A `crs` of null is no way to say it: GDAL takes that for longitude and latitude.
+it. A `crs` of null is no way to say it: GDAL takes that for longitude and latitude. About an origin
+on the Earth it is as RFC 7946 wants it.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solids_of
 from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.recording import Recording, recording_to_write
 
 PLACES = (0, 1, 3)  # x, y and altitude of a pose
+LONGEST_M = 50.0  # between two points of a line that is written in degrees
 METRES = 'LOCAL_CS["plan",LOCAL_DATUM["plan",32767],UNIT["metre",1],AXIS["x",EAST],AXIS["y",NORTH]]'
 
 
-def save_geojson(value: Any, path: Path | str) -> None:
+def save_geojson(value: Any, path: Path | str, *, origin: ArrayLike | None = None) -> None:
     """Write a plan, a closed loop, a fleet or a drive as a FeatureCollection of GeoJSON.
 
     Coordinates are metres in the plan's own frame, x and y, and the altitude of a vehicle that
-    flies; they are no longitudes and latitudes. The property `kind` tells the features apart:
-    path, primitive (a trim or maneuver), swept, body, start, goal, obstacle, zone, lanelet; of
-    several vehicles, `vehicle` tells whose it is.
+    flies; about an origin they are longitudes and latitudes. The property `kind` tells the
+    features apart: path, primitive (a trim or maneuver), swept, body, start, goal, obstacle, zone,
+    lanelet; of several vehicles, `vehicle` tells whose it is.
 
     Parameters
     ----------
@@ -41,13 +45,16 @@ def save_geojson(value: Any, path: Path | str) -> None:
         A Plan alone knows neither body nor obstacles.
     path : Path or str
         The file.
+    origin : (float, float), optional
+        Latitude and longitude [deg] of the point x = y = 0; x is east, y north, see `degrees_of`.
+        Lines have a point every 50 m then, between which they are straight in degrees.
 
     Raises
     ------
     TypeError
         If nobody moves in the value.
     ValueError
-        If nobody has a plan.
+        If nobody has a plan, or the origin is no place of the Earth.
     OSError
         If the file cannot be written.
 
@@ -63,15 +70,29 @@ def save_geojson(value: Any, path: Path | str) -> None:
     ('path', [[0.0, 0.0], [2.0, 0.0]])
     """
     recording = recording_to_write(value)
-    features = ",\n".join(json.dumps(one, allow_nan=False) for one in _features(recording))
-    head = {
-        "type": "FeatureCollection",
-        "name": recording.name_in(path),
+    save_features(_features(recording), path, name=recording.name_in(path), origin=origin)
+
+
+def save_features(
+    features: Iterable[dict[str, Any]], path: Path | str, *, name: str, origin: ArrayLike | None
+) -> None:
+    """Write features in metres as a FeatureCollection: as they are, or about an origin."""
+    frame: dict[str, Any] = {
         "crs": {"type": "name", "properties": {"name": METRES}},
         "units": "m",
         "frame": "x and y in metres in the plan's own frame, not longitude and latitude",
     }
-    text = f'{json.dumps(head, ensure_ascii=False)[:-1]}, "features": [\n{features}\n]}}\n'
+    if origin is not None:
+        latitude, longitude = as_array("origin", origin, last=2).tolist()
+        frame = {
+            "units": "degree",
+            "frame": "longitude and latitude on WGS 84",
+            "origin": {"longitude": longitude, "latitude": latitude},
+        }
+        features = ({**one, "geometry": _located(one["geometry"], origin)} for one in features)
+    head = {"type": "FeatureCollection", "name": name, **frame}
+    rows = ",\n".join(json.dumps(one, allow_nan=False) for one in features)
+    text = f'{json.dumps(head, ensure_ascii=False)[:-1]}, "features": [\n{rows}\n]}}\n'
     write_text_atomically(Path(path), text)
 
 
@@ -147,6 +168,22 @@ def _around(recording: Recording) -> Iterator[dict[str, Any]]:
 
 def _feature(geometry: Mapping[str, Any], *, kind: str, **facts: Any) -> dict[str, Any]:
     return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": geometry}
+
+
+def _located(geometry: Mapping[str, Any], origin: ArrayLike) -> dict[str, Any]:
+    """A geometry in metres, in degrees about an origin; altitudes stay."""
+    import shapely
+
+    dense = shapely.geometry.shape(geometry)
+    if dense.length > LONGEST_M:
+        dense = shapely.segmentize(dense, LONGEST_M)
+    there = shapely.transform(
+        dense,
+        lambda places: np.hstack([degrees_of(places[:, :2], origin=origin), places[:, 2:]]),
+        include_z=dense.has_z,
+    )
+    said: dict[str, Any] = json.loads(shapely.to_geojson(there))
+    return said
 
 
 def _places(poses: Array) -> Array:

@@ -24,17 +24,19 @@ from maneuver_automaton.recording import Mover, recording_to_write
 TYPES = {  # by topic
     "path": "nav_msgs/msg/Path",
     "trajectory": "trajectory_msgs/msg/MultiDOFJointTrajectory",
+    "nav_trajectory": "nav_msgs/msg/Trajectory",
     "cmd_vel": "geometry_msgs/msg/TwistStamped",
     "ackermann_cmd": "ackermann_msgs/msg/AckermannDriveStamped",
     "tf": "tf2_msgs/msg/TFMessage",
 }
-SINGLE = ("path", "trajectory")  # topics of one message, at the beginning
+SINGLE = ("path", "trajectory", "nav_trajectory")  # topics of one message, at the beginning
 STEP = 0.1  # [s]
 NANO = 1_000_000_000
 METADATA, STORED = "metadata.yaml", (".db3", ".mcap")  # what is in a bag
 VERSION: Literal[8] = 8  # of metadata.yaml: Humble cannot read the profiles of 9
-# Source: ackermann_msgs, by J. O'Quin; the one package among these that is not part of ROS itself.
-ACKERMANN = {
+# What Humble does not have. Sources: ackermann_msgs, by J. O'Quin, the one package among these that
+# is not part of ROS itself; nav_msgs since common_interfaces 5.9 (its issue 275, pull request 296).
+DEFINITIONS = {
     "ackermann_msgs/msg/AckermannDrive": """
 float32 steering_angle
 float32 steering_angle_velocity
@@ -46,7 +48,19 @@ float32 jerk
 std_msgs/Header header
 ackermann_msgs/AckermannDrive drive
 """,
+    "nav_msgs/msg/TrajectoryPoint": """
+std_msgs/Header header
+geometry_msgs/Pose pose
+geometry_msgs/Twist velocity
+geometry_msgs/Accel acceleration
+geometry_msgs/Wrench effort
+""",
+    "nav_msgs/msg/Trajectory": """
+std_msgs/Header header
+nav_msgs/TrajectoryPoint[] points
+""",
 }
+UNKNOWN = dict.fromkeys("xyz", math.nan)  # how nav_msgs says that a value is not set
 
 Message = dict[str, Any]
 
@@ -83,7 +97,10 @@ def ros_messages(
         By topic: `path`, a nav_msgs/Path with a stamp for every pose; `trajectory`, a
         trajectory_msgs/MultiDOFJointTrajectory of the vehicle and the parts that it carries, its
         velocities and accelerations in `frame`, by the model's equations where it is known,
-        otherwise by differences, as of the parts; and lists of one message for every pose:
+        otherwise by differences, as of the parts; `nav_trajectory`, a nav_msgs/Trajectory of the
+        vehicle, whose velocities and accelerations are those ahead, to the left and about the
+        vertical, as Nav2 has them, and whose efforts (and accelerations, where the model is not
+        known) are nan, which says that they are not set; and lists of one message for every pose:
         `cmd_vel`, of geometry_msgs/TwistStamped in `body_frame`; `tf`, of tf2_msgs/TFMessage; and
         for a model with a steering angle `ackermann_cmd`, of ackermann_msgs/AckermannDriveStamped.
         Of several vehicles all topics but `tf`, and the frames of their bodies, begin with the name
@@ -134,22 +151,31 @@ def _messages(
     headers = [{"stamp": one, "frame_id": frame} for one in stamps]
     parts = [(prefix + name, poses) for name, poses in _carried(mover, rows)]
     frames = [(body_frame, rows.pose), *parts]
-    places = zip(headers, _transforms(rows.pose), strict=True)
+    poses = [
+        {"header": header, "pose": {"position": at["translation"], "orientation": at["rotation"]}}
+        for header, at in zip(headers, _transforms(rows.pose), strict=True)
+    ]
+    twists, felt = _twists(rows.twist), _felt(rows, mover.model)
+    not_set = [{"linear": UNKNOWN, "angular": UNKNOWN}] * len(since)
+    changes = not_set if felt is None else _twists(felt)
     messages: dict[str, Any] = {
-        "path": {
+        "path": {"header": headers[0], "poses": poses},
+        "trajectory": _trajectory(frames, rows, since, headers[0], felt),
+        "nav_trajectory": {
             "header": headers[0],
-            "poses": [
+            "points": [
                 {
-                    "header": header,
-                    "pose": {"position": at["translation"], "orientation": at["rotation"]},
+                    **pose,
+                    "velocity": twist,
+                    "acceleration": change,
+                    "effort": {"force": UNKNOWN, "torque": UNKNOWN},
                 }
-                for header, at in places
+                for pose, twist, change in zip(poses, twists, changes, strict=True)
             ],
         },
-        "trajectory": _trajectory(frames, rows, since, headers[0], mover.model),
         "cmd_vel": [
             {"header": {"stamp": one, "frame_id": body_frame}, "twist": twist}
-            for one, twist in zip(stamps, _twists(rows.twist), strict=True)
+            for one, twist in zip(stamps, twists, strict=True)
         ],
     }
     steering = component(rows, "steering")
@@ -169,17 +195,12 @@ def _trajectory(
     rows: PlanArrays,
     since: Array,
     header: Message,
-    model: Model | None,
+    felt: Array | None,
 ) -> Message:
     """Transforms, velocities and accelerations of all frames, seen from the world."""
     transforms = [_transforms(poses) for _, poses in frames]
     velocity = _in_world(rows.pose, rows.twist)
-    if model is None:
-        acceleration = _rates(rows.time, velocity)
-    else:
-        acceleration = twist_rates(model, rows.reduced_state, rows.control)
-        acceleration[:, :2] = accelerations(rows.twist, acceleration)
-        acceleration = _in_world(rows.pose, acceleration)
+    acceleration = _rates(rows.time, velocity) if felt is None else _in_world(rows.pose, felt)
     carried = [_rates(rows.time, poses) for _, poses in frames[1:]]
     velocities = list(map(_twists, (velocity, *carried)))
     changes = (acceleration, *(_rates(rows.time, one) for one in carried))
@@ -197,6 +218,15 @@ def _trajectory(
             for k, time in enumerate(since.tolist())
         ],
     }
+
+
+def _felt(rows: PlanArrays, model: Model | None) -> Array | None:
+    """Accelerations (n, dof) in the frame of the body; None where the model is not known."""
+    if model is None:
+        return None
+    felt = twist_rates(model, rows.reduced_state, rows.control)
+    felt[:, :2] = accelerations(rows.twist, felt)
+    return felt
 
 
 def _frames(frames: Sequence[tuple[str, Array]], headers: Sequence[Message]) -> list[Message]:
@@ -308,7 +338,7 @@ def save_ros2_bag(
     """Write a plan, a closed loop, a fleet or a drive as a bag of ROS 2, a folder with SQLite.
 
     ``ros2 bag play`` and Foxglove play it. The topics are those of `ros_messages`, each with a
-    slash before its name; `/path` and `/trajectory` come first, and are latched.
+    slash before its name; `/path`, `/trajectory` and `/nav_trajectory` come first, and are latched.
 
     Parameters
     ----------
@@ -373,7 +403,7 @@ def _write(messages: dict[str, Any], folder: Path) -> None:
             "ROS 2 bag: rosbags is not installed; need pip install 'maneuver-automaton[ros]'"
         ) from error
     store = get_typestore(Stores.ROS2_HUMBLE)
-    for name, text in ACKERMANN.items():
+    for name, text in DEFINITIONS.items():
         store.register(get_types_from_msg(text, name))
     with Writer(folder, version=VERSION) as bag:
         kinds = {topic: TYPES[topic.rpartition("/")[2]] for topic in messages}

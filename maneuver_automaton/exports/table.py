@@ -7,14 +7,22 @@ import io
 from pathlib import Path
 from typing import Any
 
+from numpy.typing import ArrayLike
+
 from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.exports.kinematics import kinematics
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
 
 
 def save_csv(
-    value: Any, path: Path | str, *, step: float | None = None, model: Model | None = None
+    value: Any,
+    path: Path | str,
+    *,
+    step: float | None = None,
+    model: Model | None = None,
+    origin: ArrayLike | None = None,
 ) -> None:
     """Write a plan, a closed loop, a fleet or a drive as CSV: names, then one line an instant.
 
@@ -33,13 +41,16 @@ def save_csv(
         Time between lines [s]; lines are at most 0.05 m and 0.05 rad apart if left out.
     model : Model, optional
         The vehicle of a Plan, see `Plan.as_arrays`.
+    origin : (float, float), optional
+        Latitude and longitude [deg] of the point x = y = 0; x is east, y north. Then there are
+        columns ``longitude_deg`` and ``latitude_deg``, see `degrees_of`.
 
     Raises
     ------
     TypeError
         If nobody moves in the value.
     ValueError
-        If nobody has a plan, or a maneuver has no course.
+        If nobody has a plan, a maneuver has no course, or the origin is no place of the Earth.
     OSError
         If the file cannot be written.
 
@@ -54,7 +65,7 @@ def save_csv(
     1.0,1.0,0.0,0.0,1.0,0.0,0.0,1.0,1.0,0.0,ahead
     """
     recording = recording_to_write(value, model=model)
-    tables = {one.name: _columns(one, step) for one in recording.drivers}
+    tables = {one.name: _columns(one, step, origin) for one in recording.drivers}
     names = list(dict.fromkeys(name for table in tables.values() for name in table))
     names.append(names.pop(names.index("primitive")))  # stays the last one
     several = len(recording.movers) > 1
@@ -68,8 +79,11 @@ def save_csv(
     write_text_atomically(Path(path), text.getvalue())
 
 
-def _columns(mover: Mover, step: float | None) -> dict[str, list[Any]]:
+def _columns(mover: Mover, step: float | None, origin: ArrayLike | None) -> dict[str, list[Any]]:
     samples = mover.rows()
     rows = samples if step is None else mover.rows(step=step)
     columns = rows.columns() | kinematics(rows, samples, mover.model)
+    if origin is not None:
+        degrees = degrees_of(rows.pose[:, :2], origin=origin)
+        columns["longitude_deg"], columns["latitude_deg"] = degrees.T
     return {name: column.tolist() for name, column in columns.items()}

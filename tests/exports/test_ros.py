@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.exports.ros import ACKERMANN, TYPES
+from maneuver_automaton.exports.ros import DEFINITIONS, TYPES
 from tests.exports.cases import CAR, VALUES, assert_close, drive_on_lanes, ends, inertia, trailer
 from tests.plotting.cases import parking_plan
 from tests.plotting.fleets import crossing
@@ -171,6 +171,8 @@ def same(message, fields):
         return all(same(getattr(message, name), value) for name, value in fields.items())
     if isinstance(fields, list):
         return len(message) == len(fields) and all(map(same, message, fields))
+    if fields != fields:  # nan
+        return message != message
     return message == fields or abs(message - fields) <= 1e-6 * abs(fields)  # float32
 
 
@@ -215,8 +217,30 @@ def test_a_bag_is_replaced_and_other_folders_are_kept(tmp_path):
         ma.save_ros2_bag(parking_plan(), other / "thesis.tex")
 
 
-def test_the_one_package_beside_ros_is_defined_as_it_is():
-    assert list(ACKERMANN) == ["ackermann_msgs/msg/AckermannDrive", TYPES["ackermann_cmd"]]
+def test_a_trajectory_of_nav_msgs_has_the_fields_of_its_release():
+    typesys = pytest.importorskip("rosbags.typesys")
+    store = typesys.get_typestore(typesys.Stores.ROS2_LYRICAL)
+    for name in ("nav_msgs/msg/TrajectoryPoint", TYPES["nav_trajectory"]):
+        ours = typesys.get_types_from_msg(DEFINITIONS[name], name)[name]
+        assert [field for field, _ in ours[1]] == [field for field, _ in store.fielddefs[name][1]]
+    assert set(DEFINITIONS) - set(store.types) == {
+        "ackermann_msgs/msg/AckermannDrive", TYPES["ackermann_cmd"],
+    }  # fmt: skip
+
+
+def test_a_trajectory_of_nav_msgs_is_what_the_others_say():
+    messages = ma.ros_messages(inertia(), step=0.5)
+    trajectory, drive = messages["nav_trajectory"], messages["ackermann_cmd"]
+    assert trajectory["header"] == messages["path"]["header"]
+    for point, at, command, twist in zip(
+        trajectory["points"], messages["path"]["poses"], drive, messages["cmd_vel"], strict=True
+    ):
+        assert (point["header"], point["pose"]) == (at["header"], at["pose"])
+        assert point["velocity"] == twist["twist"]
+        assert point["acceleration"]["linear"]["x"] == command["drive"]["acceleration"]
+        assert np.isnan(list(point["effort"]["force"].values())).all()
+    alone = ma.ros_messages(parking_plan(), step=0.5)["nav_trajectory"]["points"][0]
+    assert np.isnan(alone["acceleration"]["linear"]["x"])
 
 
 def test_topics_and_frames_of_a_fleet_begin_with_the_name(tmp_path):
@@ -225,7 +249,7 @@ def test_topics_and_frames_of_a_fleet_begin_with_the_name(tmp_path):
     assert set(messages) == {
         f"{name}/{topic}"
         for name in ("there", "back")
-        for topic in ("path", "trajectory", "cmd_vel")
+        for topic in ("path", "trajectory", "nav_trajectory", "cmd_vel")
     } | {"tf"}
     assert seconds(messages["back/path"]["poses"][0]["header"]["stamp"]) == 10.5
     assert messages["back/cmd_vel"][0]["header"]["frame_id"] == "back/base_link"

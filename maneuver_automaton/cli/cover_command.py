@@ -1,0 +1,72 @@
+"""`cover`: a field worked in swaths, as one plan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
+from maneuver_automaton.cli.inputs import make_folder, not_written, user_model
+from maneuver_automaton.cli.pictures import ready_to_draw
+from maneuver_automaton.cli.result_commands import origin_of
+from maneuver_automaton.cli.terminal import announced, print_result, waiting
+from maneuver_automaton.field.covering import FieldResult, cover
+from maneuver_automaton.field.files import load_field, save_field_geojson, save_field_picture
+from maneuver_automaton.formats.plan_json import save_plan
+from maneuver_automaton.recording import Fact
+
+
+def cover_file(
+    file: Path,
+    out: Path,
+    *,
+    beside: Path | None,
+    origin: str | None,
+    model: str | None,
+    time_limit: float | None,
+    jobs: int,
+    plot: bool,
+    quiet: bool,
+    **stated: float | None,
+) -> int:
+    """Cover the field of a file; write plan, picture and GeoJSON; the exit code."""
+    place = None if origin is None else origin_of(origin)
+    own = None if model is None else user_model(model)
+    with announced(quiet=quiet):
+        field = load_field(file, beside=beside, origin=place, model=own, **stated)
+    make_folder(out)
+    with waiting("planning swaths and turns", quiet=quiet):
+        covered = cover(field.problem, time_limit=time_limit or field.time_limit_s, jobs=jobs)
+    result, path = covered.result, out / "plan.json"
+    try:
+        save_plan(result, path, name=field.name)
+        path = out / "field.geojson"
+        save_field_geojson(covered, path, name=field.name, origin=field.origin)
+        path = out / "field.png"
+        path.unlink(missing_ok=True)
+        if plot:
+            ready_to_draw()
+            save_field_picture(covered, path, name=field.name)
+    except OSError as error:
+        raise not_written(path, error) from error
+    if not quiet and result.plan is not None:
+        print_result(field.name, [], (*_facts(covered), Fact(label="written to", value=str(out))))
+    if result.plan is None:
+        complain(f"{file}: {result.status.value}: {result.reason}")
+    return NO_PLAN if result.plan is None else FOUND
+
+
+def _facts(covered: FieldResult) -> list[Fact]:
+    worked, turned = covered.lengths
+    result, problem = covered.result, covered.problem
+    assert result.plan is not None
+    share = f"{100.0 * covered.covered:.4g} % inside the headland of {problem.headland:g} m"
+    return [
+        Fact(label="swaths", value=f"{len(covered.swaths)}, {worked:.6g} m"),
+        Fact(label="worked", value=share),
+        Fact(label="turns", value=f"{turned:.6g} m"),
+        Fact(label="cost of turns", value=covered.turns_cost or 0.0, bound=covered.order_bound,
+             note=", of all orders"),
+        Fact(label="cost", value=result.cost or 0.0),
+        Fact(label="duration", value=result.plan.duration, unit="s"),
+        Fact(label="clearance", value=result.clearance_m or 0.0, unit="m", digits=3),
+    ]  # fmt: skip
