@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
@@ -21,7 +22,6 @@ from maneuver_automaton.problem import Problem, SearchSettings
 from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
-from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import (
     Ends,
     Worlds,
