@@ -1,16 +1,59 @@
-"""Keep what is worked out from a value with that value, and with no other."""
+"""What is worked out once and kept: with the value that it is worked out from, and with no other.
+
+Whoever keeps, an owner, has the last `MOST` results of each function, so that owners used in turn
+do not evict each other's as they would in one cache for all. Results are forgotten when others of
+their function were asked for since, or together with their owner; copies of an owner, also in other
+processes, begin without any.
+"""
 
 from __future__ import annotations
 
 import functools
+import weakref
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 MOST = 16  # results of one function for one owner
+LARGEST = 1 << 22  # numbers in a block of memory that is kept, 32 MiB
 
 _Owner = TypeVar("_Owner")
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
+_Number = TypeVar("_Number", np.float64, np.int64)
+
+
+class _Kept(dict[Hashable, Callable[..., Any]]):
+    """The functions that remember, by what they stand for; copies begin without any."""
+
+    def __reduce__(self) -> tuple[type[_Kept], tuple[()]]:
+        return _Kept, ()
+
+
+def _kept_by(owner: Any, kind: Hashable, make: Callable[..., _T]) -> Callable[..., _T]:
+    """The function that remembers results of a kind for an owner."""
+    kept: _Kept = owner.__dict__.setdefault("_kept", _Kept())
+    if kind not in kept:
+        kept[kind] = functools.lru_cache(MOST)(make)
+    return kept[kind]
+
+
+def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
+    """What is kept under a key with a value, made when it is first asked for.
+
+    Examples
+    --------
+    >>> class Library:
+    ...     pass
+    >>> one = Library()
+    >>> kept_with(one, "spare", list).append(3)
+    >>> kept_with(one, "spare", list), kept_with(Library(), "spare", list)
+    ([3], [])
+    """
+    return _kept_by(owner, make, lambda _: make())(key)
 
 
 def kept_by_first(
@@ -18,8 +61,7 @@ def kept_by_first(
 ) -> Callable[Concatenate[_Owner, _P], _T]:
     """Call a function once for the same arguments; its first argument keeps the results.
 
-    They live as long as that argument does, so that others used in turn do not evict them, as they
-    would in a cache that all share. The arguments after it are values, and can be hashed.
+    The arguments after it are values, and can be hashed.
 
     Examples
     --------
@@ -35,37 +77,64 @@ def kept_by_first(
 
     @functools.wraps(make)
     def once(owner: _Owner, /, *args: _P.args, **more: _P.kwargs) -> _T:
-        kept: _Kept = owner.__dict__.setdefault("_kept", _Kept())
-        if once not in kept:
-            kept[once] = functools.lru_cache(MOST)(functools.partial(make, owner))
-        made: _T = kept[once](*args, **more)
-        return made
+        return _kept_by(owner, once, functools.partial(make, owner))(*args, **more)
 
     return once
 
 
-def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
-    """What is kept under a key with a value, made when it is first asked for; lives as long as it.
+class _Block(np.ndarray[Any, Any]):
+    """Memory that is lent: an array of a kind of its own, whose parts views keep alive."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What searches share that belongs to none of its arguments alone: libraries, worlds, tables.
+
+    Each planner holds one of its own. What it lacks is taken from `RECENT`, which serves whoever
+    holds none.
 
     Examples
     --------
-    >>> class Library:
-    ...     pass
-    >>> one = Library()
-    >>> kept_with(one, "spare", list).append(3)
-    >>> kept_with(one, "spare", list), kept_with(Library(), "spare", list)
-    ([3], [])
+    >>> def square(number: int) -> list[int]:
+    ...     return [number * number]
+    >>> prepared = Prepared()
+    >>> prepared.once(square, 3) is prepared.once(square, 3)
+    True
     """
-    values: _Kept = owner.__dict__.setdefault("_values", _Kept())
-    if key not in values:
-        for old in list(values)[: 1 - MOST]:
-            values.pop(old, None)
-    made: _T = values[key] if key in values else values.setdefault(key, make())
-    return made
+
+    _blocks: list[_Block] = field(default_factory=list, init=False)  # that nobody uses now
+
+    def once(self, make: Callable[_P, _T], *args: _P.args, **more: _P.kwargs) -> _T:
+        """The result of `make` for these arguments, which are values: made at the first call."""
+        maker = make if self is RECENT else functools.partial(RECENT.once, make)
+        return _kept_by(self, make, maker)(*args, **more)
+
+    def room(self, n: int, kind: type[_Number]) -> NDArray[_Number]:
+        """An array (n,) of numbers that mean nothing, in memory that is used again after it.
+
+        The system hands out fresh memory page by page, which for the arrays of a first plan takes
+        longer than a millisecond. The memory is free again once the array and all views of it are
+        gone. A number of its `kind` has 64 bits.
+
+        Examples
+        --------
+        >>> prepared = Prepared()
+        >>> one = prepared.room(1000, np.float64)
+        >>> where = one.ctypes.data
+        >>> del one
+        >>> prepared.room(500, np.int64).ctypes.data == where
+        True
+        """
+        try:
+            block = self._blocks.pop()
+        except IndexError:  # asked for before, another thread might take the last one
+            block = _Block(0)
+        if block.size < n:
+            block = _Block(n)
+        lent = block[:n]
+        if n <= LARGEST:
+            weakref.finalize(lent, self._blocks.append, block).atexit = False
+        return lent.view(np.ndarray).view(kind)
 
 
-class _Kept(dict[Hashable, Any]):
-    """What is kept, by its key; copies and other processes begin without any."""
-
-    def __reduce__(self) -> tuple[type[_Kept], tuple[()]]:
-        return _Kept, ()
+RECENT = Prepared()

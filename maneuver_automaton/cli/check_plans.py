@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.cli.inputs import Parts, fleet_planned, road_fleet, scenario_of
+from maneuver_automaton.cli.inputs import Parts, opened
 from maneuver_automaton.cli.terminal import announced
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.errors import InvalidScenario
@@ -25,26 +25,19 @@ from maneuver_automaton.fleet import (
     verify_fleet,
 )
 from maneuver_automaton.fleet.driven import FINE
-from maneuver_automaton.formats.closed_loop_json import load_closed_loop
-from maneuver_automaton.formats.documents import checked, kind_of, parsed, told_of
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
+from maneuver_automaton.formats.documents import kind_of, parsed, told_of
 from maneuver_automaton.formats.plan_json import load_plan, load_plans
 from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, within
 from maneuver_automaton.recording.values import pair_text
 from maneuver_automaton.roads import RoadFleetResult
+from maneuver_automaton.scenario import FleetScenario
 
 ENDING = ".json"
 AGREES = 1e-9  # share by which a cost may differ from that of the file
 THERE = 1e-9  # [m, rad] between a start and where a vehicle begins
 NEARER = 1e-6  # [m] by which a distance may be below that of the file
-ALONE = {  # kinds of documents that do not state what they were made from
-    "plan": ("a plan", "planned from"),
-    "loop": ("a closed loop", "driven in"),
-    "road-plan": ("a plan on a road", "planned from"),
-    "drive": ("a drive on a road", "driven on"),
-}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,38 +61,25 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
     InvalidScenario
         If the file is damaged or holds statistics, or the scenario of `parts` is not its own.
     """
-    if path.suffix.lower() != ENDING or not (kind := kind_of(value := parsed(path))):
+    if path.suffix.lower() != ENDING or not kind_of(parsed(path)):
         return None
-    if kind == "statistics":
-        raise InvalidScenario(
-            f"{path}: holds statistics, which do not say what was driven; need a plan.json or a "
-            "closed_loop.json"
-        )
-    if kind in ALONE and parts.beside is None:
-        what, how = ALONE[kind]
-        raise InvalidScenario(
-            f"{path}: is {what}, which does not state its problem; need --with FILE, the scenario "
-            f"that it was {how}"
-        )
-    if (roads := road_fleet(path, parts, alone=True)) is not None:
+    file = opened(path, parts)
+    file.needed()
+    if file.roads:
+        roads = file.result()
         return roads.name, list(_on_road(roads))
-    if "road" in kind or kind == "drive":
-        raise InvalidScenario(f"{path}: was made on a road, need --with and its CommonRoad file")
-    document = checked(kind, value, path)
-    if kind in ("fleet", "fleet-loop"):
-        fleet = fleet_planned(path, document, parts)
-        if kind == "fleet":
-            return fleet.name, _plans(path, document, fleet.fleet)
-        return fleet.name, _loop(path, document, load_fleet_loop(path, fleet.fleet))
-    assert parts.beside is not None
-    scenario = scenario_of(parts.beside, replace(parts, beside=None))
-    if kind == "loop":
-        log = _log_of(load_closed_loop(path, scenario.problem))
-        return scenario.name, _loop(path, document, log)
+    scenario = file.scenario
+    assert scenario is not None
+    if isinstance(scenario, FleetScenario):
+        if file.kind == "fleet":
+            return scenario.name, _plans(path, file.document, scenario.fleet)
+        return scenario.name, _loop(path, file.document, file.result())
+    if file.kind == "loop":
+        return scenario.name, _loop(path, file.document, _log_of(file.result()))
     plan = load_plan(path, model=scenario.problem.automaton.model)
     with announced(), _of_this(path):
         verdict = verify(scenario.problem, plan, leave=leave)
-    return scenario.name, [_plan("plan", verdict, document.get("cost"))]
+    return scenario.name, [_plan("plan", verdict, file.document.get("cost"))]
 
 
 # -- plans

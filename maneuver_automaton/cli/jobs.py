@@ -16,7 +16,6 @@ from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, 
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import (
     Parts,
-    is_road,
     make_folder,
     not_written,
     problem_of,
@@ -26,6 +25,7 @@ from maneuver_automaton.cli.options import Options, refuse_unknown
 from maneuver_automaton.cli.pictures import draughtsman, draw
 from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.commonroad import is_road
 from maneuver_automaton.recording import Fact, recording_of, tables_of
 from maneuver_automaton.scenario import FleetScenario
 

@@ -12,12 +12,9 @@ from maneuver_automaton import exports
 from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import (
     Parts,
-    fleet_planned,
     make_folder,
     not_written,
-    road_fleet,
-    scenario_of,
-    source_of,
+    opened,
     user_model,
 )
 from maneuver_automaton.cli.options import LookOptions
@@ -25,20 +22,9 @@ from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_fil
 from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 from maneuver_automaton.exports.earth import degrees_of
-from maneuver_automaton.formats.closed_loop_json import (
-    driven_document,
-    load_closed_loop,
-    read_closed_loop_document,
-)
-from maneuver_automaton.formats.fleet_json import load_fleet
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, read_fleet_loop_document
-from maneuver_automaton.formats.plan_json import (
-    load_result,
-    plan_of_document,
-    read_fleet_document,
-    read_plan_document,
-)
-from maneuver_automaton.recording import Recording, recording_of
+from maneuver_automaton.formats.closed_loop_json import driven_document
+from maneuver_automaton.formats.plan_json import plan_of_document
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
 
 
@@ -88,7 +74,8 @@ def export(
         if not form.places:
             raise InvalidScenario(f"--origin: {kind} has no longitudes; leave it out")
         options["origin"] = origin_of(origin)
-    recording = _recording(file, parts)
+    own = None if parts.model is None else user_model(parts.model)
+    recording = exports.load_recording(file, beside=parts.beside, case=parts.case, model=own)
     path = _export_target(file, out, form, kind)
     write: Callable[..., None] = getattr(exports, form.function)
     make_folder(path.parent)
@@ -116,18 +103,6 @@ def origin_of(text: str) -> tuple[float, float]:
         what = str(error) if str(error).startswith("origin: ") else f"origin: got {text!r}"
         raise InvalidScenario(f"--{what}; need LAT,LON in degrees, as 52.1,13.4") from error
     return latitude, longitude
-
-
-def _recording(file: Path, parts: Parts) -> Recording:
-    """What the file holds; several vehicles in the world that it names itself."""
-    if (roads := road_fleet(file, parts)) is not None:
-        return recording_of(roads)
-    document = read_fleet_document(file)
-    if document is not None and (parts.beside is not None or document.get("source")):
-        beside, its = source_of(file, document, parts)
-        return exports.load_recording(file, beside=beside, case=its.case)
-    own = None if parts.model is None else user_model(parts.model)
-    return exports.load_recording(file, beside=parts.beside, case=parts.case, model=own)
 
 
 def _export_target(file: Path, out: Path | None, form: Format, kind: str) -> Path:
@@ -198,26 +173,12 @@ def _named(file: Path) -> Iterator[None]:
 
 def _result_of(file: Path, beside: Path | None) -> tuple[Any, str]:
     """What a file holds, in the world that it was made for, and its name; else the document."""
-    parts = Parts(beside=beside)
-    if (roads := road_fleet(file, parts, alone=True)) is not None:
-        return roads, roads.name
-    if (driven := read_fleet_loop_document(file)) is not None:
-        fleet = fleet_planned(file, driven, parts)
-        return load_fleet_loop(file, fleet.fleet), fleet.name
-    try:
-        plans = read_fleet_document(file)
-    except InvalidScenario:  # told by who reads the plan of one vehicle
-        plans = None
-    if plans is not None:
-        fleet = fleet_planned(file, plans, parts)
-        return load_fleet(file, fleet.fleet), fleet.name
-    if beside is None:
-        loop = read_closed_loop_document(file)
-        return (read_plan_document(file) if loop is None else driven_document(loop)), ""
-    scenario = scenario_of(beside)
-    if read_closed_loop_document(file) is None:
-        return load_result(file, scenario.problem), scenario.name
-    return load_closed_loop(file, scenario.problem), scenario.name
+    found = opened(file, Parts(beside=beside))
+    if found.beside is None and not found.several:
+        document = found.document
+        return (driven_document(document) if "steps" in document else document), ""
+    result = found.result()
+    return result, result.name if found.scenario is None else found.scenario.name
 
 
 def _draw_motion(document: dict[str, Any], path: Path, what: str, look: LookOptions) -> None:

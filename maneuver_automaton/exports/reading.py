@@ -1,9 +1,10 @@
-"""A plan.json or closed_loop.json, and the problem it answers, as a recording."""
+"""Result files opened: what they hold, in the world that they were made for; as a recording too."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +14,16 @@ from maneuver_automaton._arrays import as_array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.closed_loop_json import load_closed_loop, read_closed_loop_document
-from maneuver_automaton.formats.documents import told_of
+from maneuver_automaton.formats.closed_loop_json import load_closed_loop
+from maneuver_automaton.formats.commonroad import is_road
+from maneuver_automaton.formats.documents import checked, kind_of, parsed, told_of
 from maneuver_automaton.formats.fleet_json import load_fleet
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,
+    load_result,
     plan_of_document,
-    read_fleet_document,
-    read_plan_document,
 )
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, Recording, recording_of
@@ -45,6 +46,138 @@ from maneuver_automaton.scenario import (
 )
 
 START_TOLERANCE = 1e-6  # [m, rad] between the first pose of a plan and the start of its problem
+ALONE = {  # kinds of documents that do not state what they were made from
+    "plan": ("a plan", "planned from"),
+    "loop": ("a closed loop", "driven in"),
+    "road-plan": ("a plan on a road", "planned from"),
+    "drive": ("a drive on a road", "driven on"),
+}
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResultFile:
+    """A plan.json or closed_loop.json, and what it was made from; see `open_result`."""
+
+    path: Path
+    kind: str  # see `formats.documents.KINDS`
+    document: Mapping[str, Any]
+    scenario: Scenario | FleetScenario | None = None  # neither of a road, nor where none is named
+    beside: Path | None = None  # the file of the scenario, or of the road
+    roads: tuple[RoadScenario, ...] = ()
+
+    @property
+    def several(self) -> bool:
+        """Whether it is of several vehicles, which name the file that they were made from."""
+        return self.kind not in ALONE
+
+    def needed(self) -> None:
+        """Raise InvalidScenario if nobody names what it was made from."""
+        if self.beside is None and self.several:
+            raise InvalidScenario(
+                f"{self.path}: source: is missing, need --with and the file it was planned from"
+            )
+        if self.beside is None:
+            what, how = ALONE[self.kind]
+            raise InvalidScenario(
+                f"{self.path}: is {what}, which does not state its problem; need --with FILE, the "
+                f"scenario that it was {how}"
+            )
+
+    def result(self) -> Any:
+        """The PlanResult, ClosedLoop, FleetResult, FleetLog or RoadFleetResult that it holds.
+
+        What was driven on roads is judged again, each past the others: of a loop the plans are what
+        was driven, with the reasons of those that reached no goal. One alone is a fleet of one.
+
+        Raises
+        ------
+        InvalidScenario
+            If the file is damaged, or was made from another scenario, or from one unknown.
+        """
+        self.needed()
+        if self.roads:
+            return _driven_on_roads(self)
+        if isinstance(self.scenario, FleetScenario):
+            load = load_fleet if self.kind == "fleet" else load_fleet_loop
+            return load(self.path, self.scenario.fleet)
+        assert self.scenario is not None
+        return {"plan": load_result, "loop": load_closed_loop}[self.kind](
+            self.path, self.scenario.problem
+        )
+
+
+def open_result(
+    path: Path | str,
+    *,
+    beside: Path | str | None = None,
+    case: int | None = None,
+    model: Model | None = None,
+) -> ResultFile:
+    """A plan.json or closed_loop.json of any kind, and the scenario that it was made from.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    beside : Path or str, optional
+        The scenario that was planned or driven, of CommonRoad too: obstacles, goals, bodies and the
+        vehicle come from it. Files of several vehicles may name theirs.
+    case : int, optional
+        Which problem of a CommonRoad or another file that holds several, from 0.
+    model : Model, optional
+        A vehicle of the user's own, which the scenario names.
+
+    Raises
+    ------
+    InvalidScenario
+        If a file cannot be read, holds statistics, or the scenario is that of another kind.
+    """
+    path = Path(path)
+    value = parsed(path)
+    kind = kind_of(value) or "plan"
+    document, completed = checked(kind, value, path), None
+    if kind == "statistics":
+        raise InvalidScenario(
+            f"{path}: holds statistics, which do not say what was driven; need a plan.json or a "
+            "closed_loop.json"
+        )
+    if beside is None and isinstance(said := document.get("source"), dict):
+        beside, completed, case = _source(path, said, case)
+    if beside is None:
+        return ResultFile(path=path, kind=kind, document=document)
+    beside = Path(beside)
+    if is_road(beside):
+        roads = load_roads(beside, beside=completed)
+        if kind in ALONE:
+            road = load_scenario(beside, beside=completed, case=case or 0)
+            roads = tuple(one for one in (road,) if isinstance(one, RoadScenario))
+        return ResultFile(path=path, kind=kind, document=document, beside=beside, roads=roads)
+    if "road" in kind or kind == "drive":
+        raise InvalidScenario(f"{path}: was made on a road, need --with and its CommonRoad file")
+    scenario = load_scenario(beside, beside=completed, case=case, model=model)
+    assert not isinstance(scenario, RoadScenario)
+    if isinstance(scenario, FleetScenario) and kind in ALONE:
+        raise InvalidScenario(
+            f"{beside}: states several vehicles, which only plan, mpc, check and convert know"
+        )
+    if isinstance(scenario, Scenario) and kind not in ALONE:
+        raise InvalidScenario(f"{path}: holds plans of several vehicles, but {beside} states one")
+    return ResultFile(path=path, kind=kind, document=document, scenario=scenario, beside=beside)
+
+
+def _source(
+    path: Path, said: Mapping[str, Any], case: int | None
+) -> tuple[Path, Path | None, int | None]:
+    """The file that results say they were made from, what completes it, and which of its cases."""
+    # Files as seen from this one: by their names alone, whatever links are on the way.
+    file, completed = (
+        Path(os.path.normpath(path.parent / name)) if isinstance(name, str) else None
+        for name in (said["file"], said.get("with"))
+    )
+    assert file is not None
+    if not file.is_file():
+        raise InvalidScenario(f"{path}: source: there is no {file}, need --with and that file")
+    return file, completed, said.get("case") if case is None else case
 
 
 def load_recording(
@@ -56,90 +189,35 @@ def load_recording(
 ) -> Recording:
     """The plans, loops or drives of a plan.json or closed_loop.json.
 
-    Parameters
-    ----------
-    path : Path or str
-        The file.
-    beside : Path or str, optional
-        The scenario that was planned or driven, of CommonRoad too: obstacles, goals, bodies and the
-        vehicle come from it. A closed loop cannot do without.
-    case : int, optional
-        Which problem of a CommonRoad or another file that holds several, from 0.
-    model : Model, optional
-        A vehicle of the user's own, which the scenario names.
+    Parameters are those of `open_result`; a closed loop cannot do without its scenario.
 
     Raises
     ------
     InvalidScenario
         If a file cannot be read, or the scenario is another one.
     """
-    path = Path(path)
-    loop, fleet = read_closed_loop_document(path), read_fleet_document(path)
-    if beside is None:
-        if loop is not None:
-            raise InvalidScenario(
-                f"{path}: is a closed loop, need --with and the scenario it was driven in"
-            )
-        return _alone(path, fleet)
-    # Of a road several problems are one scene: those of several vehicles, whichever is read first.
-    scenario = load_scenario(beside, case=case if fleet is None else 0, model=model)
-    if isinstance(scenario, RoadScenario):
-        if fleet is not None:
-            return recording_of(load_road_fleet(path, beside=beside))
-        return _on_road(path, scenario, loop)
-    if isinstance(scenario, FleetScenario):
-        if fleet is None:
-            raise InvalidScenario(f"{beside}: states several vehicles, need the scenario of one")
-        load = load_fleet if loop is None else load_fleet_loop
-        return replace(recording_of(load(path, scenario.fleet)), title=scenario.name)
-    if fleet is not None:
-        raise InvalidScenario(f"{path}: holds several vehicles, but {beside} states one")
-    if loop is not None:
-        recording = recording_of(load_closed_loop(path, scenario.problem))
-        return replace(recording, title=scenario.name)
-    return _planned(path, scenario)
+    file = open_result(path, beside=beside, case=case, model=model)
+    if file.beside is None:
+        return _alone(file)
+    if file.roads and not file.several:
+        return _on_road(file)
+    if file.kind == "plan":
+        return _planned(file)
+    recording = recording_of(file.result())
+    return replace(recording, title=file.scenario.name) if file.scenario else recording
 
 
-def load_road_fleet(
-    path: Path | str,
-    *,
-    beside: Path | str,
-    vehicle: Path | str | None = None,
-    case: int | None = None,
-) -> RoadFleetResult:
-    """What a plan.json or closed_loop.json holds of drives on the roads of the file `beside`.
-
-    Of a loop the plans are what was driven, with the reasons of those that reached no goal. All
-    are judged again, each past the others. One vehicle alone is a fleet of one.
-
-    Parameters
-    ----------
-    path : Path or str
-        The file.
-    beside : Path or str
-        The CommonRoad file that was planned or driven.
-    vehicle : Path or str, optional
-        A scenario that states the vehicle, if it is not CommonRoad's BMW 320i.
-    case : int, optional
-        Which planning problem one vehicle solves, from 0.
-
-    Raises
-    ------
-    InvalidScenario
-        If a file cannot be read, nobody has a plan, or a vehicle is none of the planning problems.
-    """
-    path, document = Path(path), read_fleet_document(path)
+def _driven_on_roads(file: ResultFile) -> RoadFleetResult:
+    """What a file holds of drives on roads."""
+    path, document = file.path, file.document
     roads = {
         str(k if one.scene.benchmark is None else one.scene.benchmark.problem): one
-        for k, one in enumerate(load_roads(beside, beside=vehicle))
+        for k, one in enumerate(file.roads)
     }
-    if document is None:
-        name = [*roads][case or 0]
-        document = {"vehicles": {name: read_closed_loop_document(path) or read_plan_document(path)}}
-    stated = document["vehicles"]
+    stated = document["vehicles"] if file.several else {next(iter(roads)): document}
     if others := [name for name in stated if name not in roads]:
         raise InvalidScenario(
-            f"{path}: vehicles: got {others[0]!r}, need a planning problem of {beside}: "
+            f"{path}: vehicles: got {others[0]!r}, need a planning problem of {file.beside}: "
             f"{', '.join(roads)}"
         )
     plans = {
@@ -192,27 +270,35 @@ def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -
     return plan
 
 
-def _alone(path: Path, fleet: Mapping[str, Any] | None) -> Recording:
+def _alone(file: ResultFile) -> Recording:
     """The plans of a file, of which no more is known than it says."""
-    if fleet is None:
-        document, plan = read_plan_document(path), load_plan(path)
-        names = (_names(document, "reduced_state"), _names(document, "control"))
-        movers = [Mover(pieces=(plan,), cost=document.get("cost"), names=names)]
-    else:
-        movers = [Mover(name=name, pieces=(plan,)) for name, plan in load_plans(path).items()]
-    return Recording(kind="plan" if fleet is None else "fleet", title="", movers=tuple(movers))
-
-
-def _planned(path: Path, scenario: Scenario) -> Recording:
-    """The plan of a plan.json in the world of its scenario."""
-    document, plan, problem = read_plan_document(path), load_plan(path), scenario.problem
-    if document["automaton_hash"] != automaton_hash(problem.automaton):
+    if "steps" in file.document:
         raise InvalidScenario(
-            f"{path}: automaton_hash: this plan was made with another library than that of --with"
+            f"{file.path}: is a closed loop, need --with and the scenario it was driven in"
         )
-    _check_start(path, plan, problem.start)
-    mover = mover_of(problem, plan, cost=document.get("cost"))
-    return Recording(kind="plan", title=scenario.name, movers=(mover,), world=world_of(problem))
+    if file.several:
+        plans = load_plans(file.path)
+        movers = tuple(Mover(name=name, pieces=(plan,)) for name, plan in plans.items())
+        return Recording(kind="fleet", title="", movers=movers)
+    names = (_names(file.document, "reduced_state"), _names(file.document, "control"))
+    plan, cost = load_plan(file.path), file.document.get("cost")
+    mover = Mover(pieces=(plan,), cost=cost, names=names)
+    return Recording(kind="plan", title="", movers=(mover,))
+
+
+def _planned(file: ResultFile) -> Recording:
+    """The plan of a plan.json in the world of its scenario."""
+    scenario, plan = file.scenario, load_plan(file.path)
+    assert isinstance(scenario, Scenario)
+    if file.document["automaton_hash"] != automaton_hash(scenario.problem.automaton):
+        raise InvalidScenario(
+            f"{file.path}: automaton_hash: this plan was made with another library than that of "
+            "--with"
+        )
+    _check_start(file.path, plan, scenario.problem.start)
+    mover = mover_of(scenario.problem, plan, cost=file.document.get("cost"))
+    world = world_of(scenario.problem)
+    return Recording(kind="plan", title=scenario.name, movers=(mover,), world=world)
 
 
 def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
@@ -222,15 +308,15 @@ def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
     return tuple(map(str, names)) if isinstance(names, list) else ()
 
 
-def _on_road(path: Path, road: RoadScenario, loop: Mapping[str, Any] | None) -> Recording:
+def _on_road(file: ResultFile) -> Recording:
     """The plan or drive on a road, whose file has the rear axle's poses."""
-    document = read_plan_document(path) if loop is None else loop
-    plan = _plan_on_road(path, document, road)
+    document, road = file.document, file.roads[0]
+    plan = _plan_on_road(file.path, document, road)
     if plan is None:
-        raise InvalidScenario(f"{path}: holds no plan, its status is {document['status']!r}")
+        raise InvalidScenario(f"{file.path}: holds no plan, its status is {document['status']!r}")
     found = _answer(road_planner(road.scene, road.vehicle), plan, document)
     recording = recording_of(found)
-    reached = loop is None or bool(loop["reached"])
+    reached = "steps" not in document or bool(document["reached"])
     mover = replace(recording.movers[0], cost=document.get("cost"), reached=reached)
     return replace(recording, movers=(mover,))
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import Prepared
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, carried
@@ -39,7 +40,6 @@ from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import outside
-from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, word_of_plan, word_of_steps

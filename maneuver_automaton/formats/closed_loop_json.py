@@ -25,7 +25,6 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     DocumentHead,
     ModelEntry,
-    document_if,
     document_of,
     library_entries,
     misstated,
@@ -326,17 +325,6 @@ def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
             ),
             inside=tuple(any(within(pose, goal) for goal in problem.goals) for pose in poses),
         )
-
-
-def read_closed_loop_document(path: Path | str) -> dict[str, Any] | None:
-    """The content of a closed_loop.json, of roads and of fleets too; None if the file is none.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is one, but states what it may not.
-    """
-    return document_if(path, "loop", "drive", "fleet-loop")
 
 
 def entries_of(found: Iterable[tuple[int, Violation]]) -> list[BrokenEntry]:

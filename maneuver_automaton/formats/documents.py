@@ -146,22 +146,6 @@ def read_document(path: Path | str, *kinds: str) -> dict[str, Any]:
     return checked(kind, value, path)
 
 
-def document_if(path: Path | str, *kinds: str) -> dict[str, Any] | None:
-    """What a file holds if that is of one of these kinds; None if it is not, or cannot be read.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is of such a kind, but states what it may not.
-    """
-    try:
-        value = parsed(path)
-    except InvalidScenario:
-        return None
-    kind = kind_of(value)
-    return checked(kind, value, path) if kind in kinds else None
-
-
 def parsed(path: Path | str, file: str = "plan.json") -> Any:
     """The value of a strict JSON file; raises InvalidScenario."""
     try:

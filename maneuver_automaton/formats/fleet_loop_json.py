@@ -36,7 +36,6 @@ from maneuver_automaton.formats.documents import (
     ClosestEntry,
     DocumentHead,
     ModelEntry,
-    document_if,
     document_of,
     source_entry,
     told_of,
@@ -368,11 +367,6 @@ def _end_of(log: FleetLog, name: str, problem: Problem) -> tuple[float, Array, f
 
 
 # -- reading
-
-
-def read_fleet_loop_document(path: Path | str) -> dict[str, Any] | None:
-    """The content of a closed_loop.json of several vehicles; None if the file is none."""
-    return document_if(path, "fleet-loop")
 
 
 def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton._kept import kept_with
+from maneuver_automaton._kept import RECENT, kept_with
 from maneuver_automaton.bounds import CostToGo, Proof, besides, cell_proofs
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import terms_of
@@ -25,7 +25,6 @@ from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.prepared import RECENT
 
 GLANCE = 0.002  # [s] between two looks whether there is one
 POLISHING = 0.85  # share of the time after which what there is gets polished

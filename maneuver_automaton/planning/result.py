@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Protocol, TypeAlias
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
+from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.audit import Audit, Surroundings, TerminalError, surroundings_around
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
@@ -18,7 +19,6 @@ from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.planning.on_the_way import Passed, passed_on_the_way
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.prepared import RECENT, Prepared
 
 if TYPE_CHECKING:
     from maneuver_automaton.bounds import Narrowest

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
@@ -25,7 +26,6 @@ from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
-from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import world_around
 from maneuver_automaton.words.word import Word
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from maneuver_automaton._compile import bound
-from maneuver_automaton._kept import kept_with
+from maneuver_automaton._kept import Prepared, kept_with
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
@@ -41,7 +41,6 @@ from maneuver_automaton.search.lattice_task import (
     numbers_of_cells,
     task_of,
 )
-from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.scene import CLEARLY, pad_around
 
 SPARE = 1.5  # times the cells of the first query, of which there is memory

@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._cache_files import keep_within, read_checked, used_now, write_checked
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import RECENT, Prepared, kept_by_first
 from maneuver_automaton._kernel_folders import user_cache_folder
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search._kernels_estimate import fill_table
 from maneuver_automaton.search.arrays import CostTable
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 from maneuver_automaton.search.lattice_trims import is_mirrored
-from maneuver_automaton.search.prepared import RECENT, Prepared
 
 FOLDER = "cost_to_go"  # of the user's cache folder
 HALF = 48  # cells from the middle to the rim

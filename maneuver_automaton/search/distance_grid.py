@@ -8,11 +8,11 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import plain
+from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
 from maneuver_automaton.search._kernels_distance import BUCKETS
 from maneuver_automaton.search.arrays import CellQueue, DistanceGrid, GridLayout, GridWalls
-from maneuver_automaton.search.prepared import RECENT, Prepared
 
 MOST_CELLS = 1_000_000
 OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import RECENT, Prepared, kept_by_first
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import part_between
 from maneuver_automaton.collision import Shape
@@ -46,7 +46,6 @@ from maneuver_automaton.search.part_motion import (
     pieces_of,
     posed_parts,
 )
-from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.words.library import Library
 from maneuver_automaton.words.transitions import SWITCH, transitions_of
 

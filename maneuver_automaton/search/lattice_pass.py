@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import wrapped
-from maneuver_automaton._kept import kept_with
+from maneuver_automaton._kept import Prepared, kept_with
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
@@ -26,7 +26,6 @@ from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.lattice_library import LatticeLibrary, coasts_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import SAMPLED_HEADINGS, Resolution, task_of
-from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.words.library import NO_TRIM, LibraryArrays, scratch_of
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word, plan_of, with_price

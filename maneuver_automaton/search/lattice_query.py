@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import plain
+from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
@@ -23,7 +24,6 @@ from maneuver_automaton.search._kernels_place import places_cost, word_place
 from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
-from maneuver_automaton.search.prepared import RECENT, Prepared
 from maneuver_automaton.search.scene import (
     Ends,
     Worlds,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton._kept import RECENT, Prepared, kept_by_first
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
@@ -32,7 +32,6 @@ from maneuver_automaton.search.arrays import Scene
 from maneuver_automaton.search.lattice_library import LatticeLibrary
 from maneuver_automaton.search.part_motion import Part
 from maneuver_automaton.search.place_arrays import known_distance, place_arrays
-from maneuver_automaton.search.prepared import RECENT, Prepared
 
 CLEARLY = 1e-6  # [m] a clearance beyond the margin that leaves no doubt
 _Shapes = tuple[Shape, ...]

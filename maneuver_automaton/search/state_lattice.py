@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._kept import Prepared
 from maneuver_automaton.budget import Budget, Pace
 from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.groups import SE2
@@ -39,7 +40,6 @@ from maneuver_automaton.search.lattice_library import LatticeLibrary, library_of
 from maneuver_automaton.search.lattice_pass import GROWN_S
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
-from maneuver_automaton.search.prepared import Prepared
 from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word

@@ -12,10 +12,10 @@ import pytest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem, simulate_fleet, verify_driven
 from maneuver_automaton.formats.closed_loop_json import driven_document
+from maneuver_automaton.formats.documents import read_document
 from maneuver_automaton.formats.fleet_loop_json import (
     fleet_loop_to_dict,
     load_fleet_loop,
-    read_fleet_loop_document,
     save_fleet_loop,
 )
 from maneuver_automaton.formats.plan_json import plan_of_document
@@ -126,7 +126,7 @@ def test_interrupted_and_sources(tmp_path):
     path.parent.mkdir()
     source = {"file": tmp_path / "x.yaml", "with": None, "case": None}
     save_fleet_loop(log, path, driven=verify_driven(log), source=source, interrupted=True)
-    document = read_fleet_loop_document(path)
+    document = read_document(path, "fleet-loop")
     assert document["interrupted"] is True
     assert document["source"] == {"file": "../x.yaml", "with": None, "case": None}
     assert (document["status"], document["reached"]) == ("steps_spent", False)
@@ -177,6 +177,5 @@ def test_a_damaged_file_is_told(tmp_path, change, message):
 
 def test_files_of_one_vehicle_are_none(tmp_path):
     (tmp_path / "x.json").write_text('{"schema": 1, "reached": true, "steps": [], "step_s": 1}')
-    assert read_fleet_loop_document(tmp_path / "x.json") is None
     with pytest.raises(InvalidScenario, match=r"is no closed_loop\.json of several"):
         load_fleet_loop(tmp_path / "x.json", crossing())

@@ -13,6 +13,7 @@ import pytest
 import shapely
 from shapely.affinity import rotate, translate
 
+from maneuver_automaton._kept import Prepared
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.costs import Cost
@@ -24,7 +25,6 @@ from maneuver_automaton.planning.planner import Planner
 from maneuver_automaton.problem import Bounds, Goal, Problem, SearchSettings
 from maneuver_automaton.search import state_lattice
 from maneuver_automaton.search.free_costs import FreeTable
-from maneuver_automaton.search.prepared import Prepared
 from tests.formats.outside import DATA, needs_data
 from tests.planning.test_off_lattice import CELL, QUARTER, library, moves
 

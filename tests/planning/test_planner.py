@@ -11,11 +11,12 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from maneuver_automaton import _kept
 from maneuver_automaton.collision import Box, Disc, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import Planner, plan, result
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import cost_to_go, lattice_library, prepared, scene
+from maneuver_automaton.search import cost_to_go, lattice_library, scene
 from tests import inertia, scenes
 from tests.search.cases import TABLE_2, robot
 
@@ -78,8 +79,8 @@ def test_planners_used_in_turn_keep_what_they_prepared(monkeypatch):
     )
     for kind in kinds:
         counted(*kind)
-    monkeypatch.setattr(prepared, "MOST", 3)  # are remembered for callers that hold no planner
-    monkeypatch.setattr(prepared, "RECENT", prepared.Prepared())
+    monkeypatch.setattr(_kept, "MOST", 3)  # are remembered for callers that hold no planner
+    monkeypatch.setattr(_kept, "RECENT", _kept.Prepared())
     n = 5
     vehicle = scenes.differential_robot(1.0, 1.5)
     planners = [

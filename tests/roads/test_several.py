@@ -15,7 +15,7 @@ import shapely
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
-from maneuver_automaton.exports import load_road_fleet
+from maneuver_automaton.exports import open_result
 from maneuver_automaton.formats import load_plans
 from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
 from maneuver_automaton.groups import SE2
@@ -202,7 +202,7 @@ class TestLoop:
         for more, ending in (((), "png"), (("--animate",), "gif"), (("--html",), "html")):
             assert run(["plot", loop, *more]) == 0
             assert Path("out", f"closed_loop.{ending}").stat().st_size > 1000
-        read = load_road_fleet(loop, beside="road.xml")
+        read = open_result(loop, beside="road.xml").result()
         assert all(one.verdict.clean for one in read.results.values())
         # A file that says what was not driven is told.
         document = json.loads(Path(loop).read_text())

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 import pytest
 
+from maneuver_automaton._kept import Prepared
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.planning import Planner, plan
@@ -17,7 +18,6 @@ from maneuver_automaton.search.lattice import _Guides
 from maneuver_automaton.search.lattice_pass import pass_of
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_task import task_of
-from maneuver_automaton.search.prepared import Prepared
 from tests.quickly import quick_are
 from tests.scenes import CAR_BODY, differential_robot, random_scene, reeds_shepp, room_queries
 from tests.search.cases import compiled_only

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton._cache_files import read_checked, write_checked
+from maneuver_automaton._kept import RECENT
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
@@ -23,7 +24,6 @@ from maneuver_automaton.search._kernels_estimate import fill_table
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_trims import is_mirrored
-from maneuver_automaton.search.prepared import RECENT
 from tests import scenes
 from tests.reference_lattice import cost_table
 
@@ -121,7 +121,7 @@ SMALL = Problem(controls(on=(1.0, 0.0), left=(1.0, 1.0)), [0, 0, 0], [1, 0, 0])
 
 def kept_in(folder):
     """A table as another process would get it: from the folder, or made anew."""
-    RECENT._makers.clear()
+    RECENT.__dict__.pop("_kept", None)
     return cost_to_go_table(SMALL, reach=1.5, folder=folder).value
 
 
@@ -210,7 +210,7 @@ def test_two_processes_at_once_keep_one_whole_table(tmp_path):
 
 def test_costs_and_trims_have_tables_of_their_own(tmp_path):
     for cost in (Cost(time=1.0), Cost(time=2.0), Cost(length=1.0, time=1.0)):
-        RECENT._makers.clear()
+        RECENT.__dict__.pop("_kept", None)
         problem = Problem(SMALL.automaton, [0, 0, 0], [1, 0, 0], cost=cost)
         cost_to_go_table(problem, reach=1.5, folder=tmp_path)
     assert len(list(tmp_path.iterdir())) == 2  # the last two are the same at 1 m/s
