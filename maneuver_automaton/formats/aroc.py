@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
-from maneuver_automaton.automaton import Automaton, Trajectory
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level
 from maneuver_automaton.formats.xml_source import Element, read_xml
@@ -194,7 +194,10 @@ def automaton_of_aroc(
     }
     maneuvers = []
     for one, begin, end in zip(primitives, begin_levels.tolist(), end_levels.tolist(), strict=True):
-        course = _course_between(model, one, begin, end)
+        spans, control = np.diff(one.time), _controls(one)
+        missing = end - begin - float(control[:, 0] @ spans)  # that it ends at the speed of a trim
+        control[:, 0] += missing / float(spans.sum())
+        course = ending_at(drive(model, [begin], control=control, durations=spans), end)
         maneuvers.append(
             Maneuver.along(
                 course,
@@ -292,17 +295,6 @@ def _occupancy(row: Element) -> Occupancy:
 def _controls(one: ArocPrimitive) -> Array:
     """Inputs (n - 1, 2) from state to state."""
     return np.repeat(one.inputs, (len(one.states) - 1) // len(one.inputs), axis=0)
-
-
-def _course_between(
-    model: AcceleratingCar, one: ArocPrimitive, begin: float, end: float
-) -> Trajectory:
-    """The motion under the inputs of a file, its speeds moved to end at those of the trims."""
-    spans = np.diff(one.time)
-    control = _controls(one).copy()
-    missing = end - begin - float(control[:, 0] @ spans)
-    control[:, 0] += missing / float(spans.sum())
-    return ending_at(drive(model, [begin], control=control, durations=spans), end)
 
 
 def _check_successors(primitives: tuple[ArocPrimitive, ...], begins: Array, ends: Array) -> None:

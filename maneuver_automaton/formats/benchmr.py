@@ -26,7 +26,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, read_grey_image
+from maneuver_automaton.formats.cells import read_grey_image, world_of
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import MAX_BYTES, finite, table_of
 from maneuver_automaton.formats.xml_source import read_xml
@@ -87,11 +87,9 @@ def read_benchmr_queries(path: Path) -> tuple[Statement, ...]:
 
 
 def _world(path: Path) -> Statement:
-    obstacles = tuple(
-        Obstacle(_hull(path, drawn), name=f"obstacle {k + 1}")
-        for k, drawn in enumerate(read_svg_paths(path))
-    )
-    corners = np.concatenate([_corners(obstacle) for obstacle in obstacles])
+    hulls = [_hull(path, drawn) for drawn in read_svg_paths(path)]
+    obstacles = tuple(Obstacle(one, name=f"obstacle {k + 1}") for k, one in enumerate(hulls))
+    corners = np.concatenate([one.corners for one in hulls])
     (left, low), (right, high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     bounds = Bounds(x=(left, right), y=(low, high))
     return Statement(format="Bench-MR", name=path.stem, obstacles=obstacles, bounds=bounds)
@@ -185,11 +183,6 @@ def _hull(path: Path, drawn: DrawnPath) -> Polygon:
     return Polygon(np.asarray(hull.exterior.coords)[:-1])
 
 
-def _corners(obstacle: Obstacle) -> Array:
-    assert isinstance(obstacle.shape, Polygon)
-    return obstacle.shape.corners
-
-
 DARK = 0.5
 
 
@@ -203,14 +196,7 @@ def read_benchmr_image(path: Path) -> tuple[Statement, ...]:
     """
     dark = read_grey_image(path).shade < DARK
     cells = OccupancyMap(dark[::-1], resolution=1.0, name=path.name)
-    return (
-        Statement(
-            format="Bench-MR image",
-            name=path.stem,
-            obstacles=(cells,),
-            bounds=bounds_around(cells),
-        ),
-    )
+    return (world_of(cells, path, "Bench-MR image"),)
 
 
 _TOKEN = re.compile(r"\s*,?\s*(?:([A-Za-z])|([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?))")
@@ -242,7 +228,11 @@ def read_svg_paths(path: Path) -> tuple[DrawnPath, ...]:
         if name == "defs":  # not drawn
             continue
         if "transform" in element.attributes:
-            shift = shift + _translation(element.attributes["transform"], at)
+            text = element.attributes["transform"]
+            if (match := _TRANSLATE.fullmatch(text)) is None:
+                said = f"got {text[:60]!r}, need translate(x, y)"
+                raise InvalidScenario(f"{at}: transform: {said}")
+            shift = shift + [finite(word or "0", at=f"{at}: transform") for word in match.groups()]
         if name == "path":
             points = _points(element.attributes.get("d", ""), at)
             drawn.append(DrawnPath(points + shift, element.line))
@@ -250,13 +240,6 @@ def read_svg_paths(path: Path) -> tuple[DrawnPath, ...]:
     if not drawn:
         raise InvalidScenario(f"{path}: holds no path, need at least one")
     return tuple(drawn)
-
-
-def _translation(text: str, at: str) -> Array:
-    match = _TRANSLATE.fullmatch(text)
-    if match is None:
-        raise InvalidScenario(f"{at}: transform: got {text[:60]!r}, need translate(x, y)")
-    return np.array([finite(word or "0", at=f"{at}: transform") for word in match.groups()])
 
 
 def _points(text: str, at: str) -> Array:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.statement import MapFile, Statement
 from maneuver_automaton.formats.text_source import MAX_MAP_BYTES, read_bytes
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds
@@ -64,6 +65,12 @@ def bounds_around(cells: OccupancyMap) -> Bounds:
     )
     (left, low), (right, high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
     return Bounds(x=(left, right), y=(low, high))
+
+
+def world_of(cells: OccupancyMap, path: Path, kind: str, *maps: MapFile) -> Statement:
+    """A world with one map, and bounds around it; the rest of the problem is left to others."""
+    bounds = bounds_around(cells)
+    return Statement(format=kind, name=path.stem, obstacles=(cells,), bounds=bounds, maps=maps)
 
 
 def drawn_headings(case: int) -> Array:

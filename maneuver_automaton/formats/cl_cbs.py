@@ -35,18 +35,6 @@ RADIUS = 0.8  # [m] of an obstacle
 NO_OBSTACLE = (-1.0, -1.0)
 
 
-def is_cl_cbs(document: Document) -> bool:
-    """Whether a YAML file is a problem of CL-CBS."""
-    value = document.value
-    return isinstance(value, dict) and {"agents", "map"} <= value.keys() and "schema" not in value
-
-
-def belongs_to_cl_cbs(document: Document) -> bool:
-    """Whether a YAML file is a solution of CL-CBS, which states no problem."""
-    keys = document.value.keys() if isinstance(document.value, dict) else set()
-    return "schema" not in keys and {"statistics", "schedule"} <= keys
-
-
 def read_cl_cbs(path: Path, document: Document) -> tuple[Statement, ...]:
     """The fleet of a file.
 

@@ -275,18 +275,6 @@ def _body(model: Document, size: str, shape: str) -> Box | Disc:
     return Box(sizes_at(model, (size,)))
 
 
-def is_dynobench(document: Document) -> bool:
-    """Whether a YAML file is a problem of dynobench."""
-    value = document.value
-    return isinstance(value, dict) and "robots" in value and "schema" not in value
-
-
-def belongs_to_dynobench(document: Document) -> bool:
-    """Whether a YAML file is a model or a solution of dynobench, which states no problem."""
-    keys = document.value.keys() if isinstance(document.value, dict) else set()
-    return "schema" not in keys and ("dynamics" in keys or {"states", "actions"} <= keys)
-
-
 def read_dynobench(path: Path, document: Document) -> tuple[Statement, ...]:
     """The problem of a file, its vehicle included; or its fleet, if it has several robots.
 

@@ -393,7 +393,12 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
             did[name] = _did(stated[name]["steps"][:-1], problem.automaton)
     with told_of(path):
         steps = [_step_of(k, row, did) for k, row in enumerate(document["steps"][:-1])]
-        _check_times(steps)
+        for before, after in pairwise(steps):
+            if not after.time > before.time:
+                raise ValueError(
+                    f"steps: step {after.number} is at {after.time:g} s, need more than "
+                    f"{before.time:g} s"
+                )
     for name, problem in problems.items():
         with told_of(f"{path}: vehicles.{name}"):
             pieces[name] = tuple(
@@ -474,12 +479,3 @@ def _step_of(
         off_plan={name: float(its["off_plan_m"]) for name, its in own.items()},
         swaps=tuple(swaps),
     )
-
-
-def _check_times(steps: Sequence[FleetStep]) -> None:
-    for before, after in pairwise(steps):
-        if not after.time > before.time:
-            raise ValueError(
-                f"steps: step {after.number} is at {after.time:g} s, need more than "
-                f"{before.time:g} s"
-            )

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import save_library
@@ -58,18 +58,51 @@ def read_primitives(path: Path, model: Model | None = None) -> PrimitivesRead | 
 
 def _read(path: Path, model: Model | None) -> PrimitivesRead | None:
     """As `read_primitives`; what makes no motion raises a ValueError."""
-    ending = path.suffix.lower()
+    ending, remark = path.suffix.lower(), ""
+    file: File
     if aroc.export_at(path) is not None:
-        return _of_aroc(path, model)
-    if path.is_dir() or not path.exists():
+        kind, file = "AROC", aroc.read_aroc(path)
+        folder = path.parent if path.name == aroc.LIST else path
+        own = model if isinstance(model, AcceleratingCar) else None
+        automaton = aroc.automaton_of_aroc(file, model=own, name=folder.resolve().stem)
+        remark = str(aroc.deviation_of(file, automaton))
+    elif path.is_dir() or not path.exists():
         return None
-    if ending == MPRIM:
-        return _of_mprim(path)
-    if ending == XML and commonroad_primitives.is_commonroad_primitives(path):
-        return _of_commonroad(path)
-    if ending == JSON and _is_nav2(path):
-        return _of_nav2(path)
-    return None
+    elif ending == MPRIM:
+        kind, file = "SBPL", sbpl_mprim.read_mprim(path)
+        position, heading = sbpl_mprim.end_gap(file)
+        automaton = sbpl_mprim.automaton_of_mprim(file, name=path.stem)
+        remark = (
+            f"last poses were moved by up to {position:.2g} m and {heading:.2g} rad onto the "
+            "middle of their cells and their headings"
+        )
+    elif ending == XML and commonroad_primitives.is_commonroad_primitives(path):
+        kind, file = "CommonRoad", commonroad_primitives.read_commonroad_primitives(path)
+        automaton = commonroad_primitives.automaton_of_commonroad_primitives(file, name=path.stem)
+        remark = str(commonroad_primitives.deviation_of(file, automaton))
+    elif ending == JSON and _is_nav2(path):
+        kind, file = "Nav2", nav2_lattice.read_nav2_lattice(path)
+        name = path.name.split(".json")[0]
+        automaton = nav2_lattice.automaton_of_nav2_lattice(file, name=name)
+    else:
+        return None
+    return PrimitivesRead(kind=kind, file=file, automaton=automaton, remark=remark)
+
+
+# Of each ending that is written: the class of its files, what makes one of an automaton, and saves.
+WRITTEN: Mapping[str, tuple[type, Callable[[Automaton], Any], Callable[[Any, Path], None]]] = {
+    MPRIM: (sbpl_mprim.MprimFile, sbpl_mprim.mprim_of_automaton, sbpl_mprim.save_mprim),
+    XML: (
+        commonroad_primitives.RoadPrimitives,
+        commonroad_primitives.commonroad_primitives_of_automaton,
+        commonroad_primitives.save_commonroad_primitives,
+    ),
+    NAV2_JSON: (
+        nav2_lattice.Nav2Lattice,
+        nav2_lattice.nav2_lattice_of_automaton,
+        nav2_lattice.save_nav2_lattice,
+    ),
+}
 
 
 def writer_of(target: Path) -> Callable[[Automaton, Path], None] | None:
@@ -78,27 +111,20 @@ def writer_of(target: Path) -> Callable[[Automaton, Path], None] | None:
     `.mprim` is SBPL, `.xml` CommonRoad, `.nav2.json` Nav2, and any other `.json` a library.
     """
     name = target.name.lower()
-    writers = {
-        MPRIM: _write_mprim,
-        XML: _write_commonroad,
-        NAV2_JSON: _write_nav2,
-        JSON: save_library,
-    }
-    return next((write for ending, write in writers.items() if name.endswith(ending)), None)
+    for ending, (_, file_of, save) in WRITTEN.items():
+        if name.endswith(ending):
+            return lambda automaton, path: save(file_of(automaton), path)
+    return save_library if name.endswith(JSON) else None
 
 
 def write_again(read: PrimitivesRead, target: Path) -> bool:
     """Write a file of primitives in its own format, if `target` asks for that, to the last bit."""
-    name, file = target.name.lower(), read.file
-    if isinstance(file, sbpl_mprim.MprimFile) and name.endswith(MPRIM):
-        sbpl_mprim.save_mprim(file, target)
-    elif isinstance(file, nav2_lattice.Nav2Lattice) and name.endswith(NAV2_JSON):
-        nav2_lattice.save_nav2_lattice(file, target)
-    elif isinstance(file, commonroad_primitives.RoadPrimitives) and name.endswith(XML):
-        commonroad_primitives.save_commonroad_primitives(file, target)
-    else:
-        return False
-    return True
+    name = target.name.lower()
+    for ending, (kind, _, save) in WRITTEN.items():
+        if isinstance(read.file, kind) and name.endswith(ending):
+            save(read.file, target)
+            return True
+    return False
 
 
 def _is_nav2(path: Path) -> bool:
@@ -107,50 +133,4 @@ def _is_nav2(path: Path) -> bool:
         document = json.loads(read_text(path, most=MOST_LIBRARY_BYTES, what="a library"))
     except (ValueError, RecursionError, InvalidScenario):
         return False
-    return nav2_lattice.is_nav2_lattice(document)
-
-
-def _of_mprim(path: Path) -> PrimitivesRead:
-    file = sbpl_mprim.read_mprim(path)
-    position, heading = sbpl_mprim.end_gap(file)
-    remark = (
-        f"last poses were moved by up to {position:.2g} m and {heading:.2g} rad onto the middle of "
-        "their cells and their headings"
-    )
-    automaton = sbpl_mprim.automaton_of_mprim(file, name=path.stem)
-    return PrimitivesRead(kind="SBPL", file=file, automaton=automaton, remark=remark)
-
-
-def _of_nav2(path: Path) -> PrimitivesRead:
-    file = nav2_lattice.read_nav2_lattice(path)
-    automaton = nav2_lattice.automaton_of_nav2_lattice(file, name=path.name.split(".json")[0])
-    return PrimitivesRead(kind="Nav2", file=file, automaton=automaton, remark="")
-
-
-def _of_commonroad(path: Path) -> PrimitivesRead:
-    file = commonroad_primitives.read_commonroad_primitives(path)
-    automaton = commonroad_primitives.automaton_of_commonroad_primitives(file, name=path.stem)
-    remark = str(commonroad_primitives.deviation_of(file, automaton))
-    return PrimitivesRead(kind="CommonRoad", file=file, automaton=automaton, remark=remark)
-
-
-def _of_aroc(path: Path, model: Model | None) -> PrimitivesRead:
-    folder = path.parent if path.name == aroc.LIST else path
-    file = aroc.read_aroc(path)
-    own = model if isinstance(model, AcceleratingCar) else None
-    automaton = aroc.automaton_of_aroc(file, model=own, name=folder.resolve().stem)
-    remark = str(aroc.deviation_of(file, automaton))
-    return PrimitivesRead(kind="AROC", file=file, automaton=automaton, remark=remark)
-
-
-def _write_mprim(automaton: Automaton, path: Path) -> None:
-    sbpl_mprim.save_mprim(sbpl_mprim.mprim_of_automaton(automaton), path)
-
-
-def _write_nav2(automaton: Automaton, path: Path) -> None:
-    nav2_lattice.save_nav2_lattice(nav2_lattice.nav2_lattice_of_automaton(automaton), path)
-
-
-def _write_commonroad(automaton: Automaton, path: Path) -> None:
-    file = commonroad_primitives.commonroad_primitives_of_automaton(automaton)
-    commonroad_primitives.save_commonroad_primitives(file, path)
+    return isinstance(document, dict) and "lattice_metadata" in document

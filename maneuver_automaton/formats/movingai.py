@@ -21,7 +21,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, check_size, drawn_headings
+from maneuver_automaton.formats.cells import bounds_around, check_size, drawn_headings, world_of
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import (
     MAX_MAP_BYTES,
@@ -108,15 +108,7 @@ def read_movingai_map(path: Path) -> tuple[Statement, ...]:
     InvalidScenario
         As `load_movingai_map`.
     """
-    cells = load_movingai_map(path)
-    return (
-        Statement(
-            format="MovingAI map",
-            name=path.stem,
-            obstacles=(cells,),
-            bounds=bounds_around(cells),
-        ),
-    )
+    return (world_of(load_movingai_map(path), path, "MovingAI map"),)
 
 
 def read_movingai_scenario(path: Path) -> tuple[Statement, ...]:

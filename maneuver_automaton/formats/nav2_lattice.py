@@ -15,7 +15,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, NotRequired
+from typing import Annotated, NotRequired
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -124,11 +124,6 @@ class Nav2Lattice:
         freeze(self, "headings")
 
 
-def is_nav2_lattice(document: Any) -> bool:
-    """Whether what a JSON file holds is a lattice of Nav2."""
-    return isinstance(document, dict) and "lattice_metadata" in document
-
-
 def read_nav2_lattice(path: Path) -> Nav2Lattice:
     """The primitives of a file, as they stand there.
 
@@ -181,12 +176,6 @@ def save_nav2_lattice(file: Nav2Lattice, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    text = json.dumps(nav2_lattice_to_dict(file), indent="\t", allow_nan=False)
-    write_text_atomically(path, text + "\n")
-
-
-def nav2_lattice_to_dict(file: Nav2Lattice) -> dict[str, Any]:
-    """What the file says, in the order in which Nav2 writes it."""
     counts = {
         "num_of_headings": file.headings.size,
         "number_of_trajectories": len(file.primitives),
@@ -194,7 +183,9 @@ def nav2_lattice_to_dict(file: Nav2Lattice) -> dict[str, Any]:
     head = entry(Nav2Head, file, **counts)
     known = {key: value for key, value in head.items() if value is not None}
     content = entry(Nav2File, file, lattice_metadata=known)
-    return {key: value for key, value in content.items() if value != ""}
+    stated = {key: value for key, value in content.items() if value != ""}
+    text = json.dumps(stated, indent="\t", allow_nan=False)
+    write_text_atomically(path, text + "\n")
 
 
 def automaton_of_nav2_lattice(

@@ -27,7 +27,7 @@ from maneuver_automaton.collision import OccupancyMap, Polygon
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import GreyImage, bounds_around, check_cell, read_grey_image
+from maneuver_automaton.formats.cells import GreyImage, check_cell, read_grey_image, world_of
 from maneuver_automaton.formats.statement import MapFile, Statement, Unknown
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse, shown
@@ -51,16 +51,6 @@ class _Header:
     occupied: float
     free: float
     mode: str  # one of MODES
-
-
-def is_nav2_map(document: Document) -> bool:
-    """Whether a YAML file is one of a map."""
-    value = document.value
-    return (
-        isinstance(value, dict)
-        and "schema" not in value
-        and {"image", "resolution"} & set(value) != set()
-    )
 
 
 def load_nav2_map(path: Path, *, unknown: Unknown = "blocked") -> OccupancyMap:
@@ -152,15 +142,7 @@ def read_nav2_map(path: Path, document: Document) -> tuple[Statement, ...]:
         As `load_nav2_map`.
     """
     cells = map_of_document(document, path)
-    return (
-        Statement(
-            format="Nav2 map",
-            name=path.stem,
-            obstacles=(cells,),
-            bounds=bounds_around(cells),
-            maps=(MapFile(map=cells, path=path),),
-        ),
-    )
+    return (world_of(cells, path, "Nav2 map", MapFile(map=cells, path=path)),)
 
 
 def save_nav2_map(cells: OccupancyMap, path: Path) -> None:
@@ -228,11 +210,21 @@ def _header(document: Document) -> _Header:
         raise document.error(
             ("free_thresh",), f"got {free:g}, need at most occupied_thresh, {occupied:g}"
         )
+    places = tuple(_number(document, ("origin", k)) for k in range(3))
+    for k, place in enumerate(places):
+        most = FARTHEST_CELL * resolution if k < 2 else MOST_HEADING
+        if abs(place) > most:
+            raise document.error(("origin", k), f"got {place:g}, need at most {most:g} in size")
+    negate = value["negate"]
+    if isinstance(negate, str):
+        negate = YES_OR_NO.get(negate.lower(), negate)
+    if negate not in (0, 1) or isinstance(negate, float):
+        raise document.error(("negate",), f"got {shown(negate)}, need 0 or 1")
     return _Header(
         image=image,
         resolution=resolution,
-        origin=tuple(_origin(document, k, resolution) for k in range(3)),
-        negate=_negate(document),
+        origin=places,
+        negate=bool(negate),
         occupied=occupied,
         free=free,
         mode=mode.lower(),
@@ -248,23 +240,6 @@ def _number(document: Document, where: tuple[str | int, ...], most: float = math
         need = "a finite number" if most == math.inf else f"a number from 0 to {most:g}"
         raise document.error(where, f"got {shown(value)}, need {need}")
     return float(value)
-
-
-def _origin(document: Document, k: int, resolution: float) -> float:
-    value = _number(document, ("origin", k))
-    most = FARTHEST_CELL * resolution if k < 2 else MOST_HEADING
-    if abs(value) > most:
-        raise document.error(("origin", k), f"got {value:g}, need at most {most:g} in size")
-    return value
-
-
-def _negate(document: Document) -> bool:
-    value = document.value["negate"]
-    if isinstance(value, str) and value.lower() in YES_OR_NO:
-        return YES_OR_NO[value.lower()]
-    if value not in (0, 1) or isinstance(value, float):
-        raise document.error(("negate",), f"got {shown(value)}, need 0 or 1")
-    return bool(value)
 
 
 def _occupancy(image: GreyImage, header: _Header) -> Array:

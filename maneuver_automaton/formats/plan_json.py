@@ -5,7 +5,7 @@ Every key is always there: without a plan the numbers are null and the lists emp
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, NotRequired, cast
@@ -442,8 +442,18 @@ def plan_of_document(document: Mapping[str, Any], model: Model | None = None) ->
         control=_rows(trajectory, "control", len(time)),
         model=model,
     )
-    durations = [_duration(k, entry) for k, entry in enumerate(primitives)]
-    switches = _switches(time, durations)
+    for k, one in enumerate(primitives):
+        if (kind := one["kind"]) not in ("trim", "maneuver"):
+            raise ValueError(f"primitives[{k}].kind: got {kind!r}, need 'trim' or 'maneuver'")
+    durations = [
+        float(as_array(f"primitives[{k}].duration_s", one["duration_s"]))
+        for k, one in enumerate(primitives)
+    ]
+    due = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
+    switches = [int(np.abs(time - at).argmin()) for at in due]  # samples
+    tolerance = TIME_TOLERANCE * max(1.0, float(np.abs(due).max()))
+    if np.abs(time[switches] - due).max() > tolerance or switches[-1] != len(time) - 1:
+        raise ValueError("trajectory: has no sample at a switching time of the primitives")
     pieces = [
         _primitive(entry, _stretch(samples, begin, end))
         for entry, begin, end in zip(primitives, switches[:-1], switches[1:], strict=True)
@@ -511,22 +521,6 @@ def _passed(name: str, course: Trajectory, at: int) -> Trim:
         body_velocity=np.zeros(course.pose.shape[1]),
         reduced_state=course.reduced_state[at],
     )
-
-
-def _duration(k: int, entry: Mapping[str, Any]) -> float:
-    if entry["kind"] not in ("trim", "maneuver"):
-        raise ValueError(f"primitives[{k}].kind: got {entry['kind']!r}, need 'trim' or 'maneuver'")
-    return float(as_array(f"primitives[{k}].duration_s", entry["duration_s"]))
-
-
-def _switches(time: Array, durations: Sequence[float]) -> list[int]:
-    """Index of the sample at every switching time."""
-    due = time[0] + np.concatenate([[0.0], np.cumsum(durations)])
-    indices = [int(np.abs(time - at).argmin()) for at in due]
-    tolerance = TIME_TOLERANCE * max(1.0, float(np.abs(due).max()))
-    if np.abs(time[indices] - due).max() > tolerance or indices[-1] != len(time) - 1:
-        raise ValueError("trajectory: has no sample at a switching time of the primitives")
-    return indices
 
 
 def _twist(time: Array, pose: Array) -> Array:

@@ -66,7 +66,8 @@ class BuiltIn:
     endings: str
     module: str
     reads: str  # the function that does
-    test: str = ""  # of a path, or of a YAML document; empty: the ending is enough
+    test: str = ""  # of a path; empty: the ending is enough
+    keys: tuple[str, ...] = ()  # of a YAML file: the words of one of these
     saves: str = ""
     alone: bool = True  # a problem by itself, where it is found in a folder
     count: str = ""  # problems of a path; "several": always so many that --case tells which
@@ -75,7 +76,9 @@ class BuiltIn:
         """Whether a file is in it, by its ending and its content."""
         if path.suffix.lower() not in self.endings.split():
             return False
-        return not self.test or bool(self.call(self.test, path if document is None else document))
+        if self.keys:
+            return document is not None and _has_keys(document, *self.keys)
+        return not self.test or bool(self.call(self.test, path))
 
     def read(self, path: Path, document: Document | None) -> tuple[Statement, ...]:
         """What a file states, problem by problem."""
@@ -110,10 +113,23 @@ BUILT_IN = (  # of one ending: the last is read where none recognises the file, 
     ),
     BuiltIn("Bench-MR", ".svg", "benchmr", "read_benchmr", "n_queries", count="n_queries"),
     BuiltIn("Bench-MR", ".png .bmp", "benchmr", "read_benchmr_image", alone=False),
-    BuiltIn("dynobench", YAML, "dynobench", "read_dynobench", "is_dynobench"),
-    BuiltIn("CL-CBS", YAML, "cl_cbs", "read_cl_cbs", "is_cl_cbs"),
-    BuiltIn("Nav2", YAML, "nav2_map", "read_nav2_map", "is_nav2_map", saves="save_nav2_map"),
+    BuiltIn("dynobench", YAML, "dynobench", "read_dynobench", keys=("robots",)),
+    BuiltIn("CL-CBS", YAML, "cl_cbs", "read_cl_cbs", keys=("agents map",)),
+    BuiltIn(
+        "Nav2",
+        YAML,
+        "nav2_map",
+        "read_nav2_map",
+        keys=("image", "resolution"),
+        saves="save_nav2_map",
+    ),
 )
+OF_DYNOBENCH = "is a model or a solution of dynobench, need the problem (environment, robots)"
+BELONG: Mapping[str, str] = {  # to a problem that they do not state: files with these keys
+    "dynamics": OF_DYNOBENCH,
+    "states actions": OF_DYNOBENCH,
+    "statistics schedule": "is a solution of CL-CBS, need the problem (agents, map)",
+}
 
 
 @functools.cache
@@ -154,9 +170,13 @@ def format_of(path: Path, document: Document | None = None) -> FileFormat | None
     for one in from_outside():
         if one.recognises(path, document):
             return one
-    if ending == ".xml" and _holds_primitives(path):
-        raise InvalidScenario(f"{path}: holds {PRIMITIVES}")
-    if said := NOT_READ.get(ending):
+    said = NOT_READ.get(ending)
+    if ending == ".xml":
+        from maneuver_automaton.formats.commonroad_primitives import is_commonroad_primitives
+
+        with contextlib.suppress(OSError, ValueError):  # told by who reads it
+            said = NOT_READ[".mprim"] if is_commonroad_primitives(path) else None
+    if said:
         raise InvalidScenario(f"{path}: {said}")
     of_it = [one for one in BUILT_IN if ending in one.endings.split()]
     if document is None and of_it:
@@ -193,13 +213,13 @@ def yaml_statements(document: Document, path: Path) -> tuple[Statement, ...] | N
 
 def belongs_to(document: Document) -> str:
     """Why a YAML file states no problem, if it belongs to one; empty if it does not."""
-    from maneuver_automaton.formats import cl_cbs, dynobench
+    return next((said for keys, said in BELONG.items() if _has_keys(document, keys)), "")
 
-    if dynobench.belongs_to_dynobench(document):
-        return "is a model or a solution of dynobench, need the problem (environment, robots)"
-    if cl_cbs.belongs_to_cl_cbs(document):
-        return "is a solution of CL-CBS, need the problem (agents, map)"
-    return ""
+
+def _has_keys(document: Document, *either: str) -> bool:
+    """Whether a YAML file is no scenario, and has all keys of one of these lists of words."""
+    keys = document.value.keys() if isinstance(document.value, dict) else set()
+    return "schema" not in keys and any(set(words.split()) <= keys for words in either)
 
 
 def map_writer_of(path: Path) -> FileFormat | None:
@@ -232,16 +252,6 @@ def holds_several(path: Path) -> bool:
             with contextlib.suppress(InvalidScenario):  # told when it is planned
                 return int(one.call(one.count, path)) > 1
     return False
-
-
-def _holds_primitives(path: Path) -> bool:
-    """Whether an XML file holds motion primitives of CommonRoad; not if it cannot be read."""
-    from maneuver_automaton.formats.commonroad_primitives import is_commonroad_primitives
-
-    try:
-        return is_commonroad_primitives(path)
-    except (OSError, ValueError):
-        return False
 
 
 def load_map(path: Path | str, *, unknown: Unknown = "blocked") -> OccupancyMap:

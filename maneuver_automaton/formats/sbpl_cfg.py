@@ -75,10 +75,19 @@ def read_sbpl(path: Path) -> tuple[Statement, ...]:
     """
     lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="an environment"))
     header, begin = _header(path, lines)
+    suffix = METRES if CELL in header else CELLS
+    for key in (SIZE, "obsthresh:", f"start{suffix}", f"end{suffix}"):
+        if key not in header:
+            with_size = " beside cellsize(meters)" if CELL in header and suffix in key else ""
+            raise InvalidScenario(f"{path}: the key {key[:-1]!r} is missing{with_size}")
     columns, rows = (whole(w.text, at=f"{path}:{w.line}: {SIZE[:-1]}") for w in header[SIZE])
     check_size(columns, rows, at=f"{path}:{header[SIZE][0].line}: {SIZE[:-1]}")
     costs = _costs(path, lines, begin, columns * rows)
-    numbers = {key: _numbers(path, key, words) for key, words in header.items() if key != SIZE}
+    numbers = {
+        key: [finite(word.text, at=f"{path}:{word.line}: {key[:-1]}") for word in words]
+        for key, words in header.items()
+        if key != SIZE
+    }
     cell = float(numbers[CELL][0]) if CELL in numbers else 1.0
     if CELL in numbers:
         check_cell(cell, at=f"{path}:{header[CELL][0].line}: {CELL[:-1]}")
@@ -113,7 +122,6 @@ def _header(path: Path, lines: list[str]) -> tuple[_Header, int]:
                     f"{path}:{number}: {key[:-1]}: got {len(header[key])} numbers, need {KEYS[key]}"
                 )
             if text == GRID:
-                _check_complete(path, header)
                 return header, k
             if text not in KEYS:
                 known = ", ".join(name[:-1] for name in (*KEYS, GRID))
@@ -123,18 +131,6 @@ def _header(path: Path, lines: list[str]) -> tuple[_Header, int]:
             place = (text, k + 1)
             header[text] = []
     raise InvalidScenario(f"{path}:{max(len(lines), 1)}: the key {GRID[:-1]!r} is missing")
-
-
-def _check_complete(path: Path, header: _Header) -> None:
-    suffix = METRES if CELL in header else CELLS
-    for key in (SIZE, "obsthresh:", f"start{suffix}", f"end{suffix}"):
-        if key not in header:
-            with_size = " beside cellsize(meters)" if CELL in header and suffix in key else ""
-            raise InvalidScenario(f"{path}: the key {key[:-1]!r} is missing{with_size}")
-
-
-def _numbers(path: Path, key: str, words: list[_CfgWord]) -> list[float]:
-    return [finite(word.text, at=f"{path}:{word.line}: {key[:-1]}") for word in words]
 
 
 def _costs(path: Path, lines: list[str], begin: int, n: int) -> Array:

@@ -102,10 +102,11 @@ class _Words:
         self.ahead = self.ahead or next(self.words, None)
         return self.ahead[0] if self.ahead else ""
 
-    def key(self, name: str) -> None:
+    def key(self, name: str) -> _Words:
         word = self.next(name)
         if word != name:
             raise InvalidScenario(f"{self.path}:{self.line}: got {word!r:.40}, need {name}")
+        return self
 
     def finite(self, what: str) -> float:
         word = self.next(what)
@@ -135,19 +136,15 @@ def read_mprim(path: Path) -> MprimFile:
         another heading than it says, or two of a heading have the same number.
     """
     words = _Words(path)
-    words.key(RESOLUTION)
-    resolution = words.positive(RESOLUTION)
+    resolution = words.key(RESOLUTION).positive(RESOLUTION)
     radius = None
     if words.peek() == RADIUS:
-        words.key(RADIUS)
-        radius = words.positive(RADIUS)
-    words.key(ANGLES)
-    n_angles = words.whole(ANGLES, least=1)
+        radius = words.key(RADIUS).positive(RADIUS)
+    n_angles = words.key(ANGLES).whole(ANGLES, least=1)
     headings = 2.0 * np.pi * np.arange(n_angles) / n_angles
     if radius is not None:
         headings = _listed(words, n_angles)
-    words.key(TOTAL)
-    total = words.whole(TOTAL)
+    total = words.key(TOTAL).whole(TOTAL)
     if total > MOST_BYTES // 10:
         raise words.wrong(TOTAL, f"got {total}, more than a file can hold")
     primitives = tuple(_primitive(words, resolution, headings, radius) for _ in range(total))
@@ -178,11 +175,6 @@ def save_mprim(file: MprimFile, path: Path) -> None:
     OSError
         If the file cannot be written.
     """
-    write_text_atomically(path, mprim_text(file))
-
-
-def mprim_text(file: MprimFile) -> str:
-    """The text of a file of primitives."""
     lines = [f"{RESOLUTION} {file.resolution!r}"]
     if file.min_turning_radius is not None:
         lines.append(f"{RADIUS} {file.min_turning_radius!r}")
@@ -201,7 +193,7 @@ def mprim_text(file: MprimFile) -> str:
             lines.append(f"{PRIMITIVE_RADIUS} {one.turning_radius or 0.0!r}")
         lines.append(f"{POSES} {len(one.poses)}")
         lines += [" ".join(map(repr, pose)) for pose in one.poses.tolist()]
-    return "\n".join(lines) + "\n"
+    write_text_atomically(path, "\n".join(lines) + "\n")
 
 
 def automaton_of_mprim(
@@ -290,8 +282,7 @@ def end_gap(file: MprimFile) -> tuple[float, float]:
 def _listed(words: _Words, n_angles: int) -> Array:
     headings: list[float] = []
     for k in range(n_angles):
-        words.key(f"angle:{k}")
-        headings.append(words.finite(f"angle:{k}"))
+        headings.append(words.key(f"angle:{k}").finite(f"angle:{k}"))
         if k and not headings[k] > headings[k - 1]:
             raise words.wrong(f"angle:{k}", f"got {headings[k]:g}, need more than the one before")
     if not (headings[0] > -1e-9 and headings[-1] < 2.0 * np.pi):
@@ -302,21 +293,18 @@ def _listed(words: _Words, n_angles: int) -> Array:
 def _primitive(
     words: _Words, resolution: float, headings: Array, radius: float | None
 ) -> MprimPrimitive:
-    words.key(FIRST)
-    number = words.whole(FIRST)
-    words.key(START)
-    start = _heading(words, START, headings)
+    number = words.key(FIRST).whole(FIRST)
+    start = words.key(START).whole(START)
+    if start >= headings.size:
+        raise words.wrong(START, f"got the heading {start}, need 0 to {headings.size - 1}")
     words.key(END)
     column, row = (words.whole(END, least=-(2**31)) for _ in range(2))
     end = (column, row, words.whole(END, least=-headings.size))
-    words.key(MULTIPLIER)
-    multiplier = words.whole(MULTIPLIER)
+    multiplier = words.key(MULTIPLIER).whole(MULTIPLIER)
     own = None
     if radius is not None:
-        words.key(PRIMITIVE_RADIUS)
-        own = words.finite(PRIMITIVE_RADIUS)
-    words.key(POSES)
-    count = words.whole(POSES, least=1)
+        own = words.key(PRIMITIVE_RADIUS).finite(PRIMITIVE_RADIUS)
+    count = words.key(POSES).whole(POSES, least=1)
     poses: list[list[float]] = []
     first = words.line
     for k in range(count):
@@ -333,13 +321,6 @@ def _primitive(
     _check_ends(words, made, resolution, headings, first)
     _check_between(words, made, resolution)
     return made
-
-
-def _heading(words: _Words, what: str, headings: Array) -> int:
-    index = words.whole(what)
-    if index >= headings.size:
-        raise words.wrong(what, f"got the heading {index}, need 0 to {headings.size - 1}")
-    return index
 
 
 def _check_ends(

@@ -78,55 +78,6 @@ class Element:
         return InvalidScenario(f"{self.at}: {what}")
 
 
-class _XmlBuilder:
-    """Collect the elements of one file."""
-
-    def __init__(self, path: Path | zipfile.Path) -> None:
-        self.path = path
-        self.open: list[Element] = []
-        self.root: Element | None = None
-        self.parser = expat.ParserCreate()
-        self.parser.buffer_text = True
-        self.parser.StartElementHandler = self._start
-        self.parser.EndElementHandler = self._end
-        self.parser.CharacterDataHandler = self._text
-        self.parser.StartDoctypeDeclHandler = self._doctype
-
-    def read(self, content: bytes) -> Element:
-        parse(self.parser, content, self.path)
-        assert self.root is not None  # expat accepts no file without an element
-        return self.root
-
-    def _start(self, tag: str, attributes: dict[str, str]) -> None:
-        element = Element(tag, attributes, self.path, self.parser.CurrentLineNumber)
-        if self.open:
-            self.open[-1].children.append(element)
-        else:
-            self.root = element
-        self.open.append(element)
-
-    def _end(self, tag: str) -> None:
-        self.open.pop()
-
-    def _text(self, text: str) -> None:
-        self.open[-1].text += text
-
-    def _doctype(self, *_: object) -> None:
-        line = self.parser.CurrentLineNumber
-        raise InvalidScenario(f"{self.path}:{line}: has a document type, need a file without one")
-
-
-def parse(parser: expat.XMLParserType, content: bytes, path: Path | zipfile.Path) -> None:
-    """Let a parser read a whole file; a fault in the XML is an error that names its line."""
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as error:
-        said = expat.ErrorString(error.code)
-        raise InvalidScenario(f"{path}:{error.lineno}: not valid XML: {said}") from error
-    except LookupError as error:  # an encoding that Python does not know
-        raise InvalidScenario(f"{path}: not valid XML: {error}") from error
-
-
 def read_xml(path: Path | zipfile.Path, *, what: str, most: int) -> Element:
     """The root element of a file of at most `most` bytes; `what` is what it should hold.
 
@@ -135,7 +86,30 @@ def read_xml(path: Path | zipfile.Path, *, what: str, most: int) -> Element:
     InvalidScenario
         If it cannot be read, or is no XML.
     """
-    return _XmlBuilder(path).read(read_bytes(path, most=most, what=what))
+    parser, begun = expat.ParserCreate(), [Element("", {}, path, 0)]
+    parser.buffer_text = True
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        begun.append(Element(tag, attributes, path, parser.CurrentLineNumber))
+        begun[-2].children.append(begun[-1])
+
+    def text(found: str) -> None:
+        begun[-1].text += found
+
+    def doctype(*_: object) -> None:
+        line = parser.CurrentLineNumber
+        raise InvalidScenario(f"{path}:{line}: has a document type, need a file without one")
+
+    parser.StartElementHandler, parser.StartDoctypeDeclHandler = start, doctype
+    parser.CharacterDataHandler, parser.EndElementHandler = text, lambda _: begun.pop()
+    try:
+        parser.Parse(read_bytes(path, most=most, what=what), True)
+    except expat.ExpatError as error:
+        said = expat.ErrorString(error.code)
+        raise InvalidScenario(f"{path}:{error.lineno}: not valid XML: {said}") from error
+    except LookupError as error:  # an encoding that Python does not know
+        raise InvalidScenario(f"{path}: not valid XML: {error}") from error
+    return begun[0].children[0]  # expat accepts no file without an element
 
 
 def root_tag(path: Path) -> str:

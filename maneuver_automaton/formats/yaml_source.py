@@ -129,19 +129,19 @@ def parse(text: str, *, name: str, what: str = "a scenario") -> Document:
     if len(text) > MAX_BYTES:
         raise too_long(name, MAX_BYTES, what=what)
     if bad := _NOT_TEXT.search(text):
+        line = text.count("\n", 0, bad.start()) + 1
         raise InvalidScenario(
-            f"{name}:{_line_at(text, bad.start())}: is not a text file: "
-            f"it has the character {bad.group()!r}"
+            f"{name}:{line}: is not a text file: it has the character {bad.group()!r}"
         )
     try:
         return _Builder(name, what).build(yaml.parse(text, Loader=_PARSER))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        line = f":{mark.line + 1}" if mark else ""
+        place = f":{mark.line + 1}" if mark else ""
         said = _problem(error, text.splitlines()[mark.line :] if mark else [])
         if TOO_DEEP in said:  # more than libyaml itself reads
-            raise InvalidScenario(f"{name}{line}: {NESTED}") from error
-        raise InvalidScenario(f"{name}{line}: not valid YAML: {said}") from error
+            raise InvalidScenario(f"{name}{place}: {NESTED}") from error
+        raise InvalidScenario(f"{name}{place}: not valid YAML: {said}") from error
     except (yaml.YAMLError, UnicodeEncodeError) as error:
         said = " ".join(str(error).split())
         raise InvalidScenario(f"{name}: not valid YAML: {said}") from error
@@ -277,23 +277,14 @@ def scalar(text: str) -> Hashable:
     if text in _WORDS:
         return _WORDS[text]  # type: ignore[no-any-return]
     if _WHOLE.fullmatch(text):
-        return _whole(text)
+        if len(text) > 200:
+            return float("inf")
+        base = {"0o": 8, "0x": 16}.get(text[:2], 10)
+        value = int(text if base == 10 else text[2:], base)
+        return value if abs(value) < 2**63 else float(value)  # which says that it is huge
     if _FLOAT.fullmatch(text):
         return float(text)
     return text
-
-
-def _whole(text: str) -> int | float:
-    """A whole number; beyond 64 bits a float, which says that it is huge."""
-    if len(text) > 200:
-        return float("inf")
-    base = {"0o": 8, "0x": 16}.get(text[:2], 10)
-    value = int(text if base == 10 else text[2:], base)
-    return value if abs(value) < 2**63 else float(value)
-
-
-def _line_at(text: str, position: int) -> int:
-    return text.count("\n", 0, position) + 1
 
 
 def _problem(error: yaml.MarkedYAMLError, from_there: list[str]) -> str:
