@@ -17,7 +17,7 @@ from maneuver_automaton.formats.documents import KINDS, schema_of
 from maneuver_automaton.scenario import json_schema
 
 TOPICS = {  # rooms of the package
-    "Planning": ("planning",),
+    "Planning": ("planning", "field"),
     "Problems and costs": ("problem", "costs"),
     "Vehicles": ("models",),
     "Libraries and plans": ("automaton", "primitives", "groups", "design"),

@@ -52,7 +52,8 @@ def degrees_of(places: ArrayLike, *, origin: ArrayLike) -> Array:
     x, y, z = np.moveaxis(foot / HALF_AXES + beside - below[..., None] * up, -1, 0)
     east = np.remainder(longitude + np.arctan2(y, x) + np.pi, 2.0 * np.pi) - np.pi
     north = np.arctan2(z * SEMI_MAJOR_M, np.hypot(x, y) * SEMI_MINOR_M)
-    return np.degrees(np.stack([east, north], axis=-1))
+    degrees: Array = np.degrees(np.stack([east, north], axis=-1))
+    return degrees
 
 
 def metres_of(degrees: ArrayLike, *, origin: ArrayLike) -> Array:

@@ -155,7 +155,10 @@ def _messages(
         {"header": header, "pose": {"position": at["translation"], "orientation": at["rotation"]}}
         for header, at in zip(headers, _transforms(rows.pose), strict=True)
     ]
-    twists, felt = _twists(rows.twist), _felt(rows, mover.model)
+    twists, felt = _twists(rows.twist), None
+    if mover.model is not None:  # accelerations in the frame of the body
+        felt = twist_rates(mover.model, rows.reduced_state, rows.control)
+        felt[:, :2] = accelerations(rows.twist, felt)
     not_set = [{"linear": UNKNOWN, "angular": UNKNOWN}] * len(since)
     changes = not_set if felt is None else _twists(felt)
     messages: dict[str, Any] = {
@@ -218,15 +221,6 @@ def _trajectory(
             for k, time in enumerate(since.tolist())
         ],
     }
-
-
-def _felt(rows: PlanArrays, model: Model | None) -> Array | None:
-    """Accelerations (n, dof) in the frame of the body; None where the model is not known."""
-    if model is None:
-        return None
-    felt = twist_rates(model, rows.reduced_state, rows.control)
-    felt[:, :2] = accelerations(rows.twist, felt)
-    return felt
 
 
 def _frames(frames: Sequence[tuple[str, Array]], headers: Sequence[Message]) -> list[Message]:

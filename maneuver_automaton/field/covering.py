@@ -6,9 +6,11 @@ import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
+import shapely
 
 from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
@@ -16,7 +18,6 @@ from maneuver_automaton.audit import terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.collision import (
-    AnyShape,
     Disc,
     Obstacle,
     Polygon,
@@ -75,28 +76,14 @@ class FieldProblem:
     """
 
     planner: Planner
-    shape: Polygon
+    shape: Any  # a Polygon, once it is made
     width: float = field(kw_only=True)  # [m]
     headland: float = field(default=0.0, kw_only=True)  # [m]; 0: chosen
     direction: float | None = field(default=None, kw_only=True)  # [rad]
 
     __repr__ = brief
 
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            planner: Planner,
-            shape: AnyShape,
-            *,
-            width: float,
-            headland: float = 0.0,
-            direction: float | None = None,
-        ) -> None: ...
-
     def __post_init__(self) -> None:
-        import shapely
-
         plain_numbers(self)
         if not isinstance(self.shape, Polygon):
             object.__setattr__(self, "shape", Polygon(self.shape))
@@ -114,6 +101,8 @@ class FieldProblem:
                 f"field: the {model.name} flies or is bound to a lattice, need a vehicle that "
                 "drives in every direction of the plane"
             )
+        if self.radius == math.inf:
+            raise ValueError("field: no trim turns, need some for the turns between swaths")
         backs = bool((planner.automaton.body_velocities[:, 0] < 0.0).any())
         if not self.headland and self.straight:
             room = (1.0 if backs else PEAR) * self.radius + self._reach + planner.margin
@@ -162,15 +151,11 @@ class FieldProblem:
     @property
     def whole(self) -> Any:
         """The field as a polygon of shapely."""
-        import shapely
-
         return shapely.Polygon(self.shape.corners, self.shape.holes)
 
     @property
     def inner(self) -> Any:
         """What swaths are to cover: the field without its headland, as geometry of shapely."""
-        import shapely
-
         inner = self.whole
         for one in self.planner.obstacles:
             assert isinstance(one, Obstacle)
@@ -191,8 +176,6 @@ class FieldProblem:
     @property
     def inside(self) -> Planner:
         """The planner that keeps the vehicle inside the field, and out of its holes."""
-        import shapely
-
         outer = shapely.Polygon(self.shape.corners)
         around = outer.buffer(self._reach + 2.0 * self.width, join_style="mitre") - outer
         rings = [Obstacle(Polygon(around), name="boundary")]
@@ -203,8 +186,14 @@ class FieldProblem:
 
     def moved(self, by: LieGroup) -> FieldProblem:
         """The field moved by a planar pose, with all that stands in it."""
+        if not self.planner.bounds.are_open:
+            raise ValueError("field: bounds do not move with the symmetry")
         direction = None if self.direction is None else self.direction + float(by.pose[2])
-        there = self.planner.with_obstacles([one.moved(by) for one in self.planner.obstacles])
+        there = replace(
+            self.planner,
+            obstacles=tuple(one.moved(by) for one in self.planner.obstacles),
+            zones=tuple(one.moved(by) for one in self.planner.zones),
+        )
         return replace(self, planner=there, shape=self.shape.moved(by), direction=direction)
 
 
@@ -227,8 +216,6 @@ class FieldResult:
     @property
     def strips(self) -> Any:
         """The geometry of shapely that is worked: all swaths at the working width."""
-        import shapely
-
         lines = shapely.linestrings(self.swaths[:, :, :2])
         return shapely.union_all(shapely.buffer(lines, 0.5 * self.problem.width, cap_style="flat"))
 
@@ -327,8 +314,6 @@ def _swaths(problem: FieldProblem) -> Array:
 
 def _swaths_along(problem: FieldProblem, angle: float) -> Array:
     """Swaths (n, 2, 3) in a direction [rad]: side by side, as far as the field reaches in each."""
-    import shapely
-
     turned, width = SE2([0.0, 0.0, angle]), problem.width
     inner = shapely.transform(problem.inner, turned.inverse().act)
     left, low, right, high = inner.bounds
@@ -369,7 +354,11 @@ class _Turns:
         back = swaths[:, ::-1] + [0.0, 0.0, math.pi]
         self.states = np.stack([swaths, back], axis=1).reshape(-1, 2, 3)  # (2 n, 2, 3)
         self.problem, self.planner = problem, problem.inside
-        self.how: dict[str, Any] = {"time_limit": time_limit, "jobs": jobs, "take": _plan_of}
+        self.how: dict[str, Any] = {
+            "time_limit": time_limit,
+            "jobs": jobs,
+            "take": attrgetter("plan"),
+        }
         self.alike: list[tuple[Array, Plan | None]] = []  # in free space, by where they lead
         self.plans: dict[tuple[int, int], Plan] = {}
         here, there, swath = (
@@ -461,10 +450,6 @@ class _Turns:
             clearance_m=found.audit.min_clearance_m,
             audit=found.audit,
         )
-
-
-def _plan_of(result: PlanResult) -> Plan | None:
-    return result.plan
 
 
 def _alike(one: Array, other: Array) -> bool:

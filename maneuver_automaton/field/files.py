@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from pydantic import Field
 
 from maneuver_automaton._brief import brief
@@ -176,8 +177,6 @@ def save_field_geojson(
 
 
 def _features(covered: FieldResult) -> Iterator[dict[str, Any]]:
-    import shapely
-
     problem = covered.problem
 
     def feature(geometry: Any, **facts: Any) -> dict[str, Any]:
@@ -196,7 +195,6 @@ def _features(covered: FieldResult) -> Iterator[dict[str, Any]]:
 
 def save_field_picture(covered: FieldResult, path: Path, *, name: str) -> None:
     """Draw field, headland, strips, swaths and turns."""
-    import shapely
     from matplotlib.collections import LineCollection
     from matplotlib.patches import Patch, PathPatch
 

@@ -160,6 +160,9 @@ def test_vehicles_that_cannot_are_refused():
     spin = ma.Planner(ma.Automaton.of_controls(ma.Unicycle(), {"spin": (0.0, 1.0)}))
     with pytest.raises(ValueError, match="no trim leads straight ahead, need one for the swaths"):
         ma.FieldProblem(spin, OBLONG, width=3.0)
+    tram = ma.Planner(ma.Automaton.of_controls(CAR, {"ahead": (2.0, 0.0)}))
+    with pytest.raises(ValueError, match="no trim turns, need some for the turns between swaths"):
+        ma.FieldProblem(tram, OBLONG, width=3.0)
     helicopter = ma.Planner(ma.load_stock_library("helicopter"))
     with pytest.raises(ValueError, match="flies or is bound to a lattice"):
         ma.FieldProblem(helicopter, OBLONG, width=3.0)

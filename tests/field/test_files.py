@@ -51,7 +51,7 @@ def test_a_field_is_planned_written_and_drawn(tmp_path, capsys):
     kinds = [one["properties"]["kind"] for one in features]
     assert kinds == ["field", "inner", *["swath"] * 4, *["turn"] * 3]
     turns = [shape(one["geometry"]) for one in features if one["properties"]["kind"] == "turn"]
-    assert sum(one.length for one in turns) == pytest.approx(28.7, rel=0.01)
+    assert sum(one.length for one in turns) == pytest.approx(39.3, rel=0.01)
     assert ma.load_plan(tmp_path / "out" / "plan.json").duration == document["duration_s"]
 
 
@@ -73,10 +73,7 @@ def test_geojson_in_degrees_comes_back_in_degrees(tmp_path, capsys):
     whole = shapely.transform(
         shape(found["features"][0]["geometry"]), lambda p: metres_of(p, origin=origin)
     )
-    assert (
-        whole.equals_exact(shapely.Polygon(OBLONG).normalize(), 1e-6)
-        or whole.symmetric_difference(shapely.Polygon(OBLONG)).area < 1e-3
-    )
+    assert whole.symmetric_difference(shapely.Polygon(OBLONG)).area < 1e-3
 
 
 def test_the_meadow_reads():
@@ -88,9 +85,9 @@ def test_the_meadow_reads():
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (TRACTOR, "field.yaml: field: polygon_m is missing, need the corners of the field"),
+        (TRACTOR, "field.yaml:1: field: polygon_m is missing, need the corners of the field"),
         (FIELD.replace("width_m: 3.0", "width_m: 0.0"),
-         "field.yaml, line 11: field.width_m: got 0.0, need a positive number"),
+         "field.yaml:11: field.width_m: got 0.0, need a positive number"),
         (FIELD.replace("width_m: 3.0, ", ""),
          "field.yaml: width_m: missing, need the working width, or --width"),
         (FIELD.replace("[40, 0], [40, 34]", "[40, 34], [40, 0]"),
@@ -98,7 +95,7 @@ def test_the_meadow_reads():
         (FIELD.replace("headland_m: 12.0", "headland_m: 20.0"),
          "field: nothing is left of it inside a headland of 20 m: the largest circle in it has a "
          "radius of 17 m"),
-        (FIELD + "start: {pose: [0, 0, 0]}\n", "start: is for plan; a field has none, leave it out"),
+        (FIELD + "start: {pose: [0, 0, 0]}\n", "start: is for plan; a field has none"),
         (FIELD.replace("headland_m", "headlands_m"), "headlands_m"),
     ],
 )  # fmt: skip
