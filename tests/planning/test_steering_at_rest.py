@@ -12,6 +12,7 @@ import maneuver_automaton as ma
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.scenario.scenario import scenario_of_text
+from maneuver_automaton.scenario.writing import to_yaml
 
 CAR = ma.SecondOrderCar(
     wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
@@ -45,10 +46,8 @@ def turned(plan: ma.Plan) -> float:
 
 
 def test_who_never_does_has_no_such_maneuver() -> None:
-    free = ma.Automaton.of_model(CAR, GRID, strokes=[-0.5, 0.5])
-    never = ma.Automaton.of_model(
-        replace(CAR, steering_at_rest=math.inf), GRID, strokes=[-0.5, 0.5]
-    )
+    strokes, other = [-0.5, 0.5], replace(CAR, steering_at_rest=math.inf)
+    free, never = (ma.Automaton.of_model(one, GRID, strokes=strokes) for one in (CAR, other))
     plain = replace(CAR, steering_at_rest=1.0)
     assert any(standing_price(plain, one.course.reduced_state) for one in free.maneuvers)
     assert never.maneuvers
@@ -83,7 +82,7 @@ def test_files_state_it(tmp_path) -> None:
     for word, price in prices.items():
         scenario = scenario_of_text(FILE.format(word), name="car")
         assert scenario.problem.automaton.model.steering_at_rest == price
-        again = scenario_of_text(scenario.to_yaml(), name="again")
+        again = scenario_of_text(to_yaml(scenario), name="again")
         assert again.problem.automaton.model.steering_at_rest == price
     never = scenario.problem.automaton
     ma.save_library(never, tmp_path / "never.json")
@@ -103,7 +102,7 @@ def test_states_in_files_are_told_by_their_keys() -> None:
     )
     scenario = scenario_of_text(stated, name="car")
     assert scenario.problem.start_state.tolist() == [1.37, 0.0]
-    again = scenario_of_text(scenario.to_yaml(), name="again")
+    again = scenario_of_text(to_yaml(scenario), name="again")
     assert again.problem.start_state.tolist() == [1.37, 0.0]
     for wrong, said in (
         ("{speed: 1.0}", "need some of speed_m_s, steering_rad"),

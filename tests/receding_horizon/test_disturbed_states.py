@@ -68,7 +68,8 @@ def check(loop: ma.ClosedLoop) -> None:
         assert step.clearance_m is None or step.clearance_m > 0.0
     for piece in loop.driven:
         for state in (begin_state(piece), end_state(piece)):
-            assert (low - 1e-6 <= state).all() and (state <= high + 1e-6).all()
+            assert (low - 1e-6 <= state).all()
+            assert (state <= high + 1e-6).all()
     np.testing.assert_allclose(begin_state(loop.driven[0]), loop.problem.start_state, atol=1e-12)
     for step, after in zip(loop.steps, loop.steps[1:], strict=False):
         if not after.off_plan and after.decision.leads and step.decision.leads:
@@ -95,10 +96,9 @@ def test_a_step_takes_the_measured_state() -> None:
     pose, state = first.piece.end, end_state(first.piece)
     _, same = loop.step(pose, state)
     assert same.off_plan == 0.0
-    _, other = loop.step(same.piece.end, end_state(same.piece) + [0.1, -0.05])
-    np.testing.assert_allclose(
-        begin_state(other.plan), end_state(same.piece) + [0.1, -0.05], atol=1e-12
-    )
+    disturbed = np.add(end_state(same.piece), [0.1, -0.05])
+    _, other = loop.step(same.piece.end, disturbed)
+    np.testing.assert_allclose(begin_state(other.plan), disturbed, atol=1e-12)
     assert other.off_plan == pytest.approx(0.1)
     with pytest.raises(ValueError, match="measured: state: speed is 9"):
         loop.step(pose, {"speed": 9.0})
