@@ -50,7 +50,7 @@ class Leg(NamedTuple):
     trim: Trim
 
 
-class Question(NamedTuple):
+class BetweenTrims(NamedTuple):
     """A problem between trims, and what its plans lack: a first maneuver, and one at each goal."""
 
     problem: Problem
@@ -116,7 +116,7 @@ class FromState(Step):
             ended.why = _why_none(found, first)
 
 
-def _offer_whole(found: Incumbents, one: Question, plan: Plan) -> None:
+def _offer_whole(found: Incumbents, one: BetweenTrims, plan: Plan) -> None:
     """Offer a plan between trims, with its first and last maneuver."""
     asked = found.problem
     off = [sum(goal.off(plan.end)) for goal in one.problem.goals]
@@ -138,7 +138,7 @@ def _driven(leg: Leg, start: Array, time: float, *, ends: bool) -> Plan:
     return Plan(start, word, durations=[0.0, 0.0], maneuvers=(leg.maneuver,), start_time=time)
 
 
-def _questions(found: Incumbents) -> tuple[list[Question], str]:
+def _questions(found: Incumbents) -> tuple[list[BetweenTrims], str]:
     """Problems between trims, the most promising first; or why there are none."""
     problem, refused = found.problem, ""
     firsts: list[Leg | None] = [None]
@@ -171,7 +171,7 @@ def _question(
     goals: tuple[Goal, ...],
     last: tuple[Leg | None, ...],
     served: tuple[int, ...],
-) -> Question | None:
+) -> BetweenTrims | None:
     """The problem after a first maneuver and before the last ones; None if no time is left."""
     base, horizon = between_trims(problem), problem.horizon
     took = 0.0 if first is None else first.maneuver.duration
@@ -201,7 +201,7 @@ def _question(
         for goal, leg in zip(goals, last, strict=True)
     )
     least += 0.0 if first is None else problem.maneuver_cost(first.maneuver)
-    return Question(asked, first, last, served, least)
+    return BetweenTrims(asked, first, last, served, least)
 
 
 def _after(pose: Array, displacement: Array) -> Array:

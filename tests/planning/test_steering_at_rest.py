@@ -1,0 +1,113 @@
+"""Cars that turn their wheels at rest at will, at a price, or never."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.models.speeds import standing_price
+from maneuver_automaton.scenario.scenario import scenario_of_text
+from maneuver_automaton.scenario.writing import to_yaml
+
+CAR = ma.SecondOrderCar(
+    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
+)
+GRID = {"speed": [-1.0, 0.0, 1.0], "steering": [-0.7, 0.0, 0.7]}
+FILE = """
+schema: 1
+vehicle:
+  model: second_order_car
+  wheelbase_m: 2.8
+  max_steering_rad: 0.75
+  max_speed_m_s: 2.5
+  max_acceleration_m_s2: 1.0
+  max_steering_rate_rad_s: 0.5
+  steering_at_rest: {}
+automaton: {{preset: second_order_car}}
+start: {{pose: [0, 0, 0]}}
+goal: {{pose: [1, 3, 0]}}
+cost: {{time: 1.0}}
+"""
+
+
+def turned(plan: ma.Plan) -> float:
+    """How far the wheels turn while the car stands [rad], counted by itself."""
+    angle = 0.0
+    for maneuver in filter(None, plan.maneuvers):
+        speed, steering = maneuver.course.reduced_state.T
+        stands = np.maximum(np.abs(speed[1:]), np.abs(speed[:-1])) <= 1e-3
+        angle += float(np.abs(np.diff(steering))[stands].sum())
+    return angle
+
+
+def test_who_never_does_has_no_such_maneuver() -> None:
+    strokes, other = [-0.5, 0.5], replace(CAR, steering_at_rest=math.inf)
+    free, never = (ma.Automaton.of_model(one, GRID, strokes=strokes) for one in (CAR, other))
+    plain = replace(CAR, steering_at_rest=1.0)
+    assert any(standing_price(plain, one.course.reduced_state) for one in free.maneuvers)
+    assert never.maneuvers
+    assert not any(standing_price(plain, one.course.reduced_state) for one in never.maneuvers)
+
+
+@pytest.mark.parametrize("polish", [False, True])
+def test_plans_keep_to_it(polish: bool) -> None:
+    never = replace(CAR, steering_at_rest=math.inf)
+    library = ma.Automaton.of_model(never, GRID, strokes=[-0.5, 0.5])
+    search = ma.SearchSettings(polish=polish)
+    result = ma.plan(ma.Problem(library, [0, 0, 0], [1.0, 3.0, 0.0], search=search), time_limit=3.0)
+    assert result.plan is not None, result.reason
+    assert result.audit.passed
+    assert turned(result.plan) < 1e-6
+
+
+def test_a_price_counts_what_is_turned() -> None:
+    problem = ma.Problem(ma.Automaton.of_model(CAR, GRID), [0, 0, 0], [1.0, 3.0, 0.0])
+    library = ma.Automaton.of_model(replace(CAR, steering_at_rest=2.0), GRID)
+    priced = replace(problem, automaton=library)
+    rests = [trim for trim in library.trims if trim.is_rest]
+    turn = next(
+        one for one in library.maneuvers if {one.source, one.target} == {t.name for t in rests[:2]}
+    )
+    same = next(one for one in problem.automaton.maneuvers if one.name == turn.name)
+    assert priced.maneuver_cost(turn) == pytest.approx(problem.maneuver_cost(same) + 2.0 * 0.7)
+
+
+def test_files_state_it(tmp_path) -> None:
+    prices = {"free": 0.0, "2.5": 2.5, "forbidden": math.inf}
+    for word, price in prices.items():
+        scenario = scenario_of_text(FILE.format(word), name="car")
+        assert scenario.problem.automaton.model.steering_at_rest == price
+        again = scenario_of_text(to_yaml(scenario), name="again")
+        assert again.problem.automaton.model.steering_at_rest == price
+    never = scenario.problem.automaton
+    ma.save_library(never, tmp_path / "never.json")
+    assert ma.load_library(tmp_path / "never.json").model == never.model
+
+
+@pytest.mark.parametrize("word", ["never", "-1.0", "[1]", ".inf"])
+def test_what_is_no_price_is_told(word: str) -> None:
+    with pytest.raises(InvalidScenario, match="need free, forbidden, or a price of at least 0"):
+        scenario_of_text(FILE.format(word), name="car")
+
+
+def test_states_in_files_are_told_by_their_keys() -> None:
+    file = FILE.format("free")
+    stated = file.replace(
+        "start: {pose: [0, 0, 0]}", "start: {pose: [0, 0, 0], state: {speed_m_s: 1.37}}"
+    )
+    scenario = scenario_of_text(stated, name="car")
+    assert scenario.problem.start_state.tolist() == [1.37, 0.0]
+    again = scenario_of_text(to_yaml(scenario), name="again")
+    assert again.problem.start_state.tolist() == [1.37, 0.0]
+    for wrong, said in (
+        ("{speed: 1.0}", "need some of speed_m_s, steering_rad"),
+        ("{speed_m_s: 9.0}", "speed is 9, need one of the second_order_car within"),
+        ("[1.0, 0.0]", "need a mapping of numbers"),
+    ):
+        with pytest.raises(InvalidScenario, match=said):
+            scenario_of_text(stated.replace("{speed_m_s: 1.37}", wrong), name="car")

@@ -1,0 +1,123 @@
+"""Loops whose speeds and steering angles are disturbed, for every vehicle with inertia."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.automaton.cutting import begin_state, end_state
+from maneuver_automaton.receding_horizon import Guarantee
+from maneuver_automaton.receding_horizon.log import Decision
+from maneuver_automaton.receding_horizon.simulation import Disturbance, simulate
+
+CASES = {  # length and width [m], state at the start, deviation per step, way [m]
+    "second_order_car": ((4.0, 1.8), [1.37, 0.12], (0.05, 0.02), 24.0),
+    "second_order_unicycle": ((0.5, 0.3), [0.2, -0.13], (0.02, 0.02), 4.0),
+    "single_track": ((4.5, 1.8), [15.0, 0.1, 0.05, 0.01], (0.2, 0.02, 0.01, 0.002), 100.0),
+    "hovercraft": ((0.6, 0.4), [0.7, 0.1, 0.2], (0.02, 0.01, 0.02), 6.0),
+    "helicopter": (
+        (1.0, 1.0),
+        [3.3, 0.4, 0.2, 0.1, 0.05, 0.02],
+        (0.05, 0.02, 0.02, 0.01, 0.005, 0.005),
+        30.0,
+    ),
+    "car_with_trailer": ((0.3, 0.2), [0.23], (0.005,), 3.0),
+}
+SEEDS = 84  # of each vehicle: 504 loops in all
+SHORT = 4  # steps
+GIVEN_AWAY = {Guarantee.DECREASE, Guarantee.FEASIBILITY}  # what a disturbance may take
+
+
+def loop_of(name: str, seed: int) -> ma.ClosedLoop:
+    """A short loop past a box, begun in a state beside the trims."""
+    library = ma.load_stock_library(name)
+    size, state, deviations, far = CASES[name]
+    rng = np.random.default_rng(seed)
+    end = np.zeros(library.model.group.dof)
+    end[:2] = far, far * rng.uniform(-0.2, 0.2)
+    goal = ma.Goal(
+        end,
+        trim=None if library.rest is not None else "speed 15, turn_rate 0",
+        tolerance_m=size[0],
+        tolerance_rad=0.5,
+    )
+    box = ma.Box([0.08 * far, 0.08 * far], [0.5 * far, far * rng.uniform(0.25, 0.35)])
+    problem = ma.Problem(
+        library,
+        np.zeros(end.size),
+        goal,
+        start_state=state,
+        footprint=ma.Box(size),
+        obstacles=box,
+        search=ma.SearchSettings(improve=False, polish=False),
+    )
+    upset = Disturbance(reduced_state=deviations, seed=seed)
+    return simulate(problem, step=0.5, steps=SHORT, time_limit=1.0, disturbance=upset)
+
+
+def check(loop: ma.ClosedLoop) -> None:
+    """Driven as the model says from each measured state, free, and no guarantee broken."""
+    assert loop.steps, loop.reason
+    low, high = loop.problem.automaton.model.reduced_limits.T
+    for step, audit in zip(loop.steps, loop.audits, strict=True):
+        assert audit.passed, audit.reason
+        assert not step.violations
+        assert {one.guarantee for one in step.disturbed} <= GIVEN_AWAY
+        assert step.decision is not Decision.MITIGATED
+        assert step.clearance_m is None or step.clearance_m > 0.0
+    for piece in loop.driven:
+        for state in (begin_state(piece), end_state(piece)):
+            assert (low - 1e-6 <= state).all()
+            assert (state <= high + 1e-6).all()
+    np.testing.assert_allclose(begin_state(loop.driven[0]), loop.problem.start_state, atol=1e-12)
+    for step, after in zip(loop.steps, loop.steps[1:], strict=False):
+        if not after.off_plan and after.decision.leads and step.decision.leads:
+            assert after.value <= step.value - step.applied_cost + 1e-6
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_goes_on_from_a_disturbed_state(name: str) -> None:
+    check(loop_of(name, 0))
+
+
+@pytest.mark.exhaustive
+@pytest.mark.parametrize("seed", range(SEEDS))
+@pytest.mark.parametrize("name", CASES)
+def test_five_hundred_loops(name: str, seed: int) -> None:
+    check(loop_of(name, seed))
+
+
+def test_a_step_takes_the_measured_state() -> None:
+    library = ma.load_stock_library("second_order_car")
+    problem = ma.Problem(library, [0, 0, 0], ma.Goal([20, 2, 0], tolerance_m=1.0))
+    loop = ma.RecedingHorizon(problem, step=1.0, time_limit=2.0)
+    _, first = loop.step([0, 0, 0])
+    pose, state = first.piece.end, end_state(first.piece)
+    _, same = loop.step(pose, state)
+    assert same.off_plan == 0.0
+    disturbed = np.add(end_state(same.piece), [0.1, -0.05])
+    _, other = loop.step(same.piece.end, disturbed)
+    np.testing.assert_allclose(begin_state(other.plan), disturbed, atol=1e-12)
+    assert other.off_plan == pytest.approx(0.1)
+    with pytest.raises(ValueError, match="measured: state: speed is 9"):
+        loop.step(pose, {"speed": 9.0})
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"reduced_state": (-0.1, 0.0)}, "reduced_state must be numbers of at least 0"),
+        ({"reduced_state": (0.1, 0.0), "delay": 1}, "is for a delay of 0"),
+    ],
+)
+def test_what_is_no_disturbance_is_told(given: dict, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        Disturbance(**given)
+
+
+def test_as_many_deviations_as_the_state_has_numbers() -> None:
+    library = ma.load_stock_library("second_order_car")
+    problem = ma.Problem(library, [0, 0, 0], [9, 0, 0])
+    with pytest.raises(ValueError, match="has 1 numbers, need 2 for the second_order_car"):
+        simulate(problem, step=1.0, disturbance=Disturbance(reduced_state=(0.1,)))
