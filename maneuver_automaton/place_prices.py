@@ -12,12 +12,14 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import PlaceCost, allowed, scale_of
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import along
+from maneuver_automaton.primitives.primitive import Trajectory
 
 SHARE = 2e-4  # of a plan's whole cost: by how much a price may be off, as estimated
-TURN = 0.2  # [rad] of an interval at most, before any is halved
+TURN = 0.4  # [rad] of an interval at most, before any is halved
 ROUNDS = 24  # in which intervals are halved
+DENSE = 0.25  # of a scale, and [rad], between samples of a course that is driven as sampled
 MOST_INTERVALS = 1 << 16
 NODES = np.linspace(0.0, 1.0, 5)
 COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
@@ -133,7 +135,7 @@ class _Motion:
         if course is None:
             raise ValueError(f"maneuver {primitive.name!r}: has no course, so no price of places")
         row = np.clip(np.searchsorted(course.time, since, "right") - 1, 0, len(course.time) - 2)
-        if course.model is not None:
+        if course.model is not None and self._is_coarse(course):
             steps, states = along(course, since, course.model)
         else:
             span = np.diff(course.time)[row]
@@ -144,6 +146,12 @@ class _Motion:
             states = states + share[:, None] * (course.reduced_state[row + 1] - states)
             steps = course.pose_at(since)
         return steps, self.model.body_velocity(states, course.control[row]), states
+
+    def _is_coarse(self, course: Trajectory) -> bool:
+        """Whether samples are too far apart for one twist from each to the next."""
+        steps = np.abs(np.diff(course.pose, axis=0))
+        way = np.hypot(steps[:, 0], steps[:, 1]).max(initial=0.0)
+        return bool(way > DENSE * scale_of(self.cost) or steps[:, 2].max(initial=0.0) > DENSE)
 
 
 def _first_stretches(plan: Plan, scale: float) -> _Intervals:
@@ -158,13 +166,7 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
             edges = np.array([0.0, lasting])
             steps = np.abs(lasting * primitive.body_velocity[None])
         else:
-            course = primitive.course
-            edges = np.array([0.0, lasting]) if course is None else course.time
-            steps = (
-                np.abs(primitive.displacement[None])
-                if course is None
-                else np.abs(np.diff(course.pose, axis=0))
-            )
+            edges, steps = _between_controls(primitive)
         way = np.linalg.norm(steps[:, [0, 1, *range(3, steps.shape[1])]], axis=1)
         parts = np.maximum(np.ceil(np.maximum(way / scale, steps[:, 2] / TURN)), 1.0).astype(int)
         row = np.repeat(np.arange(len(parts)), parts)
@@ -176,6 +178,17 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     if not pieces:
         return _Intervals(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
     return _Intervals(np.concatenate(pieces), np.concatenate(begins), np.concatenate(ends))
+
+
+def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
+    """Times (n + 1,) [s] at which controls change, and the ways (n, dof) between, added up."""
+    course = maneuver.course
+    if course is None:
+        return np.array([0.0, maneuver.duration]), np.abs(maneuver.displacement[None])
+    changes = (course.control[1:-1] != course.control[:-2]).any(axis=1)
+    rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
+    steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
+    return course.time[rows], steps
 
 
 def _halved(todo: _Intervals, split: NDArray[np.bool_]) -> _Intervals:

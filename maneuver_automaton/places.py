@@ -166,7 +166,7 @@ class _Near:
 
     @property
     def scale(self) -> float:
-        return 0.25 * self.clearance.within
+        return 0.5 * self.clearance.within
 
     def rates(self, poses: Array, velocities: Array) -> Array:
         return self.rates_along(poses, velocities, None)
@@ -190,10 +190,23 @@ class _Near:
             for height, around in self.around:
                 rows = self._level_with(height, flat)
                 if rows.any():
-                    still = np.zeros(int(rows.sum()))
-                    found = around.nearest(body, frames[rows], still).distance
+                    found = self._to_obstacles(around, body, frames[rows])
                     best[rows] = np.minimum(best[rows], found)
         return np.asarray(best.reshape(poses.shape[:-1]))
+
+    def _to_obstacles(
+        self, around: ObstacleDistances, body: list[ShapePart], frames: Array
+    ) -> Array:
+        """Distances (n,) [m] of a body, exact where they are less than `within`."""
+        middle, reach = (
+            body[0].middle,
+            max(math.dist(body[0].middle, one.middle) + one.reach for one in body),
+        )
+        centers = np.column_stack([SE2(frames).act(middle), np.zeros(len(frames))])
+        found = around.nearest(parts_of(()), centers, np.zeros(len(frames))).distance - reach
+        near = np.flatnonzero(found < self.clearance.within)
+        found[near] = around.nearest(body, frames[near], np.zeros(near.size)).distance
+        return found
 
     def _level_with(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:
         """Whether the body is neither above nor below obstacles of a height."""
@@ -390,11 +403,14 @@ class Ground:
         import shapely
 
         inside = np.zeros(places.shape[:-1], dtype=np.bool_)
-        points = shapely.points(places)
         for part in parts_of(self.areas):
-            if not part.radius:
-                shapely.prepare(part.core)
-            inside |= shapely.dwithin(part.core, points, part.radius)
+            x, y = np.moveaxis(places - part.middle, -1, 0)
+            near = (np.abs(x) <= part.reach) & (np.abs(y) <= part.reach) & ~inside
+            if part.radius:
+                inside[near] = np.hypot(x[near], y[near]) <= part.radius
+                continue
+            shapely.prepare(part.core)
+            inside[near] = shapely.intersects_xy(part.core, places[near])
         return inside
 
 

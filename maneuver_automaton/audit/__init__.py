@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from maneuver_automaton.audit.clearance import Least as Least
 from maneuver_automaton.audit.judge import Audit as Audit
+from maneuver_automaton.audit.judge import StatedPrices as StatedPrices
 from maneuver_automaton.audit.judge import TerminalError as TerminalError
 from maneuver_automaton.audit.judge import audit_plan as audit_plan
 from maneuver_automaton.audit.judge import closest_to as closest_to

@@ -27,10 +27,12 @@ from maneuver_automaton.audit.outlines import (
 )
 from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
 from maneuver_automaton.audit.passages import AuditedBody, EdgePairs, bounds_of
+from maneuver_automaton.audit.places import AGREED, MovingShapes, price_again
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
+from maneuver_automaton.places import PlaceCost
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
 
@@ -63,6 +65,16 @@ class Audit:
     terminal_position_m: float
     terminal_heading_rad: float
     reason: str = ""
+    place_price: float | None = None  # of all place costs, integrated anew; None without any
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StatedPrices:
+    """What a plan is said to cost because of where it goes, to be confirmed."""
+
+    costs: tuple[PlaceCost, ...] = ()
+    prices: tuple[float, ...] = ()  # of each
+    whole: float = 0.0  # what the plan costs in all
 
 
 def terminal_error(plan: Plan, goal: Goal) -> TerminalError:
@@ -107,6 +119,7 @@ def audit_plan(
     margin: float = 0.0,
     states: tuple[Array, Array] | None = None,
     zones: tuple[Zone, ...] = (),
+    places: StatedPrices | None = None,
     around: Around = surroundings_of,
     ask: Callable[[], None] = lambda: None,
 ) -> Audit:
@@ -134,6 +147,8 @@ def audit_plan(
         Reduced states in which it must begin and end.
     zones : tuple of Zone
         Where not every motion is admitted.
+    places : StatedPrices, optional
+        What it costs because of where it goes: integrated anew, to within 1e-3 of the whole cost.
     around : callable
         The surroundings of some obstacles, say from a store of those of the map.
     ask : callable
@@ -178,6 +193,28 @@ def audit_plan(
         distances.append(least.distance)
         reasons += [f"the {name}: {hit}" if name else hit] if hit else []
     reasons += zones_broken(drive, list(bodies.values()), zones, origin)
+    prices: list[float] = []
+    if places is not None and places.costs:
+        ask()
+        moving = [MovingShapes(drive.frames, footprint)]
+        moving += [MovingShapes(drive.part(name), shapes) for name, shapes in (parts or {}).items()]
+        offset = np.array(goal.pose)
+        offset[2] = 0.0
+        for cost, stated in zip(places.costs, places.prices, strict=True):
+            prices.append(
+                price_again(
+                    cost,
+                    drive,
+                    offset,
+                    bodies=moving,
+                    obstacles=obstacles,
+                    body_height=body_height,
+                    whole=places.whole,
+                )
+            )
+            if not abs(prices[-1] - stated) <= AGREED * places.whole:
+                what = type(cost).__name__
+                reasons.append(f"{what} costs {prices[-1]:.6g}, not {stated:.6g} as stated")
     return Audit(
         passed=not reasons,
         max_dynamics_defect=drive.off,
@@ -185,6 +222,7 @@ def audit_plan(
         terminal_position_m=missed.position_m,
         terminal_heading_rad=missed.heading_rad,
         reason="; ".join(reasons),
+        place_price=sum(prices) if prices else None,
     )
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit import Audit, audit_plan, closest_to, origin_of
+from maneuver_automaton.audit import Audit, StatedPrices, audit_plan, closest_to, origin_of
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.cutting import carried
 from maneuver_automaton.budget import UNLIMITED, Budget
@@ -25,6 +25,7 @@ from maneuver_automaton.collision.fcl_checker import Course, FclChecker, origin_
 from maneuver_automaton.collision.layers import Layer, layers_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model, Unicycle
+from maneuver_automaton.places import Clearance
 from maneuver_automaton.planning.result import Workspace, workspace_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.primitive import Trajectory
@@ -89,6 +90,21 @@ def check_plan(
         if reason:
             return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
         _ask(budget, _audit_takes(problem, plan))
+        prices = problem.place_prices_of(plan) if problem.place_costs else ()
+        refused = min((one.refused for one in prices if one.refused is not None), default=None)
+        if refused is not None:
+            reason = f"at {refused:.6g} s it is where a place cost does not allow it"
+            return Checked(audit=None, broken=Condition.COLLISION, reason=reason)
+        places = StatedPrices(
+            costs=tuple(  # the audit has distances of its own
+                stated if isinstance(stated, Clearance) else known
+                for stated, known in zip(
+                    problem.place_costs, problem.bound_place_costs, strict=True
+                )
+            ),
+            prices=tuple(one.price for one in prices),
+            whole=problem.cost_of(plan) if prices else 0.0,
+        )
         audit = audit_plan(
             plan,
             goal,
@@ -100,6 +116,7 @@ def check_plan(
             margin=problem.margin,
             states=_end_states(problem, plan, goal),
             zones=problem.zones,
+            places=places,
             around=workspace.surroundings,
             ask=lambda: _ask(budget),
         )

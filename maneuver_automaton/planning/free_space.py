@@ -83,8 +83,10 @@ def word_candidate(
 
 
 def certificate_of(found: Incumbents) -> float | None:
-    """The certificate of the cheapest plan; None for one that is no word of the library."""
+    """The certificate of the cheapest plan; None for no word of the library, or priced places."""
     problem, best = found.problem, found.plans[0]
+    if problem.place_costs:  # reduced costs are those of the invariant part alone
+        return None
     word = word_of_plan(problem.automaton, best.plan)
     return None if word is None else certificate(problem, problem.goals[best.goal_index], word)
 

@@ -178,6 +178,8 @@ class Incumbents:
 
     def note(self, cost: float, *, at: float | None = None) -> None:
         """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
+        if self.problem.place_costs:  # searches of words know nothing of them
+            return
         if cost < self.least_cost:
             self.least_cost = cost
             self._tell(cost)
@@ -372,7 +374,8 @@ class Incumbents:
         others = [one for one in others if one.cost >= best.cost][: self.alternatives]
         # the search adds the same terms up in another order
         value = bound.value if bound.value < best.cost * (1.0 - ROUNDING) else best.cost
-        bound = replace(bound, value=value, optimal=bound.optimal or value == best.cost)
+        known = bound.optimal and not self.problem.place_costs  # which searches leave out
+        bound = replace(bound, value=value, optimal=known or value == best.cost)
         first = self.improvements[0][0]
         return PlanResult(
             problem=self.problem,

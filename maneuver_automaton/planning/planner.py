@@ -25,6 +25,7 @@ from maneuver_automaton.collision import (
     as_obstacles,
 )
 from maneuver_automaton.costs import Cost, StageCost
+from maneuver_automaton.places import PlaceCost, check_place_costs
 from maneuver_automaton.planning.many import plan_many_on
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import PlanResult, Workspace
@@ -61,6 +62,7 @@ class Planner:
     body_height: tuple[float, float] = field(default=(0.0, 0.0), kw_only=True)  # [m] about z
     margin: float = field(default=0.0, kw_only=True)  # [m]
     zones: tuple[Zone, ...] = field(default=(), kw_only=True)
+    place_costs: tuple[PlaceCost, ...] = field(default=(), kw_only=True)
     start_trim: str | None = field(default=None, kw_only=True)  # of queries that name none
     workspace: Workspace = field(init=False)  # what its queries share
     _first: Problem = field(init=False)  # a query whose every value was checked
@@ -83,6 +85,7 @@ class Planner:
             body_height: tuple[float, float] = (0.0, 0.0),
             margin: float = 0.0,
             zones: Sequence[Zone] = (),
+            place_costs: PlaceCost | Sequence[PlaceCost] = (),
             start_trim: str | None = None,
         ) -> None: ...
 
@@ -91,6 +94,7 @@ class Planner:
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
         object.__setattr__(self, "zones", tuple(self.zones))
+        object.__setattr__(self, "place_costs", check_place_costs(self.place_costs))
         object.__setattr__(self, "workspace", Workspace(self.obstacles))
         automaton = self.automaton
         # With inertia, without a rest, it has to be given a trim to end in; any will do here.
@@ -148,6 +152,7 @@ class Planner:
             body_height=self.body_height,
             margin=self.margin,
             zones=self.zones,
+            place_costs=self.place_costs,
             start_time=start_time,
             start_trim=start_trim,
         )

@@ -129,7 +129,9 @@ def candidate(
     are maneuvers.
     """
     if settings.retimed:
-        plan = at_best_pace(here, plan)
+        paced = at_best_pace(here, plan)
+        if not here.place_costs or here.cost_of(paced) <= here.cost_of(plan):
+            plan = paced
     cost = here.cost_of(plan)
     fixed = bool(here.obstacles or here.zones or any(plan.maneuvers))
     ordered = plan if fixed else costliest_first(plan, here.rates_of(plan))
@@ -146,12 +148,18 @@ def allowed(here: Problem, plan: Plan) -> bool:
 
 
 def bounded(problem: Problem) -> bool:
-    """Whether a problem bounds the places its vehicle may go to."""
-    return any(getattr(problem.bounds, name) is not None for name in ("x", "y", "z"))
+    """Whether places count: a problem bounds where its vehicle may go to, or prices it."""
+    return bool(problem.place_costs) or any(
+        getattr(problem.bounds, name) is not None for name in ("x", "y", "z")
+    )
 
 
 def cost_until(problem: Problem, plan: Plan, until: float) -> float:
     """Cost of the first `until` seconds of a plan, the switches in them included."""
+    if problem.place_costs:
+        first = first_part(plan, until)
+        places = sum(one.price for one in problem.place_prices_of(first))
+        return places + cost_until(replace(problem, place_costs=()), plan, until)
     # The cost does not depend on where the rest begins, and to find out where takes longer.
     if any(plan.maneuvers):
         return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
@@ -162,7 +170,7 @@ def cost_until(problem: Problem, plan: Plan, until: float) -> float:
 
 def _cost_of_first(problem: Problem, plan: Plan, until: float) -> float:
     """Cost of the first `until` seconds of a plan."""
-    if plan.maneuvers or not plan.trims:
+    if plan.maneuvers or not plan.trims or problem.place_costs:
         return problem.cost_of(first_part(plan, until))
     times = first_times(plan.durations.tolist(), until)
     return problem.cost_of_trims(plan.trims[: len(times)], np.array(times))

@@ -332,7 +332,9 @@ class RecedingHorizon:
                 last,
                 step,
                 most_steps=None if retimed else self.most_steps,
-                uniform=self.settings.retimed and is_uniform(step.plan, here.cost),
+                uniform=self.settings.retimed
+                and not here.place_costs
+                and is_uniform(step.plan, here.cost),
                 moved=here.moves or now.changed,
             )
         steady = self.promises.steady and not (here.moves or retimed)

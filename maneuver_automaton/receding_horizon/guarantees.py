@@ -20,6 +20,7 @@ from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.search.limits import rest_rate
 
 ACCURACY = 1e-9  # relative, of values
+PRICED = 1e-3  # the same where places are priced, by quadrature
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -33,6 +34,7 @@ class Promises:
     horizon: float | None  # T [s], None if free
     step: float  # delta [s]
     switch: float = 0.0  # cost of the switch to the rest that fills a fixed time
+    accuracy: float = ACCURACY  # relative, of values
     steady: bool = True  # whether it costs least_rate or more at every moment to move
 
     def most_steps(self, value: float) -> int | None:
@@ -103,6 +105,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
         horizon=problem.horizon.time,
         step=step,
         switch=cost.switch if cost and fixed else 0.0,
+        accuracy=PRICED if problem.place_costs else ACCURACY,
         steady=steady,
     )
 
@@ -144,7 +147,7 @@ def broken(
     why = "obstacles moved" if moved else "the plan was followed"
     if off > 0.0:
         why = f"the state was measured {off:.3g} off the plan"
-    tolerance = ACCURACY * (1.0 + abs(last.value))
+    tolerance = promised.accuracy * (1.0 + abs(last.value))
     free = " and safely" if moved else ""
     if now.shifted_value is None:
         yield Violation(

@@ -46,11 +46,11 @@ from maneuver_automaton.scenario.scenario import (
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
     BoundsPart,
-    CostPart,
     Goals,
     HorizonPart,
     NoisePart,
     Obstacles,
+    PricedCostPart,
     ScenarioFile,
     SearchPart,
     StartPart,
@@ -136,7 +136,7 @@ class VehicleEntry(FilePart):
     automaton: AutomatonPart | None = optional(AT_TOP)
     start: StartPart = Field(description="a mapping {pose, ...}")
     goal: Goals = Field(description="a mapping {pose, ...}, or a list of these")
-    cost: CostPart | None = optional(AT_TOP)
+    cost: PricedCostPart | None = optional(AT_TOP)
     horizon: HorizonPart | None = optional(AT_TOP)
     bounds_m: BoundsPart | None = optional(AT_TOP)
     margin_m: NotNegative | None = optional(AT_TOP)
@@ -155,7 +155,7 @@ class FleetFile(FilePart):
     name: Text | None = optional("what the situation is called")
     vehicle: VehiclePart | None = optional("of all that name none")
     automaton: AutomatonPart | None = optional("of all that name none")
-    cost: CostPart | None = optional("left out: {time: 1}")
+    cost: PricedCostPart | None = optional("left out: {time: 1}")
     horizon: HorizonPart | None = optional("left out: any number of trims")
     bounds_m: BoundsPart | None = optional("left out: none")
     margin_m: NotNegative = Field(0.0, description="distance kept from everything")

@@ -23,6 +23,7 @@ from maneuver_automaton.models.kinds import KINDS
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
+from maneuver_automaton.scenario.ground import GroundFile, StatedPlaces, places_of
 from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
@@ -59,6 +60,7 @@ class Scenario:
     time_limit_s: float = 5.0  # upper bound for search and refinement [s]
     receding_horizon: RecedingHorizonPart | None = None
     maps: tuple[MapFile, ...] = ()  # files of the maps among the obstacles
+    ground_files: tuple[GroundFile, ...] = ()  # of what places cost
     stated: AutomatonPart | None = None  # the automaton, as the file states it
     path: Path | None = None
     timing_s: Mapping[str, float] = field(default_factory=dict)  # load, automaton [s]
@@ -158,6 +160,11 @@ def scenario_of_document(
     built = time.perf_counter()
     _check_ends(document, file, automaton)
     cost = once(("vehicle", "automaton", "cost"), lambda: cost_of(document, file.cost, automaton))
+    places: StatedPlaces = once(
+        ("vehicle", "cost", "obstacles"), lambda: places_of(document, file.cost, folder)
+    )
+    if places.walls:
+        obstacles = (*obstacles, *places.walls)
     fastest = max(math.hypot(*trim.body_velocity[:2]) for trim in automaton.trims)
     zones = once(
         ("vehicle", "automaton", "zones"),
@@ -178,6 +185,7 @@ def scenario_of_document(
             obstacles=obstacles,
             margin=file.margin_m,
             zones=zones,
+            place_costs=places.costs,
             **bodies,
         )
     return Scenario(
@@ -186,6 +194,7 @@ def scenario_of_document(
         time_limit_s=file.search.time_limit_s,
         receding_horizon=file.receding_horizon,
         maps=maps,
+        ground_files=places.files,
         stated=file.automaton,
         path=path,
         timing_s={"load": read - begin, "automaton": built - read},

@@ -193,6 +193,53 @@ class CostPart(FilePart):
     direction_change: NotNegative = Field(0.0, description="per change between forward and reverse")
 
 
+Per = Annotated[Literal["metre", "second"], Need("metre or second")]
+
+
+class ClearancePart(FilePart):
+    """What it costs to be near to obstacles that stand still."""
+
+    weight: NotNegative = Field(description="price at contact")
+    within_m: Positive = Field(description="distance from which on nothing is paid")
+    per: Per = Field("metre", description="metre of the way, or second")
+
+
+class GroundPart(FilePart):
+    """Ground with a price."""
+
+    one_of: ClassVar = ("polygon_m", "raster", "costmap", "elevation")
+    goes_with: ClassVar = {
+        "holes_m": ("polygon_m",),
+        "resolution_m": ("raster", "costmap", "elevation"),
+        "origin": ("raster", "costmap", "elevation"),
+        "max_cross_slope": ("elevation",),
+        "per": ("polygon_m", "raster", "costmap"),
+    }
+
+    polygon_m: Polygon | None = optional("corners [x, y]")
+    holes_m: Polygons = Field((), description="polygons inside polygon_m that cost nothing")
+    raster: Name | None = optional("prices: .npy, row 0 lowest, or an image whose white is 1")
+    costmap: Name | None = optional("costs of Nav2: 252 costs price, 253 and above are obstacles")
+    elevation: Name | None = optional("heights [m]: a metre climbed costs price")
+    resolution_m: Positive | None = optional("size of a cell")
+    origin: Annotated[
+        tuple[Number, Number, Number],
+        Several("a pose [x, y, heading], three numbers", at_least=3, at_most=3),
+    ] = Field((0.0, 0.0, 0.0), description="pose of the lower left corner")
+    price: NotNegative = Field(1.0, description="price, or factor of the raster's values")
+    max_cross_slope: NotNegative | None = optional("greatest slope from left to right, rise by way")
+    per: Per = Field("metre", description="metre of the way, or second")
+
+
+class PricedCostPart(CostPart, title="Cost"):
+    """Weights of the stage cost, 0 unless stated, and what places cost beside it."""
+
+    clearance: ClearancePart | None = optional("{weight, within_m}: near obstacles")
+    ground: Annotated[tuple[GroundPart, ...], Several("a list of ground")] = Field(
+        (), description="a list of {polygon_m, price}, {raster, ...}, ..."
+    )
+
+
 class HorizonPart(FilePart):
     """How long a plan lasts, and of how many trims it may consist."""
 
@@ -412,8 +459,8 @@ class ScenarioFile(FilePart):
     automaton: AutomatonPart = Field(description="a mapping with trims, grid, file or preset")
     start: StartPart = Field(description="a mapping {pose, ...}")
     goal: Goals = Field(description="a mapping {pose, ...}, or a list of these")
-    cost: CostPart = Field(
-        default_factory=lambda: CostPart(time=1.0), description="left out: {time: 1}"
+    cost: PricedCostPart = Field(
+        default_factory=lambda: PricedCostPart(time=1.0), description="left out: {time: 1}"
     )
     horizon: HorizonPart = Field(
         default_factory=HorizonPart, description="left out: free time, any number of trims"

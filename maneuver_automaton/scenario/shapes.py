@@ -149,11 +149,11 @@ def stated_zone(zone: Zone) -> dict[str, Any]:
     shape = zone.shape
     if isinstance(shape, Disc):
         raise ValueError("zones: a scenario file states a zone by a polygon, not by a disc")
-    corners = {"polygon_m": shape.corners.tolist(), **_holes(shape)}
+    corners = {"polygon_m": shape.corners.tolist(), **holes_entry(shape)}
     return stated(ZonePart, zone, **corners)
 
 
-def _holes(shape: Box | Polygon) -> dict[str, Any]:
+def holes_entry(shape: Box | Polygon) -> dict[str, Any]:
     """The holes of a shape, if it has any, as a key of a file."""
     rings = shape.holes if isinstance(shape, Polygon) else ()
     return {"holes_m": [ring.tolist() for ring in rings]} if rings else {}
@@ -177,7 +177,7 @@ def stated_footprint(footprint: Sequence[Shape]) -> tuple[dict[str, Any], ...]:
             if shape.center.any():
                 raise ValueError("footprint: a scenario file can state a disc around the pose only")
             entries.append({"disc_m": float(shape.radius)})
-        elif _holes(shape):
+        elif holes_entry(shape):
             raise ValueError("footprint: a scenario file cannot state the holes of a body")
         else:
             entries.append({"polygon_m": tuple((x, y) for x, y in shape.corners.tolist())})
@@ -205,7 +205,7 @@ def stated_obstacle(obstacle: AnyObstacle, maps: Sequence[MapFile], folder: Path
         box = {"center": shape.center.tolist(), "size": shape.size.tolist(), **heading}
         entry["box_m"] = box
     else:
-        entry |= {"polygon_m": shape.corners.tolist(), **_holes(shape)}
+        entry |= {"polygon_m": shape.corners.tolist(), **holes_entry(shape)}
     if obstacle.height is not None:
         entry["height_m"] = [float(z) for z in obstacle.height]
     if obstacle.motion is not None and obstacle.motion is not STANDS:

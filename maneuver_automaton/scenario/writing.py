@@ -16,6 +16,7 @@ from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Horizon, Unstated
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
+from maneuver_automaton.scenario.ground import stated_places
 from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario
 from maneuver_automaton.scenario.schema import (
@@ -110,11 +111,16 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
         "automaton": _automaton(scenario, folder),
         "start": {key: value for key, value in start.items() if value is not None},
         "goal": _one_or_several(goals),
-        "cost": _cost(problem.cost),
+        "cost": _cost(problem.cost)
+        | stated_places(problem.place_costs, scenario.ground_files, folder),
         "horizon": _horizon(problem.horizon),
         "bounds_m": stated(BoundsPart, problem.bounds),
         "margin_m": problem.margin,
-        "obstacles": [stated_obstacle(one, scenario.maps, folder) for one in problem.obstacles],
+        "obstacles": [
+            stated_obstacle(one, scenario.maps, folder)
+            for one in problem.obstacles
+            if all(one is not file.walls for file in scenario.ground_files)
+        ],
         "zones": [stated_zone(one) for one in problem.zones],
         "search": search | stated(SearchPart, problem.search),
     }

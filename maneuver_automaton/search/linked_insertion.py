@@ -91,7 +91,7 @@ def _known(task: InsertionTask) -> tuple[Word, ...]:
     word = None if plan is None else word_of_plan(task.problem.automaton, plan)
     if plan is None or word is None:
         return ()
-    return (replace(word, cost=task.problem.cost_of(plan)),)
+    return (replace(word, cost=task.problem.invariant_cost_of(plan)),)
 
 
 def _so_far(task: InsertionTask, found: BestWords) -> SearchResult:

@@ -167,7 +167,7 @@ class WordSetup:
             return None
         cost = price + float(self.library.arrays.rates[list(trims)] @ times)
         if total is not None or self.prices_switches:
-            cost = self.problem.cost_of(self.plan(trims, times))
+            cost = self.problem.invariant_cost_of(self.plan(trims, times))
         return TimedWord(tuple(trims), times, cost)
 
     @property
@@ -194,7 +194,7 @@ class WordSetup:
     def word(self, timed: TimedWord) -> Word:
         """A word under work with all its trims and transitions, and with its cost."""
         word = self._complete(timed.trims, timed.durations)
-        return replace(word, cost=self.problem.cost_of(plan_of(self.problem, word)))
+        return replace(word, cost=self.problem.invariant_cost_of(plan_of(self.problem, word)))
 
     def _complete(self, trims: Sequence[int], durations: Array) -> Word:
         """The word with the trims and transitions between those given, and with rest as padding."""
@@ -331,7 +331,7 @@ def maneuver_prices(automaton: Automaton, cost: StageCost) -> Array:
         )
         for one in automaton.maneuvers
     ]
-    return np.array([any_problem.cost_of(one) for one in alone]) + terms.switch
+    return np.array([any_problem.invariant_cost_of(one) for one in alone]) + terms.switch
 
 
 @kept_by_first

@@ -165,7 +165,8 @@ def test_what_is_left_out():
         ("control: [0.8, 0.8]", "control: [0.8]",
          ":8: automaton.trims[2].control: got [0.8], need a list of 2 numbers (speed, turn_rate)"),
         ("length: 0.1", "lngth: 0.1", ":10: cost.lngth: unknown key; did you mean 'length'? Known "
-         "keys: effort, norm, time, effort_matrix, norm_order, length, switch, direction_change"),
+         "keys: effort, norm, time, effort_matrix, norm_order, length, switch, "
+         "direction_change, clearance, ground"),
         ("margin_m: 0.05", "horizon: {time_s: 5.0}",
          ":12: horizon.time_s: got 5, need free: vehicles that give way arrive later"),
         ("leaves: true", "horizon: {time_s: 5.0}",

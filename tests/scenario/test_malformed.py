@@ -562,7 +562,8 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     "merge key": (
         cost("<<: {effort: 1.0}"),
         ":11: cost.<<: unknown key; did you mean 'time'? Known keys: effort, norm, "
-        "time, effort_matrix, norm_order, length, switch, direction_change",
+        "time, effort_matrix, norm_order, length, switch, direction_change, "
+        "clearance, ground",
     ),
     "empty": ("", ": is empty, need a scenario"),
     "comments only": ("# nothing\n", ": is empty, need a scenario"),
