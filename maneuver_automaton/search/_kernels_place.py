@@ -178,9 +178,14 @@ def edge_place(
 
 @bare_kernel
 def word_place(
-    scene: Scene, lib: LatticeArrays, start: Array, trims: IntArray, durations: Array, edges: IntArray
+    scene: Scene,
+    lib: LatticeArrays,
+    start: Array,
+    trims: IntArray,
+    durations: Array,
+    edges: IntArray,
 ) -> float:
-    """Price of the places along a word from a pose (4,); an edge leads to each trim, -1 for none."""
+    """Price of the places along a word from a pose (4,); an edge leads to a trim, -1 for none."""
     return steps_place(scene, lib, start, trims, durations, edges, trims.shape[0])
 
 

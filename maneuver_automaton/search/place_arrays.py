@@ -15,7 +15,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.arrays import PlaceArrays
 from maneuver_automaton.search.lattice_library import LatticeLibrary
 
-TURNS = 16  # headings of a raster, where they matter
+TURNS = 32  # headings of a raster, where they matter
 FINE = 0.25  # cells of a raster, in half widths of the body ...
 ROUGH = 0.1  # ... or in length scales of a vehicle that is a point
 MOST_SAMPLES = 1 << 21  # of a raster: 8 MiB
@@ -37,7 +37,9 @@ NOTHING = PlaceArrays(
 )
 
 
-def place_arrays(problem: Problem, library: LatticeLibrary, frame: Array, box: Array) -> PlaceArrays:
+def place_arrays(
+    problem: Problem, library: LatticeLibrary, frame: Array, box: Array
+) -> PlaceArrays:
     """What places cost within a box (4,), seen from a frame (3,); of what is beyond, the border.
 
     The first clearance is that of the body that there is, whatever its parts. All other costs are
