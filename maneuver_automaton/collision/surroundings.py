@@ -86,21 +86,32 @@ class ObstacleDistances:
     singles: tuple[_Single, ...]
     speed: float  # [m/s] no point of an obstacle is faster
 
-    def nearest(self, body: Sequence[ShapePart], poses: Array, times: Array) -> Nearest:
-        """Distance to the nearest obstacle, and which, at poses (n, 3) and times (n,) [s]."""
+    def nearest(
+        self, body: Sequence[ShapePart], poses: Array, times: Array, *, within: float = math.inf
+    ) -> Nearest:
+        """Distance to the nearest obstacle, and which, at poses (n, 3) and times (n,) [s].
+
+        What stands farther away than `within` [m] may be left out: then none is the nearest.
+        """
         best = Nearest(np.full(len(poses), math.inf), np.full(len(poses), -1))
         for part in body:
             if len(self.owners):
-                best = _nearer(best, self._nearest_in_tree(part, poses))
+                best = _nearer(best, self._nearest_in_tree(part, poses, within))
             if self.singles:
                 best = self._nearest_single(part, poses, times, best)
         return best
 
-    def _nearest_in_tree(self, part: ShapePart, poses: Array) -> Nearest:
-        (_, which), away = self.tree.query_nearest(
-            part.at(poses), return_distance=True, all_matches=False
+    def _nearest_in_tree(self, part: ShapePart, poses: Array, within: float) -> Nearest:
+        limit = None if math.isinf(within) else within + part.radius
+        (rows, which), away = self.tree.query_nearest(
+            part.at(poses), max_distance=limit, return_distance=True, all_matches=False
         )
-        return Nearest(np.maximum(away - part.radius, 0.0), self.owners[which])
+        found = Nearest(np.full(len(poses), math.inf), np.full(len(poses), -1))
+        found.distance[rows], found.owner[rows] = (
+            np.maximum(away - part.radius, 0.0),
+            self.owners[which],
+        )
+        return found
 
     def _nearest_single(
         self, part: ShapePart, poses: Array, times: Array, best: Nearest

@@ -68,6 +68,22 @@ class BoundEntry(TypedDict):
     history: Annotated[Pairs, says("[[s, value]]")]
 
 
+class PlacePriceEntry(TypedDict):
+    """What one cost of places adds to a plan's cost."""
+
+    kind: Annotated[str, says("Clearance, Ground, or what a user's own is called")]
+    per: Annotated[str, says("metre or second")]
+    price: Number
+    error: Annotated[Number, says("of its integration, as estimated")]
+
+
+class CostPartsEntry(TypedDict):
+    """The parts of a plan's cost."""
+
+    invariant: Annotated[Number, says("what does not depend on where the plan is")]
+    places: Annotated[list[PlacePriceEntry], says("what does")]
+
+
 class PrimitiveEntry(TypedDict):
     """A trim or a maneuver."""
 
@@ -104,6 +120,7 @@ class AuditEntry(TypedDict):
     min_clearance_m: Known
     terminal_position_m: Known
     terminal_heading_rad: Known
+    place_price: NotRequired[Annotated[Known, says("of the places, integrated anew")]]
 
 
 class AlternativeEntry(TypedDict):
@@ -132,6 +149,7 @@ class PlanDocument(DocumentHead):
     status: Annotated[str, says("how planning ended")]
     narrowest: NotRequired[Annotated[NarrowestEntry | None, says("only where one is known")]]
     cost: NotRequired[Known]
+    cost_parts: NotRequired[Annotated[CostPartsEntry, says("only where places are priced")]]
     duration_s: NotRequired[Known]
     lower_bound: NotRequired[Annotated[Known, says("no plan costs less")]]
     gap: NotRequired[Annotated[Known, says("(cost - lower_bound) / cost")]]
@@ -190,12 +208,33 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
         ],
         timing_s=dict.fromkeys(TIMINGS) | result.timing_s,
         counts=dict.fromkeys(COUNTS, 0) | result.counts,
+        cost_parts=_cost_parts(result),
     )
     if result.narrowest is None:
         del document["narrowest"]
     if not result.problem.via:
         del document["via"]
+    if not (result.problem.place_costs and result.plan):
+        del document["cost_parts"]
     return document
+
+
+def _cost_parts(result: PlanResult) -> CostPartsEntry:
+    problem, plan = result.problem, result.plan
+    if plan is None:
+        return {"invariant": 0.0, "places": []}
+    return {
+        "invariant": problem.invariant_cost_of(plan),
+        "places": [
+            {
+                "kind": type(cost).__name__,
+                "per": cost.per,
+                "price": found.price,
+                "error": found.error,
+            }
+            for cost, found in zip(problem.place_costs, problem.place_prices_of(plan), strict=True)
+        ],
+    }
 
 
 def save_plan(

@@ -199,8 +199,10 @@ def uses_lattice(problem: Problem) -> bool:
 
 @kept_by_first
 def _uses_lattice(problem: Problem) -> bool:
-    climbs = problem.start.size > 3 and not problem.has_inertia
-    if problem.climbs_among_obstacles or (climbs and problem.place_costs):
+    method = problem.search.method
+    placed = bool(problem.place_costs) and method in ("auto", "lattice")
+    climbs = problem.start.size > 3 and problem.automaton.is_kinematic
+    if problem.climbs_among_obstacles or (climbs and placed):
         return True
     velocities = problem.automaton.body_velocities
     moving = velocities[velocities.any(axis=1)]
@@ -208,10 +210,7 @@ def _uses_lattice(problem: Problem) -> bool:
     steers = len(moving) > 1 and sides and velocities.shape[1] == 3
     if not steers or (problem.horizon.time is not None and len(moving) == len(velocities)):
         return False
-    method = problem.search.method
-    return method == "lattice" or (
-        method == "auto" and bool(problem.obstacles or problem.place_costs)
-    )
+    return placed or method == "lattice" or (method == "auto" and bool(problem.obstacles))
 
 
 class Ends(Step):

@@ -315,10 +315,12 @@ class _Work:
             return None
         if not np.isin(found.trims, query.library.trims).all():
             query = with_trims(query, Chosen(words=(), others=tuple(found.trims.tolist())))
-        return found if is_free(query, found) else None
+        found = query.with_places(found)
+        cheaper = found.cost < self.word.cost * (1.0 - GAIN)
+        return found if cheaper and is_free(query, found) else None
 
     def _cost(self, word: Word) -> float:
-        """Cost of a word, prices of switches and changes of direction included."""
+        """Cost of a word, prices of switches and changes of direction included, without places."""
         prices, numbers = self.query.library.arrays.library, self.number_of[word.trims]
         gears = np.sign(self.twists[numbers, 0])
         gears = gears[gears != 0.0]

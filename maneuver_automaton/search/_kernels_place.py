@@ -185,7 +185,7 @@ def word_place(
     durations: Array,
     edges: IntArray,
 ) -> float:
-    """Price of the places along a word from a pose (4,); an edge leads to each trim, -1 for none."""
+    """Price of the places along a word from a pose (4,); an edge leads to a trim, -1 for none."""
     return steps_place(scene, lib, start, trims, durations, edges, trims.shape[0])
 
 

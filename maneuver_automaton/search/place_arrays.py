@@ -15,7 +15,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.arrays import PlaceArrays
 from maneuver_automaton.search.lattice_library import LatticeLibrary
 
-TURNS = 16  # headings of a raster, where they matter
+TURNS = 32  # headings of a raster, where they matter
 FINE = 0.25  # cells of a raster, in half widths of the body ...
 ROUGH = 0.1  # ... or in length scales of a vehicle that is a point
 MOST_SAMPLES = 1 << 21  # of a raster: 8 MiB
