@@ -281,11 +281,9 @@ def _entries(cast: Cast) -> tuple[list[Artist], list[str]]:
 def _box(cast: Cast) -> tuple[Array, Array]:
     """Corners (3,) of what is shown, the ground at the lowest building."""
     poses = [one.track.pose[:, [0, 1, 3]] for one in cast.actors]
-    goals = [
-        end.pose[None, [0, 1, 3]]
-        for one in cast.actors
-        for end in (*one.mover.goals, *one.mover.via)
-    ]
+    movers = [one.mover for one in cast.actors]
+    goals = [goal.pose[None, [0, 1, 3]] for one in movers for goal in one.goals]
+    goals += [via.pose[None, [0, 1, 3]] for one in movers for via in one.via]
     points = np.concatenate([*poses, *goals])
     low, high = points.min(axis=0), points.max(axis=0)
     for obstacle in _standing(cast):
