@@ -80,7 +80,7 @@ class Via:
     def __post_init__(self) -> None:
         plain_numbers(self)
         if self.gate is not None:
-            self._check_gate()
+            self._check_gate(self.gate)
         elif self.pose is None:
             raise ValueError("via: has neither a pose nor a gate, need one of them")
         pose = as_array("via: pose", self.pose)
@@ -111,9 +111,9 @@ class Via:
                 "that of the crossing"
             )
 
-    def _check_gate(self) -> None:
+    def _check_gate(self, gate: Array) -> None:
         """Two ends that are apart; without a pose the middle, with a heading across."""
-        gate = as_array("via: gate", self.gate)
+        gate = as_array("via: gate", gate)
         if gate.shape not in ((2, 2), (2, 3)):
             raise ValueError(f"via: gate has shape {gate.shape}, need two points [x, y]")
         check_size("via: gate", gate)

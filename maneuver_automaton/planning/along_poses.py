@@ -261,8 +261,8 @@ class _Search:
         poses = [*(to.pose for _, to in self.arrivals), self.found.problem.start]
         for i, k in self._pairs():
             begins = np.array([poses[a] for a in rows[i]])
-            ends = [*goals] if k == n else [Goal(poses[a]) for a in rows[k]]
-            priced = _estimates(middle, begins, ends)
+            aims = [*goals] if k == n else [Goal(poses[a]) for a in rows[k]]
+            priced = _estimates(middle, begins, aims)
             if k == n:
                 priced = priced.min(axis=1, keepdims=True)
             self.costs[np.ix_(rows[i], rows[k])] = np.maximum(priced, self.bounds[i, k])
@@ -448,7 +448,7 @@ class _Search:
         for to in sorted(others, key=lambda one: float(np.abs(one.pose - here.pose).sum())):
             if self.legs.is_over(budget):
                 break
-            best = min((best, self._with(best, n, to, budget)), key=_price)
+            best = _cheaper(best, self._with(best, n, to, budget))
         return best
 
     def _with(self, chain: Chain, n: int, to: Arrival, budget: Budget) -> Chain | None:
@@ -477,7 +477,7 @@ class _Search:
             if self.legs.is_over(budget):
                 break
             at = golden_section(price, -reach, reach, lambda: self.legs.is_over(budget))
-            best = min((best, tried.get(at)), key=_price)
+            best = _cheaper(best, tried.get(at))
         return best
 
     def with_more_time(self, chain: Chain) -> None:
@@ -545,12 +545,12 @@ def arrivals_of(
             for heading in _headings(problem, number)
         ]
         found = [Arrival(pose, trim) for pose in poses for trim in _trims(problem, via)]
-    said = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
-    if all(said):
+    blocked = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
+    if all(blocked):
         proven = len(found) == 1 and not via.radius
         status = PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN
-        return (), (status, _about(said[0]))
-    free = (one for one, why in zip(found, said, strict=True) if not why)
+        return (), (status, _about(blocked[0]))
+    free = (one for one, why in zip(found, blocked, strict=True) if not why)
     return tuple(free), None
 
 
@@ -710,6 +710,10 @@ def _least(problem: Problem, goal: Goal) -> float:
     if problem.has_inertia:
         return straight_bound(problem, (goal,))
     return closed_bound(problem, goal)
+
+
+def _cheaper(chain: Chain, other: Chain | None) -> Chain:
+    return chain if other is None or chain.cost <= other.cost else other
 
 
 def _price(chain: Chain | None) -> float:

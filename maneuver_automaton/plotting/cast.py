@@ -20,7 +20,7 @@ from maneuver_automaton.plotting.limits import limit_boxes, shape_path
 from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
 from maneuver_automaton.plotting.style import count_from_near, tidy, word_text
 from maneuver_automaton.plotting.track import Track, joined_track, track_of_plan
-from maneuver_automaton.problem import Bounds, Goal
+from maneuver_automaton.problem import Bounds, Goal, Via
 from maneuver_automaton.recording import Mover, Recording
 
 STILL_SIZE_M = 1.0  # size of a path that goes nowhere
@@ -47,6 +47,7 @@ class Scenery:
 
     goals: tuple[Goal, ...]
     reached: int | None = None  # which of the goals
+    via: tuple[Via, ...] = ()
     obstacles: tuple[AnyObstacle, ...] = ()
     zones: tuple[Zone, ...] = ()
     bounds: Bounds = field(default_factory=Bounds)
@@ -233,7 +234,8 @@ class Actor:
     def points(self, size: float) -> Array:
         """Places (n, 2) where something happens: tracks, bodies along them, start and goals."""
         goals = [goal.pose for goal in self.mover.goals]
-        ends = np.array([self.track.start, np.asarray(self.mover.end), *goals])
+        on_the_way = [one.pose for one in self.mover.via]
+        ends = np.array([self.track.start, np.asarray(self.mover.end), *goals, *on_the_way])
         room = 0.0 if self.body else ROOM * size
         held = [track.pose[:, :2] for _, track in self.held]
         times = np.append(self.begin, self.track.switching_times)
@@ -343,6 +345,7 @@ def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
     scene = Scenery(
         goals=first.mover.goals if alone else (),
         reached=first.mover.goal_index if alone else None,
+        via=first.mover.via if alone else (),
         obstacles=world.obstacles,
         zones=world.zones,
         bounds=world.bounds,

@@ -14,17 +14,24 @@ from matplotlib.quiver import Quiver
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color
-from maneuver_automaton.plotting.style import mark_handle
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.plotting.style import SMALL_PT, mark_handle
+from maneuver_automaton.problem import Goal, Via
 
 ARROW_SIZE = 0.13  # of the size of the path
 SET: Color = (0.00, 0.62, 0.45)
+WAY: Color = (0.00, 0.35, 0.60)
 
 
 def draw_ends(
-    ax: Axes, start: Array, goals: Sequence[Goal], *, size: float, reached: int | None = None
+    ax: Axes,
+    start: Array,
+    goals: Sequence[Goal],
+    *,
+    size: float,
+    reached: int | None = None,
+    via: Sequence[Via] = (),
 ) -> dict[str, Any]:
-    """Draw a start pose (dof,) and all goals; if one is `reached`, the others are pale."""
+    """Draw a start pose (dof,), what is on the way, and all goals: others than `reached` pale."""
     pale = [reached is not None and k != reached for k in range(len(goals))]
     colors = [GREY if others else INK for others in pale]
     headed = [k for k, goal in enumerate(goals) if not goal.free_heading]
@@ -43,12 +50,38 @@ def draw_ends(
                     facecolor=(*SET, 0.15), edgecolor=SET, linewidth=0.9, zorder=1.6,
                 )
             )  # fmt: skip
+    faced = [one.pose for one in via if not one.free_heading]
     artists["headings"] = draw_headings(
         ax,
-        np.array([start, *(goals[k].pose for k in headed)]),
+        np.array([start, *faced, *(goals[k].pose for k in headed)]),
         length=ARROW_SIZE * size,
-        color=[INK, *(colors[k] for k in headed)],
+        color=[INK, *(WAY for _ in faced), *(colors[k] for k in headed)],
     )
+    return artists | _draw_via(ax, via)
+
+
+def _draw_via(ax: Axes, via: Sequence[Via]) -> dict[str, Any]:
+    """Numbers in circles at poses on the way; gates as lines, tolerances as discs."""
+    artists: dict[str, Any] = {}
+    for k, one in enumerate(via, 1):
+        x, y = one.place[:2].tolist()
+        if one.gate is not None:
+            (artists[f"gate {k}"],) = ax.plot(
+                one.gate[:, 0], one.gate[:, 1], color=WAY, linewidth=1.4, linestyle=(0, (3, 2)),
+                marker="|", markersize=6.0, zorder=4.6,
+            )  # fmt: skip
+            x, y = one.gate[1, :2].tolist()
+        if one.tolerance_m > 0.0 and one.gate is None:
+            disc = Circle((x, y), one.tolerance_m, facecolor=(*WAY, 0.12), edgecolor=WAY)
+            disc.set(linewidth=0.9, zorder=1.6)
+            artists[f"near {k}"] = ax.add_patch(disc)
+        artists[f"via {k}"] = ax.scatter(
+            x, y, s=105.0, facecolors=["white"], edgecolors=[WAY], linewidths=1.2, zorder=5.2,
+        )  # fmt: skip
+        artists[f"number {k}"] = ax.annotate(
+            str(k), (x, y), ha="center", va="center_baseline", fontsize=SMALL_PT, color=WAY,
+            zorder=5.3, annotation_clip=True,
+        )  # fmt: skip
     return artists
 
 
@@ -77,8 +110,10 @@ def draw_headings(
     )  # fmt: skip
 
 
-def end_handles(goals: Sequence[Goal] = ()) -> tuple[list[Line2D], list[str]]:
-    """Legend handles of start and goals, and what else there is of goals."""
+def end_handles(
+    goals: Sequence[Goal] = (), via: Sequence[Via] = ()
+) -> tuple[list[Line2D], list[str]]:
+    """Legend handles of start and goals, what else there is of goals, and poses on the way."""
     handles = [mark_handle("o", size=5.5, face=INK, edge=INK), mark_handle("D", size=6.0, edge=INK)]
     names = ["start", "goal"]
     if goals and all(goal.free_heading for goal in goals):
@@ -92,4 +127,10 @@ def end_handles(goals: Sequence[Goal] = ()) -> tuple[list[Line2D], list[str]]:
     if any(goal.tolerance_m > 0.0 for goal in goals):
         handles.append(mark_handle("o", size=9.0, face=(*SET, 0.15), edge=SET))
         names.append("goal tolerance")
+    if any(one.gate is None for one in via):
+        handles.append(mark_handle("o", size=9.0, edge=WAY))
+        names.append("on the way")
+    if any(one.gate is not None for one in via):
+        handles.append(Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 2))))
+        names.append("gate")
     return handles, names

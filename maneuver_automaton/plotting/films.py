@@ -391,4 +391,4 @@ def _draw_still(ax: Any, cast: Cast) -> None:
         ax.add_collection(part, autolim=False)
     if cast.is_alone:
         start, scene = cast.actors[0].track.start, cast.scene
-        draw_ends(ax, start, scene.goals, size=cast.size, reached=scene.reached)
+        draw_ends(ax, start, scene.goals, size=cast.size, reached=scene.reached, via=scene.via)

@@ -90,7 +90,9 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
     for part in artists.values():
         if part.axes is None:
             ax.add_collection(part)
-    return artists | draw_ends(ax, track.start, scene.goals, size=size, reached=scene.reached)
+    return artists | draw_ends(
+        ax, track.start, scene.goals, size=size, reached=scene.reached, via=scene.via
+    )
 
 
 def _steps_of(ax: Axes, cast: Cast, one: Actor) -> dict[str, Any]:

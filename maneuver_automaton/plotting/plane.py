@@ -116,7 +116,7 @@ def plane_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], li
     scene, world = cast.scene, cast.recording.world
     if cast.is_alone:
         driven = path_entries(cast, moving=moving)
-        ends = end_handles(scene.goals)
+        ends = end_handles(scene.goals, scene.via)
     else:
         driven, ends = vehicle_entries(cast, moving=moving), ([], [])
     lanes = ([Patch(facecolor=LANE)], ["lane"]) if world.lanes else ([], [])

@@ -21,6 +21,7 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
+from maneuver_automaton.plotting.ends import WAY
 from maneuver_automaton.plotting.limits import shape_path
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import space_page
@@ -125,6 +126,7 @@ def _ends(cast: Cast) -> list[tuple[Array, Color, str]]:
     for one in cast.actors:
         colors = (START, GOAL) if cast.is_alone else (one.color, one.color)
         rows.append((one.track.start, colors[0], "o"))
+        rows += [(via.pose, WAY, "s") for via in one.mover.via]
         rows += [(goal.pose, colors[1], "*") for goal in one.mover.goals]
     return rows
 
@@ -269,13 +271,19 @@ def _entries(cast: Cast) -> tuple[list[Artist], list[str]]:
         handle = line_handle(color if cast.is_alone else INK, marker=marker)
         handle.set_markerfacecolor(color if cast.is_alone else INK)
         handles.append(handle)
+    if any(one.mover.via for one in cast.actors):
+        handles.append(line_handle(WAY, marker="s"))
+        names = [*names, "start", "goal", "on the way"]
+        return handles, names
     return handles, [*names, "start", "goal"]
 
 
 def _box(cast: Cast) -> tuple[Array, Array]:
     """Corners (3,) of what is shown, the ground at the lowest building."""
     poses = [one.track.pose[:, [0, 1, 3]] for one in cast.actors]
-    goals = [goal.pose[None, [0, 1, 3]] for one in cast.actors for goal in one.mover.goals]
+    movers = [one.mover for one in cast.actors]
+    goals = [goal.pose[None, [0, 1, 3]] for one in movers for goal in one.goals]
+    goals += [via.pose[None, [0, 1, 3]] for one in movers for via in one.via]
     points = np.concatenate([*poses, *goals])
     low, high = points.min(axis=0), points.max(axis=0)
     for obstacle in _standing(cast):

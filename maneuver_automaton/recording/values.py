@@ -19,7 +19,7 @@ from maneuver_automaton.automaton.plan_arrays import PlanArrays, arrays_at, join
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
-from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.problem import Bounds, Goal, Problem, Via
 
 MOST_DIGITS = 6  # of a number in a heading
 MOST_PAIRS = 3  # that are named, the nearest first
@@ -153,6 +153,11 @@ class Mover:
     def goals(self) -> tuple[Goal, ...]:
         """Where it was to go; empty if that is not known, or a region."""
         return () if self.problem is None else self.problem.goals
+
+    @property
+    def via(self) -> tuple[Via, ...]:
+        """What it was to pass on its way."""
+        return () if self.problem is None else self.problem.via
 
     @property
     def regions(self) -> tuple[Shape, ...]:
