@@ -207,7 +207,7 @@ def judged(problem, result):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_plan_among_obstacles_is_driven_anew(name, back):
     problem = ma.load_scenario(SCENARIOS / f"{name}.yaml").problem
-    settings = replace(problem.search, max_expansions=3000, improve=False)
+    settings = replace(problem.search, max_expansions=12_000, improve=False)
     problem = replace(problem, search=settings)
     if back:
         end = problem.goals[0].pose
