@@ -16,10 +16,17 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Shape
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import Car, Unicycle, UserModel
+from maneuver_automaton.models import (
+    Car,
+    FourWheelSteeringCar,
+    RearSteeredCar,
+    Unicycle,
+    UserModel,
+)
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
+from maneuver_automaton.scenario.automata import preset_automaton
 from tests import translations
 
 TABLE_2 = {
@@ -254,6 +261,14 @@ def _user() -> Automaton:
     return Automaton(model, trims, maneuvers)
 
 
+def _forklift() -> Automaton:
+    return preset_automaton("reeds_shepp", RearSteeredCar(wheelbase=1.5, max_steering=1.2))
+
+
+def _four_wheels() -> Automaton:
+    return preset_automaton("crab", FourWheelSteeringCar(wheelbase=1.0, max_steering=1.2))
+
+
 def _stock(name: str) -> Callable[[], Automaton]:
     return functools.partial(load_stock_library, name)
 
@@ -326,6 +341,36 @@ ALL = (
         goal=(24.0, 6.0, 0.3),
         moving_trim="speed 3, hitch 0",
         slow=1.0,
+        inertia=True,
+    ),
+    Vehicle(
+        name="rear_steered_car",
+        library=_forklift,
+        footprint=(Box([2.4, 1.15], [-0.75, 0.0]),),
+        goal=(8.0, 2.0, 0.5),
+    ),
+    Vehicle(
+        name="four_wheel_steering_car",
+        library=_four_wheels,
+        footprint=(Box([1.5, 0.6]),),
+        goal=(6.0, 2.0, 0.5),
+    ),
+    Vehicle(
+        name="articulated_vehicle",
+        library=_stock("articulated_vehicle"),
+        footprint=(Box([3.6, 2.8], [0.9, 0.0]),),
+        parts={"rear_part": (Box([3.4, 2.7], [-0.3, 0.0]),)},
+        goal=(20.0, 5.0, 0.3),
+        moving_trim="speed 2, articulation 0",
+        inertia=True,
+    ),
+    Vehicle(
+        name="tractor_with_trailers",
+        library=_stock("tractor_with_trailers"),
+        footprint=(Box([7.0, 2.5], [2.1, 0.0]),),
+        parts={"trailer": (Box([3.0, 2.4]),), "trailer_2": (Box([11.0, 2.5], [2.5, 0.0]),)},
+        goal=(40.0, 8.0, 0.2),
+        moving_trim="speed 2, steering 0",
         inertia=True,
     ),
     Vehicle(

@@ -1,7 +1,7 @@
 """Forklift, four-wheel steering, wheel loader, trailers: each judged by an integration of its own.
 
-What is integrated here are headings and axles in the world, written down from the constraint that no
-wheel slips sideways; nothing of it comes from the package.
+What is integrated here are headings and axles in the world, written down from the constraint that
+no wheel slips sideways; nothing of it comes from the package.
 """
 
 from __future__ import annotations
@@ -17,9 +17,6 @@ from scipy.integrate import solve_ivp
 from shapely import affinity
 
 import maneuver_automaton as ma
-from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.building import build_library
-from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import (
     ArticulatedVehicle,
     FourWheelSteeringCar,
@@ -27,9 +24,7 @@ from maneuver_automaton.models import (
     TractorWithTrailers,
     rollout,
 )
-from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.primitives.connecting import pieces
-from tests.reference_dynamics import trim_defect
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 NAMES = (
@@ -107,7 +102,12 @@ def rates(model, state, u):
         wheels.append((0, steered, headings[0] + u[1]))
         offsets = (model.hitch_offset, model.hitch_offset_2, model.hitch_offset_3)
         joints = [
-            (k, turned((-offsets[k], 0.0), headings[k]), k + 1, turned((length, 0), headings[k + 1]))
+            (
+                k,
+                turned((-offsets[k], 0.0), headings[k]),
+                k + 1,
+                turned((length, 0), headings[k + 1]),
+            )
             for k, length in enumerate(model.lengths)
         ]
         given = []
@@ -207,7 +207,7 @@ def judged(problem, result):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_plan_among_obstacles_is_driven_anew(name, back):
     problem = ma.load_scenario(SCENARIOS / f"{name}.yaml").problem
-    settings = replace(problem.search, max_expansions=3000, improve=False)
+    settings = replace(problem.search, max_expansions=12_000, improve=False)
     problem = replace(problem, search=settings)
     if back:
         end = problem.goals[0].pose

@@ -154,8 +154,8 @@ def test_what_is_left_out():
          "unicycle, car, second_order_unicycle, second_order_car, accelerating_car, "
          "car_with_trailer, single_track, "
          "hovercraft, helicopter, lattice_body, omnidirectional, rear_steered_car, "
-         "four_wheel_steering_car, articulated_vehicle, tractor_with_trailers; did you mean 'car'? A vehicle of "
-         "your own needs --model MODULE:OBJECT"),
+         "four_wheel_steering_car, articulated_vehicle, tractor_with_trailers; did you mean "
+         "'car'? A vehicle of your own needs --model MODULE:OBJECT"),
         ("preset: reeds_shepp", "preset: table2", ":20: vehicles[2].automaton.preset: got "
          "'table2', which is for the unicycle, not the car"),
         ("pose: [4, -4, 0]", "pose: [4, -4, 0, 1]",
