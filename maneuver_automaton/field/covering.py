@@ -333,7 +333,7 @@ def _swaths_along(problem: FieldProblem, angle: float) -> Array:
 
 
 def _united(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intervals in a row, those that overlap as one."""
+    """Intervals in their order, those that overlap or touch as one."""
     whole: list[tuple[float, float]] = []
     for low, high in spans:
         if whole and low <= whole[-1][1]:
