@@ -10,7 +10,7 @@ from maneuver_automaton.cli.pictures import ready_to_draw
 from maneuver_automaton.cli.result_commands import origin_of
 from maneuver_automaton.cli.terminal import announced, print_result, waiting
 from maneuver_automaton.field.covering import FieldResult, cover
-from maneuver_automaton.field.files import load_field, save_field_geojson, save_field_picture
+from maneuver_automaton.field.files import load_field, save_field_geojson
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.recording import Fact
 
@@ -45,6 +45,8 @@ def cover_file(
         path.unlink(missing_ok=True)
         if plot:
             ready_to_draw()
+            from maneuver_automaton.field.picture import save_field_picture
+
             save_field_picture(covered, path, name=field.name)
     except OSError as error:
         raise not_written(path, error) from error

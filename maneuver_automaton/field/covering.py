@@ -117,7 +117,8 @@ class FieldProblem:
         ahead = np.flatnonzero((twists[:, 0] > 0.0) & ~twists[:, 1:].any(axis=1))
         if not ahead.size:
             raise ValueError("field: no trim leads straight ahead, need one for the swaths")
-        return automaton.trims[ahead[np.argmin(self._rates[ahead])]]
+        cheapest: Trim = automaton.trims[ahead[np.argmin(self._rates[ahead])]]
+        return cheapest
 
     @property
     def radius(self) -> float:
@@ -314,7 +315,7 @@ def _swaths(problem: FieldProblem) -> Array:
 
 def _swaths_along(problem: FieldProblem, angle: float) -> Array:
     """Swaths (n, 2, 3) in a direction [rad]: side by side, as far as the field reaches in each."""
-    turned, width = SE2([0.0, 0.0, angle]), problem.width
+    turned, width = SE2(np.array([0.0, 0.0, angle])), problem.width
     inner = shapely.transform(problem.inner, turned.inverse().act)
     left, low, right, high = inner.bounds
     count = max(1, math.ceil((high - low) / width - ROUND))
@@ -328,11 +329,11 @@ def _swaths_along(problem: FieldProblem, angle: float) -> Array:
         parts = shapely.get_parts(strip.intersection(inner))
         spans = sorted(one.bounds[::2] for one in parts if one.area > 1e-4 * width * width)
         rows += [[[x, y, 0.0] for x in span] for span in _united(spans)]
-    return np.asarray((turned @ SE2(rows)).pose)
+    return np.asarray((turned @ SE2(np.array(rows))).pose)
 
 
 def _united(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intervals in a row, those that overlap as one."""
+    """Intervals in their order, those that overlap or touch as one."""
     whole: list[tuple[float, float]] = []
     for low, high in spans:
         if whole and low <= whole[-1][1]:
