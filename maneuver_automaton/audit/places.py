@@ -55,7 +55,7 @@ def price_again(
         poses = drive.frames.at(elements, at) + offset
         twists = drive.twists_at(elements, at)
         if isinstance(cost, Clearance):
-            gap = np.maximum(1.0 - near(elements, at, poses) / cost.within, 0.0)
+            gap = np.maximum(1.0 - near(elements, at, poses, cost.within) / cost.within, 0.0)
             found = cost.weight * gap**2
         else:
             found = np.asarray(cost.rates(poses, twists), dtype=np.float64)
@@ -124,18 +124,26 @@ class _Distances:
             shapely.prepare(core)
         self.obstacles = flat
 
-    def __call__(self, elements: Any, shares: Array, poses: Array) -> Array:
+    def __call__(self, elements: Any, shares: Array, poses: Array, within: float) -> Array:
+        """Distances (n,) [m] that are right where they are less than `within`."""
         import shapely
 
-        least = np.full(len(poses), math.inf)
+        least = np.full(len(poses), within)
         for body in self.bodies:
             frames = body.frames.at(elements, shares) + self.offset
             for shape in body.shapes or (None,):
-                cores, radius = _moved(shape, frames)
-                for height, obstacle, wide in self.obstacles:
-                    rows = self._meets(height, poses)
-                    apart = shapely.distance(cores[rows], obstacle) - radius - wide
-                    least[rows] = np.minimum(least[rows], np.maximum(apart, 0.0))
+                far = 0.0 if shape is None else _reach(shape)
+                near = [
+                    self._meets(height, poses) & (_from_box(frames, one) < far + wide + within)
+                    for height, one, wide in self.obstacles
+                ]
+                used = np.flatnonzero(np.any(near, axis=0)) if near else np.zeros(0, dtype=np.int64)
+                cores, radius = _moved(shape, frames[used])
+                for rows, (_, obstacle, wide) in zip(near, self.obstacles, strict=True):
+                    some = np.flatnonzero(rows[used])
+                    apart = shapely.distance(cores[some], obstacle) - radius - wide
+                    here = used[some]
+                    least[here] = np.minimum(least[here], np.maximum(apart, 0.0))
         return least
 
     def _meets(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:
@@ -155,6 +163,22 @@ def _core(shape: Shape) -> tuple[Any, float]:
     return shapely.make_valid(shapely.Polygon(shape.corners, getattr(shape, "holes", ()))), 0.0
 
 
+def _reach(shape: Shape) -> float:
+    """The greatest distance [m] of a point of a shape from its frame."""
+    if isinstance(shape, Disc):
+        return float(np.hypot(*shape.center)) + shape.radius
+    return float(np.hypot(*np.asarray(shape.corners).T).max())
+
+
+def _from_box(frames: Array, obstacle: Any) -> Array:
+    """Distances (n,) [m] of frames from the box around an obstacle."""
+    low_x, low_y, high_x, high_y = obstacle.bounds
+    x, y = frames[:, 0], frames[:, 1]
+    d_x = np.maximum(np.maximum(low_x - x, x - high_x), 0.0)
+    d_y = np.maximum(np.maximum(low_y - y, y - high_y), 0.0)
+    return np.asarray(np.hypot(d_x, d_y))
+
+
 def _moved(shape: Shape | None, frames: Array) -> tuple[Any, float]:
     """A shape of a body, or its point, at frames (n, dof)."""
     import shapely
@@ -168,7 +192,9 @@ def _moved(shape: Shape | None, frames: Array) -> tuple[Any, float]:
         placed(frames[:, None, :3], np.column_stack([ring, np.zeros(len(ring))]))[..., :2]
         for ring in rings
     ]
-    holes = [list(row) for row in zip(*ways[1:], strict=True)] or [None] * len(frames)
+    if len(ways) == 1:
+        return shapely.polygons(ways[0]), 0.0
+    holes = [list(row) for row in zip(*ways[1:], strict=True)]
     bodies = [shapely.Polygon(shell, inner) for shell, inner in zip(ways[0], holes, strict=True)]
     return np.array(bodies, dtype=object), 0.0
 
