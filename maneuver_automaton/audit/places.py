@@ -194,7 +194,7 @@ def _moved(shape: Shape | None, frames: Array) -> tuple[Any, float]:
     ]
     if len(ways) == 1:
         return shapely.polygons(ways[0]), 0.0
-    holes = [list(row) for row in zip(*ways[1:], strict=True)]
+    holes: list[Any] = [list(row) for row in zip(*ways[1:], strict=True)]
     bodies = [shapely.Polygon(shell, inner) for shell, inner in zip(ways[0], holes, strict=True)]
     return np.array(bodies, dtype=object), 0.0
 

@@ -90,6 +90,12 @@ def _symmetry(problem: Problem) -> Iterator[Finding]:
     yield _found("vector field", analysis.check_vector_field(model))
     yield _found("flow", analysis.check_flow(model))
     yield _found("stage cost", analysis.check_stage_cost(_stage_cost(problem), region=region))
+    for kind in dict.fromkeys(type(cost).__name__ for cost in problem.place_costs):
+        yield Finding(
+            what="symmetry: place cost",
+            holds=None,
+            words=f"{kind} depends on the place; the vehicle and the rest of its cost do not",
+        )
     if constraint := _constraint(problem.bounds, model):
         report = analysis.check_constraint(constraint, region=region)
         yield _told("bounds", report, hint="they do not move with the problem")

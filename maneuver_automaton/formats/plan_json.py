@@ -216,6 +216,8 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
         del document["via"]
     if not (result.problem.place_costs and result.plan):
         del document["cost_parts"]
+    if document["audit"] and document["audit"].get("place_price") is None:
+        document["audit"].pop("place_price", None)
     return document
 
 

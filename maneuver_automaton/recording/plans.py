@@ -130,7 +130,7 @@ def _facts(result: PlanResult) -> list[Fact]:
     if result.lower_bound is not None and result.gap is not None:
         is_best = result.gap <= 0.0 or (bound is not None and bound.kind == "incumbent")
         below = result.cost if is_best else result.lower_bound
-    changes = replace(result.problem, cost=Cost(direction_change=1.0)).cost_of(plan)
+    changes = replace(result.problem, cost=Cost(direction_change=1.0)).invariant_cost_of(plan)
     turns = f"{round(changes)} between forward and reverse"
     return [
         *plan_facts(

@@ -78,13 +78,13 @@ def _of_file(document: Document, part: GroundPart, where: Where, folder: Path) -
         more["max_cross_slope"] = part.max_cross_slope
     else:
         more["per"] = part.per
-    make = {
+    make: dict[str, Any] = {
         "raster": Ground.of_raster,
         "costmap": Ground.of_costmap,
         "elevation": Ground.of_elevation,
     }
     with at(document, (*where, key)):
-        found: Any = make[key](values, resolution=part.resolution_m, origin=part.origin, **more)
+        found = make[key](values, resolution=part.resolution_m, origin=part.origin, **more)
     ground, walls = found if key == "costmap" else (found, None)
     return GroundFile(ground=ground, part=part, path=path, walls=walls)
 
