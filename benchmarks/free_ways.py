@@ -33,7 +33,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import LatticeBody
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
-from maneuver_automaton.planning.lower_bound import known_bound
+from maneuver_automaton.planning.proving import known_bound
 from maneuver_automaton.problem import Bounds, Goal, Horizon, SearchSettings
 from maneuver_automaton.scenario.automata import preset_automaton
 from maneuver_automaton.search.lattice import _enclosed, distance_grids

@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import maneuver_automaton as ma
 from benchmarks import cases
 from benchmarks.tables import median, show
-from maneuver_automaton.planning.lower_bound import POLISHING, known_bound, proofs_of
+from maneuver_automaton.planning.proving import POLISHING, known_bound, proofs_of
 from maneuver_automaton.problem import Problem
 from tests import scenes
 

@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import maneuver_automaton as ma
 from benchmarks.random_plans import LEFT_OUT, drawn
 from benchmarks.tables import median, show
-from maneuver_automaton.planning.lower_bound import known_bound, proofs_of
+from maneuver_automaton.planning.proving import known_bound, proofs_of
 from maneuver_automaton.problem import Problem, SearchSettings
 from tests.matrix.vehicles import VEHICLES
 

@@ -9,6 +9,7 @@ from maneuver_automaton.bounds.pose_scene import pose_scene as pose_scene
 from maneuver_automaton.bounds.separation import Narrowest as Narrowest
 from maneuver_automaton.bounds.separation import Reachability as Reachability
 from maneuver_automaton.bounds.separation import Separation as Separation
+from maneuver_automaton.bounds.separation import are_apart as are_apart
 from maneuver_automaton.bounds.separation import connectivity as connectivity
 from maneuver_automaton.bounds.separation import goals_blocked as goals_blocked
 from maneuver_automaton.bounds.separation import separation as separation

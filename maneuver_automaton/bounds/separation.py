@@ -342,6 +342,29 @@ def widest_path(
     return found.answer, found.path, kept
 
 
+def are_apart(problem: Problem, *, most_boxes: int, deadline: float = math.inf) -> bool:
+    """Whether obstacles are proven to part the start from every goal, as in `separation`.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Box, Unicycle
+    >>> from maneuver_automaton.problem import Bounds
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
+    >>> walls = [Box([1.0, 8.0], [4.0, 4.9]), Box([1.0, 8.0], [4.0, -4.9])]
+    >>> problem = Problem(robot, [0, 0, 0], [8, 0, 0], obstacles=walls, footprint=Box([3.0, 2.0]),
+    ...                   bounds=Bounds(x=(-2.0, 10.0), y=(-4.0, 4.0)))
+    >>> are_apart(problem, most_boxes=10_000)  # the walls leave 1.8 m
+    True
+    """
+    if not lasting_obstacles(problem):
+        return False
+    proof = connectivity(
+        *_asked(problem), bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
+    )
+    _proofs(problem).extend([proof] if proof.answer is Reachability.SEPARATED else [])
+    return proof.answer is Reachability.SEPARATED
+
+
 @kept_by_first
 def _proofs(problem: Problem) -> list[Connectivity]:
     """Where a search that has met the proof for a problem leaves it for `separation`."""

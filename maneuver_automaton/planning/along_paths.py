@@ -17,6 +17,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.checking import TooLate, what_is_hit
 from maneuver_automaton.planning.incumbents import Incumbents, Step
+from maneuver_automaton.planning.no_way import proven_apart
 from maneuver_automaton.planning.polishing import Polish, guess_along
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.planning.tracking import AT_ONCE, Tracked, track
@@ -54,6 +55,7 @@ class AlongPaths(Step):
         if first.plan is None or first.goal_index is None:
             ended.proof = first.reason if first.enclosed else ""
             ended.remark = f" ({first.reason})" if first.reason else ""
+            ended.is_complete = proven_apart(problem, found.budget)
             return
         yield from _stopping(found, first.plan, first.goal_index)
         if found.budget.is_over:

@@ -23,7 +23,7 @@ from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents, Step
-from maneuver_automaton.planning.no_way import along_free_path, before_proof
+from maneuver_automaton.planning.no_way import along_free_path, before_proof, proven_apart
 from maneuver_automaton.planning.polishing import BY_TIME, Polish
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.planning.tracking import AT_ONCE
@@ -158,7 +158,8 @@ class Lattice(Step):
                 word = None if path.word is None else with_waits(query, path.word)
         if word is None:
             aside = along_free_path(query, self.table)
-            first = self.first_plan(query, limit, begun=begun, aside=aside)
+            proven = functools.partial(proven_apart, problem)
+            first = self.first_plan(query, limit, begun=begun, aside=aside, is_proven=proven)
             word = first.word
         if word is not None:
             self.gained(word)

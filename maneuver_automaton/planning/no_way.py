@@ -34,6 +34,7 @@ from maneuver_automaton.words.transitions import SWITCH
 
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
+SOON_BOXES = 30_000  # ... while a search goes on: as long as a few thousand expansions take
 MOST_AT_GOALS = 100_000  # ... within the tolerance of a goal
 MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
 ROUNDING = 1e-6  # relative
@@ -95,7 +96,7 @@ def too_long(problem: Problem, budget: Budget) -> str:
     longest = horizon.time or horizon.max_time
     if longest is None or budget.left < FIRST_LOOK:
         return ""
-    from maneuver_automaton.planning.lower_bound import known_bound, proofs_of
+    from maneuver_automaton.planning.proving import known_bound, proofs_of
 
     left = budget.left
     load_kernels("cells")
@@ -140,6 +141,18 @@ def along_free_path(query: LatticeQuery, table: CostTable) -> Callable[[Budget],
     if not able or query.moves or query.world.arrays.field.distance.size == 0:
         return None
     return functools.partial(_followed, query, table)
+
+
+def proven_apart(problem: Problem, budget: Budget) -> bool:
+    """Whether a little work proves that no path leads to a goal, for any vehicle with this body."""
+    if not problem.obstacles:
+        return False
+    from maneuver_automaton.bounds import are_apart
+
+    left = SHARE * budget.left
+    load_kernels("separation")  # the compiler's time is not the budget's
+    deadline = budget.clock() + left
+    return left > 0.0 and are_apart(problem, most_boxes=SOON_BOXES, deadline=deadline)
 
 
 def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPlan:

@@ -18,9 +18,9 @@ from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.planning.checking import load_checks
 from maneuver_automaton.planning.from_state import between_trims
 from maneuver_automaton.planning.leaving import plan_leaving
-from maneuver_automaton.planning.lower_bound import kept_bounds, known_bound, plan_to_gap
 from maneuver_automaton.planning.no_way import with_proof
 from maneuver_automaton.planning.polishing import left_out
+from maneuver_automaton.planning.proving import kept_bounds, known_bound, plan_to_gap
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace, workspace_of
 from maneuver_automaton.planning.steps import answer, prepare_steps, uses_lattice
 from maneuver_automaton.problem import Problem

@@ -6,6 +6,7 @@ it is applied.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -17,7 +18,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.blocked import open_goals
-from maneuver_automaton.planning.no_way import along_free_path
+from maneuver_automaton.planning.no_way import along_free_path, proven_apart
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.improve import Patience, improve
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
@@ -173,7 +174,8 @@ def track(
     if word is None:
         most = max_expansions or problem.search.max_expansions
         counted, aside = replace(budget, expansions=most), along_free_path(query, table)
-        found = first_plan(query, budget=counted, table=table, aside=aside)
+        proven = functools.partial(proven_apart, problem)
+        found = first_plan(query, budget=counted, table=table, aside=aside, is_proven=proven)
         word, expansions, queries = found.word, found.expansions, found.queries
         if word is None:
             return Tracked(

@@ -13,7 +13,7 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.bounds import CostToGo
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.costs import Cost, prices_switches, terms_of
-from maneuver_automaton.planning.lower_bound import Proving, in_costs
+from maneuver_automaton.planning.proving import Proving, in_costs
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.log import Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.settings import switches_at_will

@@ -41,6 +41,7 @@ from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
 
+PROOF = 8_000  # expansions until it is asked once whether it is proven that there is no word
 ASIDE = 50_000  # expansions until something else is tried, whose words are longer
 
 Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
@@ -67,13 +68,15 @@ def first_plan(
     grids: Grids | None = None,
     begun: Begun | None = None,
     aside: Callable[[Budget], FirstPlan] | None = None,
+    is_proven: Callable[[Budget], bool] | None = None,
 ) -> FirstPlan:
     """The first connection from start to a goal, at the first resolution that has one.
 
     The library of the query says which resolutions are tried, and when; expansions of the `budget`
     are those of all searches together. `grids` are those of fine cells, and `begun` is the first
     search of the schedule, if they are known. What finds words otherwise is asked `aside`, once,
-    where this takes long or ends without one; if that is exhausted, so is all.
+    where this takes long or ends without one; if that is exhausted, so is all. Whether it
+    `is_proven` that there is none is asked once, before that.
     """
     schedule = schedule_of(query.library)
     guides = _Guides(query, table, grids)
@@ -84,7 +87,7 @@ def first_plan(
         turns[0].begun = begun.search_of(query)
         if not begun.is_found:
             guides.coarse_grids[turns[0].sign] = turns[0].begun.search.grid
-    word, proof, total, left_out, other = None, "", 0, False, None
+    word, proof, total, left_out, other, none = None, "", 0, False, None, False
     while word is None:
         due = room if aside is None else min(room, ASIDE)
         for one in turns:
@@ -105,6 +108,10 @@ def first_plan(
         proof = _enclosed(query, guides.fine) if word is None and closed else ""
         late = alive and not any(one.may_expand for one in turns)
         asks = total >= due or not (alive or stages)
+        if is_proven and word is None and not proof and total >= PROOF:
+            none, is_proven = is_proven(budget), None
+            if none:
+                break
         if aside and asks and word is None and not proof and total < room:
             other, aside = aside(replace(budget, expansions=room - total)), None
             word, total = other.word, total + other.expansions
@@ -129,7 +136,7 @@ def first_plan(
         word=word,
         expansions=total,
         queries=sum(one.queries for one in passes) + (other.queries if other else 0),
-        exhausted=word is None and not alive and not left_out,
+        exhausted=none or (word is None and not alive and not left_out),
         enclosed=proof,
         nearest=min(ahead, default=(math.inf, math.inf)),
         nodes=expanded(query, [one.arrays for one in passes])

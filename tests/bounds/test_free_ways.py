@@ -11,7 +11,7 @@ from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Probl
 from maneuver_automaton.bounds import goals_blocked, separation
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import UserModel
-from maneuver_automaton.planning.lower_bound import known_bound
+from maneuver_automaton.planning.proving import known_bound
 from maneuver_automaton.problem import Bounds, Goal, SearchSettings
 from maneuver_automaton.scenario import load_scenario
 

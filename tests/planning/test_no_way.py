@@ -5,10 +5,11 @@ import dataclasses
 import pytest
 
 from maneuver_automaton import Cost, Horizon, SearchSettings, plan
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.bounds.levels import Proof
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.formats import plan_to_dict
-from maneuver_automaton.planning import PlanResult, PlanStatus, lower_bound
+from maneuver_automaton.planning import PlanResult, PlanStatus, proving
 from maneuver_automaton.planning.no_way import (
     FIRST_BOXES,
     FIRST_LOOK,
@@ -36,6 +37,15 @@ def test_a_plan_for_a_gap_that_is_too_narrow_does_not_exist(tmp_path):
     assert written["narrowest"]["missing_m"] == pytest.approx(0.3, rel=0.2)
     save_picture(result, tmp_path / "plan.png")
     assert (tmp_path / "plan.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize("library", ["second_order_car", "car_with_trailer"])
+def test_the_proof_does_not_wait_until_the_time_is_over(library):
+    """Also for a vehicle with inertia, of whose body alone the proof speaks."""
+    problem = dataclasses.replace(gap(1.6), automaton=load_stock_library(library))
+    result = plan(problem, time_limit=100.0)
+    assert result.status is PlanStatus.UNREACHABLE
+    assert result.counts["expansions"] < 20_000
 
 
 @pytest.mark.parametrize("status", [PlanStatus.OUT_OF_BUDGET, PlanStatus.NO_PLAN])
@@ -77,7 +87,7 @@ def test_work_that_nobody_can_stop_is_not_begun_late(monkeypatch, seconds, yield
             asked.append(work)
             yield Proof(value=0.0, optimal=False, cells=10**12, size=1.0, work=work)
 
-    monkeypatch.setattr(lower_bound, "proofs_of", proofs_of)
+    monkeypatch.setattr(proving, "proofs_of", proofs_of)
     problem = dataclasses.replace(bend(3.2), horizon=Horizon(max_time=1e3))
     assert too_long(problem, Budget.from_now(seconds)) == ""
     assert len(asked) == yields

@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import math
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +14,12 @@ import maneuver_automaton as ma
 from maneuver_automaton.bounds import cell_proofs
 from maneuver_automaton.budget import Budget, Watch
 from maneuver_automaton.cli import run
-from maneuver_automaton.planning import PlanResult, PlanStatus, lower_bound
-from maneuver_automaton.planning.lower_bound import plan_to_gap
+from maneuver_automaton.planning import PlanResult, PlanStatus, proving
 from maneuver_automaton.planning.no_way import with_proof
+from maneuver_automaton.planning.proving import plan_to_gap
 from tests import scenes
 from tests.bounds.scenes import gap
+from tests.bounds.test_cell_bound import WALL, among
 
 SLOT = replace(scenes.parallel_slot(6.5), cost=ma.Cost(length=1.0))
 
@@ -85,7 +87,7 @@ def test_a_planner_knows_at_once_what_it_has_proven_of_other_starts():
 
 def test_without_a_plan_all_time_is_for_the_search_and_the_proof_that_there_is_none(monkeypatch):
     begun = []
-    monkeypatch.setattr(lower_bound, "proofs_of", lambda *args, **more: iter(begun.append(args)))
+    monkeypatch.setattr(proving, "proofs_of", lambda *args, **more: iter(begun.append(args)))
     narrow, left = gap(1.6), Budget.from_now(30.0)
     late = replace(left, began=left.began - 50.0)  # most of the time has gone by
 
@@ -109,3 +111,14 @@ def test_a_bound_is_polished_no_longer_than_there_is_time():
     )
     assert next(looks) < 40  # of 250 sweeps over the cells
     assert 0.0 <= last.value <= 12.0
+
+
+def test_a_bound_alone_is_as_good_as_beside_a_plan():
+    """It looks for a plan first, and then only at poses that a cheaper one may visit."""
+    problem = among(WALL, cost=ma.Cost(time=1.0))
+    cost = ma.plan(problem, time_limit=1.0).cost
+    alone, beside = (
+        ma.lower_bound(problem, incumbent=known, time_limit=60.0, max_work=4_000_000)
+        for known in (math.inf, cost)
+    )
+    assert beside.value * 0.995 <= alone.value <= cost
