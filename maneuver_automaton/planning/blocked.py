@@ -126,7 +126,8 @@ def _part_touched(problem: Problem, goal: Goal | None, pose: Array, time: float)
     if not problem.parts or (trim is None and state is None and automaton.rest is None):
         return ""
     if state is None:
-        state = automaton.trims[automaton.index_of(trim) if trim else automaton.rest].reduced_state
+        at = automaton.index_of(trim) if trim else automaton.rest or 0
+        state = automaton.trims[at].reduced_state
     offsets = automaton.model.part_poses(state)
     for name, offset in zip(automaton.model.part_names, offsets, strict=True):
         if name in problem.parts:

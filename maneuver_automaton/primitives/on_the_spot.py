@@ -157,15 +157,36 @@ def maneuvers_between(model: Model, source: Trim, target: Trim) -> tuple[Maneuve
     return _by_optimal_control(model, source, target)
 
 
-@functools.lru_cache(maxsize=MODELS)
+class _Known:
+    """A model as a key of a cache, which holds it: by what it is, or itself if it has no hash."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        try:
+            self._key: tuple[Any, int] = (model, hash(model))
+        except TypeError:
+            self._key = (None, id(model))
+
+    def __hash__(self) -> int:
+        return self._key[1]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Known) and self._key == other._key
+
+
 def _limited(model: Model) -> bool:
-    return has_limited_rates(model)
+    return _is_limited(_Known(model))
 
 
 @functools.lru_cache(maxsize=MODELS)
-def program_of(model: Model) -> TransferProgram:
+def _is_limited(known: _Known) -> bool:
+    return has_limited_rates(known.model)
+
+
+@functools.lru_cache(maxsize=MODELS)
+def _program_of(known: _Known) -> TransferProgram:
     """The program of short maneuvers of a model, written down once."""
-    return transfer_program(model, settings=FEW)
+    return transfer_program(known.model, settings=FEW)
 
 
 def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneuver, ...]:
@@ -173,7 +194,7 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
     start, end = source.reduced_state, target.reduced_state
     for factor, swing in GUESSES:
         found = solve_transfer(
-            program_of(model),
+            _program_of(_Known(model)),
             start=start,
             end=end,
             controls=np.stack([target.control, target.control]),
@@ -184,7 +205,7 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         if found.status is not SolveStatus.SOLVED:
             continue
         raw = Inputs(control=found.control, interval=found.duration / len(found.control))
-        enough = CLOSED / 100.0
+        enough = CLOSED / 2.0
         inputs = closed(model, start, end, inputs=raw, limits=model.control_limits, enough=enough)
         course = inputs.drive(model, start)
         missed = float(np.abs(course.reduced_state[-1] - end).max())
@@ -203,4 +224,4 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
 def prepare_maneuvers(model: Model) -> None:
     """Have the program of a model ready, before a clock runs."""
     if not (isinstance(model, CarWithTrailer) or _limited(model)):
-        program_of(model)
+        _program_of(_Known(model))

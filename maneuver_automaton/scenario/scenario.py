@@ -316,7 +316,7 @@ def _check_state(
                 (*where, key), f"is no key here, need some of {', '.join(keys.values())}"
             )
     with at(document, where):
-        settled_state(automaton, _by_name(end.state, automaton), where[0], trim=end.trim)
+        settled_state(automaton, _by_name(end.state, automaton), str(where[0]), trim=end.trim)
 
 
 def _check_trim(document: Document, where: Where, trim: str | None, automaton: Automaton) -> None:
