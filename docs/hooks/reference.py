@@ -18,7 +18,7 @@ from maneuver_automaton.scenario import json_schema
 
 TOPICS = {  # rooms of the package
     "Planning": ("planning",),
-    "Problems and costs": ("problem", "costs"),
+    "Problems and costs": ("problem", "costs", "via"),
     "Vehicles": ("models",),
     "Libraries and plans": ("automaton", "primitives", "groups", "design"),
     "Bodies and obstacles": ("collision",),
