@@ -18,7 +18,7 @@ from maneuver_automaton.scenario import json_schema
 
 TOPICS = {  # rooms of the package
     "Planning": ("planning", "field"),
-    "Problems and costs": ("problem", "costs", "places"),
+    "Problems and costs": ("problem", "costs", "places", "via"),
     "Vehicles": ("models",),
     "Libraries and plans": ("automaton", "primitives", "groups", "design"),
     "Bodies and obstacles": ("collision",),

@@ -535,13 +535,13 @@ def arrivals_of(
     elif automaton.translated is not None:
         found = [
             Arrival(pose, trim)
-            for place in _places(via)
+            for place in _places(problem, number)
             for pose, trim in posed(automaton, place, "via", free=via.free_heading)
         ]
     else:
         poses = [
             _with_heading(place, heading)
-            for place in _places(via)
+            for place in _places(problem, number)
             for heading in _headings(problem, number)
         ]
         found = [Arrival(pose, trim) for pose in poses for trim in _trims(problem, via)]
@@ -559,13 +559,14 @@ def _about(said: str) -> str:
     return said.replace("at the goal ", "").replace("the goal is", "it is")
 
 
-def _places(via: Via) -> Iterator[Array]:
-    """Poses (dof,) at its places, with the heading that is stated; its own pose first."""
+def _places(problem: Problem, number: int) -> Iterator[Array]:
+    """Poses (dof,) at the places of a pose on the way, with the heading that is stated."""
+    via = problem.via[number]
     places = [0, 1, *range(3, via.pose.size)]
     if via.gate is None:
         yield via.pose
     else:
-        for share in ALONG_GATE:
+        for share in (*_straight_through(problem, number), *ALONG_GATE):
             pose = np.array(via.pose)
             pose[places] = via.gate[0] + share * (via.gate[1] - via.gate[0])
             yield pose
@@ -574,6 +575,18 @@ def _places(via: Via) -> Iterator[Array]:
         pose = np.array(via.pose)
         pose[:2] += (1.0 - GAIN) * via.tolerance_m * np.array([math.cos(angle), math.sin(angle)])
         yield pose
+
+
+def _straight_through(problem: Problem, number: int) -> Iterator[float]:
+    """The share of a gate at which the line between its neighbours crosses it."""
+    gate = problem.via[number].gate
+    ends = [problem.start, *(one.pose for one in problem.via), problem.goals[0].pose]
+    before, after = ends[number][:2], ends[number + 2][:2]
+    assert gate is not None
+    lines = np.column_stack([gate[1, :2] - gate[0, :2], before - after])
+    if problem.order == "given" and abs(np.linalg.det(lines)) > GAIN:
+        share = float(np.linalg.solve(lines, before - gate[0, :2])[0])
+        yield min(max(share, 0.0), 1.0)
 
 
 def _with_heading(pose: Array, heading: float) -> Array:
@@ -612,7 +625,7 @@ def _headings_tried(problem: Problem) -> int:
     n = len(problem.via)
     letters = len(moving_trims(problem.automaton, problem.cost).twists)
     legs = (n + 1) * (1 if problem.order == "given" else n) * min(letters, MOST_LETTERS) ** 3
-    places = max(sum(1 for _ in _places(via)) for via in problem.via)
+    places = max(sum(1 for _ in _places(problem, k)) for k in range(n))
     return int(np.clip(math.sqrt(MOST_ESTIMATES / legs) / places, HEADINGS, MOST_HEADINGS))
 
 

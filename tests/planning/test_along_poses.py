@@ -1,0 +1,220 @@
+"""Poses on the way: exact, in order or in the best order, the best headings, for all vehicles."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import maneuver_automaton as ma
+from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.formats.plan_json import plan_to_dict
+from maneuver_automaton.scenario.scenario import scenario_of_text
+from maneuver_automaton.scenario.writing import to_yaml
+
+ROBOT = ma.Automaton.of_controls(
+    ma.Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+)
+PLACES = ((1.2, 0.4), (1.9, 1.9), (0.5, 2.6))
+START, GOAL = [0.0, 0.0, 0.0], [-1.0, 1.0, -1.5]
+
+
+def planned(problem, seconds=2.0):
+    """The answer, which passes all that is on the way; anybody's checks find so too."""
+    result = ma.plan(problem, time_limit=seconds)
+    assert result.status is ma.PlanStatus.FOUND, result.reason
+    assert result.audit.passed
+    assert ma.verify(problem, result.plan).passed
+    assert len(result.via) == len(problem.via)
+    for one in result.via:
+        assert max(problem.via[one.number - 1].off(one.pose)) < 1e-8
+    return result
+
+
+def dubins(begins, ends):
+    """Shortest ways (...) forwards at radius 1 between poses (..., 3); Shkel, Lumelsky (2001)."""
+    way = ends - begins
+    d, along = np.hypot(way[..., 0], way[..., 1]), np.arctan2(way[..., 1], way[..., 0])
+    a, b = begins[..., 2] - along, ends[..., 2] - along
+    sin, cos, same = np.sin, np.cos, np.cos(a - b)
+
+    def turn(angle):
+        return np.mod(angle + 1e-12, 2 * np.pi) - 1e-12
+
+    found = []
+    with np.errstate(invalid="ignore"):
+        for s in (1.0, -1.0):  # left first, or right
+            u, v = s * a, s * b
+            t = np.arctan2(cos(v) - cos(u), d + sin(u) - sin(v))
+            straight = np.sqrt(2 + d * d - 2 * same + 2 * d * (sin(u) - sin(v)))
+            found.append(turn(t - u) + straight + turn(v - t))
+            p = np.sqrt(-2 + d * d + 2 * same + 2 * d * (sin(u) + sin(v)))
+            t = np.arctan2(-cos(u) - cos(v), d + sin(u) + sin(v)) - np.arctan2(-2.0, p)
+            found.append(turn(t - u) + p + turn(t - v))
+            middle = (6 - d * d + 2 * same + 2 * d * (sin(v) - sin(u))) / 8
+            p = turn(2 * np.pi - np.arccos(middle))
+            t = turn(-u + np.arctan2(cos(v) - cos(u), d + sin(u) - sin(v)) + p / 2)
+            found.append(t + p + turn(v - u - t + p))
+    return np.fmin.reduce(found)
+
+
+def cheapest(places, goal, *, count=720):
+    """Cost, and heading at the first place, of the best way: by all headings of half a degree."""
+    costs, poses, firsts = np.zeros(1), np.array([START]), None
+    for place in (*places, None):
+        angles = 2 * np.pi * np.arange(count) / count
+        ends = np.column_stack([np.tile(place, (count, 1)), angles]) if place else np.array([goal])
+        sums = costs[:, None] + dubins(poses[:, None], ends[None])
+        before = sums.argmin(axis=0)
+        firsts = angles if firsts is None else firsts[before]
+        costs, poses = sums.min(axis=0), ends
+    return costs[0], firsts[0]
+
+
+def test_the_best_heading_at_the_first_depends_on_the_third():
+    """One search, not pieces glued together: beside it all headings of half a degree."""
+    found = {}
+    for third in ((0.5, 2.6), (3.9, 2.4)):
+        places = (*PLACES[:2], third)
+        least, first = cheapest(places, GOAL)
+        via = [ma.Via(place, free_heading=True) for place in places]
+        result = planned(ma.Problem(ROBOT, START, GOAL, via=via), 4.0)
+        assert result.cost == pytest.approx(least, rel=2e-3)
+        assert result.lower_bound <= least
+        found[third] = result.via[0].pose[2], first
+    (one, best), (other, best_other) = found.values()
+    assert abs(best - best_other) > 0.02
+    assert abs(np.angle(np.exp(1j * (one - other)))) > 0.01
+
+
+def test_a_moved_problem_has_the_moved_plan():
+    via = [ma.Via([3, 3], free_heading=True), ma.Via([6, 1, -0.4], stay_s=1.5)]
+    problem = ma.Problem(ROBOT, START, [9, 0, 0], via=via)
+    by = ma.SE2([4.0, -7.0, 2.0])
+    result, moved = planned(problem), planned(problem.moved(by))
+    assert moved.cost == pytest.approx(result.cost, rel=1e-4)
+    assert moved.via[0].pose[:2].tolist() == pytest.approx(by.act(np.array([3.0, 3.0])).tolist())
+
+
+def test_an_order_that_is_free_is_the_best_of_all():
+    poses = [[6, 0, 0], [2, 0, 0], [4, 0, 0]]
+    given = ma.Problem(ROBOT, START, [8, 0, 0], via=poses)
+    result = planned(replace(given, order="free"))
+    assert [one.number for one in result.via] == [2, 3, 1]
+    assert result.cost == pytest.approx(8.0) == result.lower_bound
+    assert planned(given).cost > 8.0
+
+
+def test_a_gate_is_crossed_and_a_stop_lasts():
+    via = [ma.Via(gate=[[3, -1], [3, 2]]), ma.Via([6, 0, 0], stay_s=2.0)]
+    result = planned(ma.Problem(ROBOT, START, [9, 0, 0], via=via))
+    assert result.cost == pytest.approx(11.0)
+    assert "rest" in result.plan.word
+    (entry, stop) = plan_to_dict(result)["via"]
+    assert (entry["number"], stop["number"], stop["time_s"]) == (1, 2, pytest.approx(6.0))
+
+
+def test_among_obstacles():
+    wall = ma.Box([0.4, 4.0], [4.0, 0.0])
+    via = [ma.Via([2, -2], free_heading=True, tolerance_m=0.2), ma.Via([4, 3, 0])]
+    planned(
+        ma.Problem(ROBOT, START, [8, 0, 0], via=via, obstacles=wall, footprint=ma.Box([0.4, 0.3]))
+    )
+    inside = ma.Problem(ROBOT, START, [8, 0, 0], via=ma.Via([4, 0, 0]), obstacles=wall)
+    result = ma.plan(inside, time_limit=1.0)
+    assert result.status is ma.PlanStatus.GOAL_BLOCKED
+    assert result.reason.startswith("pose 1 on the way: the vehicle touches")
+
+
+def test_with_inertia_it_passes_in_motion_or_stops():
+    car = ma.load_stock_library("second_order_car")
+    passing = ma.Problem(car, [0, 0, 0], [20, 0, 0], via=ma.Via([10, 0, 0]))
+    fast = planned(passing, 4.0)
+    stops = planned(replace(passing, via=(ma.Via([10, 0, 0], stop=True),)), 3.0)
+    assert fast.cost < stops.cost
+    assert not ma.verify(replace(passing, via=(ma.Via([10, 0, 0], stop=True),)), fast.plan).passed
+
+
+def test_in_space():
+    controls = {"on": (1, 0, 0), "left": (1, 1, 0), "right": (1, -1, 0), "up": (1, 0, 0.5)}
+    controls["down"] = (1, 0, -0.5)
+    flyer = ma.UserModel(
+        name="flyer",
+        group=ma.SE2xR,
+        control_names=("v", "w", "c"),
+        velocity=lambda z, u: [u[0], 0 * u[0], u[1], u[2]],
+    )
+    robot = ma.Automaton.of_controls(flyer, controls)
+    planned(ma.Problem(robot, [0, 0, 0, 0], [8, 0, 0, 0], via=ma.Via([4, 2, 0.3, 1])))
+
+
+def test_a_plan_that_misses_is_refused():
+    straight = ma.Plan(START, [ROBOT["ahead"]], durations=[8.0])
+    for via, passed in (([3, 0, 0], True), ([3, 0, 0.1], False), ([3, 1e-6, 0], False)):
+        problem = ma.Problem(ROBOT, START, [8, 0, 0], via=[via])
+        assert ma.verify(problem, straight).passed is passed
+    back = ma.Problem(ROBOT, START, [8, 0, 0], via=[[5, 0, 0], [3, 0, 0]])
+    assert ma.verify(back, straight).reason == (
+        "pose 2 on the way is not passed after those before it"
+    )
+    assert ma.verify(replace(back, order="free"), straight).passed
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: ma.Via(), "via: has neither a pose nor a gate"),
+        (lambda: ma.Via([0, 0, 0], stay_s=-1), "via: stay_s must be a number of at least 0"),
+        (lambda: ma.Via(gate=[[1, 1], [1, 1]]), "need two places"),
+        (lambda: ma.Via([5, 0, 0], gate=[[1, -1], [1, 1]]), "beside the gate"),
+        (lambda: ma.Problem(ROBOT, START, GOAL, order="best"), "order must be one of"),
+        (lambda: ma.Problem(ROBOT, START, GOAL, via=[START] * 13, order="free"), "at most 12"),
+        (lambda: ma.Problem(ROBOT, START, GOAL, via=ma.Via([0, 0, 0, 1])), "need 3"),
+        (
+            lambda: ma.Problem(ROBOT, START, GOAL, via=[START], horizon=ma.Horizon(time=9)),
+            "need a free final time",
+        ),
+        (
+            lambda: ma.FleetProblem([ma.Problem(ROBOT, START, GOAL, via=[START])]),
+            "has poses on its way",
+        ),
+        (
+            lambda: ma.RecedingHorizon(ma.Problem(ROBOT, START, GOAL, via=[START]), step=1),
+            "there are poses on the way",
+        ),
+    ],
+)
+def test_what_is_wrong_is_told(make, said):
+    with pytest.raises(ValueError, match=said):
+        make()
+
+
+HEAD = """
+schema: 1
+vehicle: {model: unicycle}
+automaton: {preset: table2}
+start: {pose: [0, 1, 0]}
+goal: {pose: [0, 0, 0]}
+"""
+
+
+def test_a_file_reads_back():
+    text = HEAD + "order: free\nvia:\n  - {pose: [1, 2], free_heading: true, tolerance_m: 0.5}\n"
+    text += "  - {gate: [[1, 2], [3, 4]], stop: true}\n  - {pose: [1, 2, 3], stay_s: 2}\n"
+    once = scenario_of_text(text, name="via")
+    assert once.problem.order == "free"
+    assert len(once.problem.via) == 3
+    assert to_yaml(scenario_of_text(to_yaml(once), name="via")) == to_yaml(once)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("{pose: [1, 2]}", "need \\[x, y, heading\\], or free_heading: true"),
+        ("{stop: true}", "got neither pose nor gate"),
+        ("{gate: [[1, 2]]}", "need a list of two points"),
+        ("{pose: [1, 2, 0], heading: free}", "unknown key"),
+    ],
+)
+def test_a_malformed_file_is_told(line, said):
+    with pytest.raises(InvalidScenario, match=said):
+        scenario_of_text(HEAD + f"via:\n  - {line}\n", name="via")
