@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -49,7 +50,7 @@ from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     zones_of,
 )
-from maneuver_automaton.scenario.vehicles import STATE_UNITS, carried_of, model_of
+from maneuver_automaton.scenario.vehicles import PARTS, STATE_UNITS, carried_of, model_of
 
 T = TypeVar("T")
 Made: TypeAlias = dict[tuple[object, ...], Any]  # of parts of a file, which several vehicles share
@@ -251,6 +252,8 @@ def _names_of(value: Any, own: Model | None) -> dict[str, Any]:
         vehicle = value.get("vehicle") if isinstance(value, dict) else None
         model = vehicle.get("model") if isinstance(vehicle, dict) else None
         kind = KINDS.get(model) if isinstance(model, str) else None
+        with contextlib.suppress(ValueError, LookupError):  # its trailers are counted where stated
+            kind = kind and model_of(PARTS[str(model)].model_validate(vehicle))
     names = {} if own is None else {"own": own.name}
     if kind is None:
         return names

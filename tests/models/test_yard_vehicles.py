@@ -105,6 +105,16 @@ def test_what_is_no_vehicle_is_told(kind, values, message):
     assert str(error.value) == message
 
 
+def test_a_trim_states_an_angle_for_each_trailer():
+    text = (SCENARIOS / "two_trailers.yaml").read_text(encoding="utf-8")
+    trims = "{trims: [{name: rest, state: [0, 0]}, {name: ahead, control: [1, 0.1]}]}"
+    text = text.replace("{preset: tractor_with_trailers}", trims)
+    automaton = scenario_of_text(text, name="x.yaml").problem.automaton
+    assert automaton.trim_names == ("rest", "ahead")
+    with pytest.raises(InvalidScenario, match=r"need 2: \[hitch, hitch_2\]|two|2 numbers"):
+        scenario_of_text(text.replace("[0, 0]}, {", "[0, 0, 0]}, {"), name="x.yaml")
+
+
 def test_a_body_of_a_trailer_that_is_not_there_is_told():
     text = (SCENARIOS / "two_trailers.yaml").read_text(encoding="utf-8")
     more = text.replace("  trailer_2: {", "  trailer_3: {rectangle_m: [1.0, 1.0]}\n  trailer_2: {")
