@@ -29,9 +29,9 @@ from maneuver_automaton.collision import (
 from maneuver_automaton.costs import Cost, StageCost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
+from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.place_prices import PlacePrice, price_along
 from maneuver_automaton.places import PlaceCost, bound, check_place_costs, moved
-from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.on_the_spot import state_of, trim_at
 from maneuver_automaton.via import Via as Via

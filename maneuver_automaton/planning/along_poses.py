@@ -165,7 +165,7 @@ class _Legs:
     def __post_init__(self) -> None:
         stays = replace(self.between.horizon, stay=False)
         self.last = replace(self.between, start_trim=None, start_state=None)
-        self.middle = replace(self.last, goals=self.between.start, horizon=stays)
+        self.middle = replace(self.last, goals=(Goal(self.between.start),), horizon=stays)
 
     @property
     def is_timed(self) -> bool:

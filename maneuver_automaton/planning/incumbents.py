@@ -178,11 +178,10 @@ class Incumbents:
 
     def note(self, cost: float, *, at: float | None = None) -> None:
         """Note what a search has found `at` a time [s], now if omitted; it is checked later."""
-        if self.problem.place_costs:  # searches of words know nothing of them
-            return
         if cost < self.least_cost:
             self.least_cost = cost
-            self._tell(cost)
+            if not self.problem.place_costs:  # whose prices are not exact within a search
+                self._tell(cost)
             self.improvements.append((self.budget.elapsed if at is None else at, cost))
 
     def offer(self, plan: Plan, goal_index: int, *, proven: bool = True) -> bool:

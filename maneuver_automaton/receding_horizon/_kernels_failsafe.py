@@ -29,8 +29,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.search._kernels_coast import coast_inside, coast_proven, coasted
-from maneuver_automaton.search._kernels_connection import edge_end, edge_free
+from maneuver_automaton.search._kernels_coast import coast_inside, coast_proven, coasted, edge_end
+from maneuver_automaton.search._kernels_connection import edge_free
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_nodes import enter
 from maneuver_automaton.search.arrays import LatticeArrays, Scene

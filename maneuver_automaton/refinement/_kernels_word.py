@@ -12,8 +12,14 @@ from __future__ import annotations
 
 from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
 from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays, WordSteps
-from maneuver_automaton.search._kernels_coast import coast_free, coasted, is_still, may_stay
-from maneuver_automaton.search._kernels_connection import edge_end, edge_proven
+from maneuver_automaton.search._kernels_coast import (
+    coast_free,
+    coasted,
+    edge_end,
+    is_still,
+    may_stay,
+)
+from maneuver_automaton.search._kernels_connection import edge_proven
 from maneuver_automaton.search._kernels_place import (
     coast_place,
     edge_place,

@@ -22,13 +22,13 @@ from maneuver_automaton.search._kernels_coast import (
     coast_inside,
     coast_proven,
     coasted,
+    edge_end,
     edge_swept,
     may_stay,
     swept_end,
     too_short,
 )
 from maneuver_automaton.search._kernels_connection import (
-    edge_end,
     edge_inside,
     edge_proven,
     free_candidate,

@@ -113,7 +113,8 @@ def coast_place(
     if t == 0.0:
         return 0.0
     n = max(math.ceil(parts.fastest[trim] * abs(t) / place.step), 1)
-    step, twist, total = t / n, lib.library.twists[trim], 0.0
+    step, twist = t / n, lib.library.twists[trim]
+    total = 0.0
     alone = is_one_in_plane(scene, lib)
     for k in range(2 * n):
         middle = k // 2 + 0.5
@@ -128,7 +129,7 @@ def coast_place(
                 x, y, heading = compose(at[0], at[1], at[2], off[0], off[1], off[2])
                 nearest = part_distance(scene, lib, p, (x, y, heading, at[3]), nearest)
         total += place_rate(place, at, twist, nearest)
-    return 0.5 * abs(step) * total
+    return float(0.5 * abs(step) * total)
 
 
 @bare_inner_kernel
