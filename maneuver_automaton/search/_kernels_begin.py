@@ -150,7 +150,9 @@ def set_grid(
     aim_i, aim_j = math.floor((aim[0] - x) / cell), math.floor((aim[1] - y) / cell)
     layout = GridLayout(x, y, cell, columns, rows, stride, i * stride, j * stride, aim_i, aim_j)
     beside = GridWalls(walls.inflation, walls.wanted, walls.cut, detour_of(columns, rows))
-    laid = DistanceGrid(grid.value, grid.rank, grid.mark, grid.state, grid.queue, layout, beside)
+    laid = DistanceGrid(
+        grid.value, grid.rank, grid.mark, grid.state, grid.queue, layout, beside, grid.prices
+    )
     if n > 0:
         sow(laid, aims)
     return laid

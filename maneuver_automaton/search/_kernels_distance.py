@@ -95,6 +95,25 @@ def blocked_cell(grid: DistanceGrid, field: Field, i: int, j: int) -> bool:
 
 
 @bare_inner_kernel
+def least_share(grid: DistanceGrid, field: Field, i: int, j: int, room: float) -> float:
+    """How much more a step into a cell costs for its place, at least, as a share of its length."""
+    at, prices = grid.layout, grid.prices
+    share = 0.0
+    rows, columns = prices.value.shape
+    if rows > 0:
+        x, y = at.origin_x + (i + 0.5) * at.cell, at.origin_y + (j + 0.5) * at.cell
+        column = min(max(math.floor((x - prices.origin_x) / prices.cell + 0.5), 0), columns - 1)
+        row = min(max(math.floor((y - prices.origin_y) / prices.cell + 0.5), 0), rows - 1)
+        share = float(prices.value[row, column])
+    # The field says no more than `outside`; what is farther from all is not near enough to count.
+    if prices.near > 0.0 and room < field.outside:
+        near = 1.0 - max(room - prices.reach, 0.0) / prices.within
+        if near > 0.0:
+            share += prices.near * near * near
+    return share
+
+
+@bare_inner_kernel
 def _octile(i: int, j: int) -> int:
     """Length of the shortest way over `i` columns and `j` rows of cells, in units."""
     i, j = abs(i), abs(j)
@@ -152,6 +171,8 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     `value` keeps the length alone: it is compared with costs, and is finite behind every gap that
     the cells cannot show. Both are whole numbers: the same whatever was asked for before.
 
+    Where places cost something a metre counts so much more as it costs more there, at least.
+
     Grows until that cell is settled, in the order of the rank plus the octile way to where the
     grid is aimed at, so that cells far from the path are not looked at. The state of the search is
     kept in the grid: the next call goes on from it.
@@ -161,6 +182,7 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
     # grid of which little is used is not filled first. A cell may stand in the open list several
     # times.
     at, walls = grid.layout, grid.walls
+    priced = grid.prices.near > 0.0 or grid.prices.value.shape[0] > 0
     i = math.floor((x - at.origin_x) / at.cell)
     j = math.floor((y - at.origin_y) / at.cell)
     if not (0 <= i < at.columns and 0 <= j < at.rows):
@@ -206,6 +228,8 @@ def distance_at(grid: DistanceGrid, field: Field, x: float, y: float) -> float:
                 step = DIAGONAL if a != 0 and b != 0 else STRAIGHT
                 if room < walls.wanted:
                     step *= NARROW
+                if priced:
+                    step += int(step * least_share(grid, field, n_i, n_j, room))
                 ranked = rank + step + (walls.detour if room < walls.cut else 0)
                 if mark != REACHED or ranked < grid.rank[there]:
                     grid.mark[there] = REACHED

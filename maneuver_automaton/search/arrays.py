@@ -165,6 +165,20 @@ class GridWalls(NamedTuple):
     detour: int  # [units] how much longer a path is preferred to one through such a cell
 
 
+class LeastPrices(NamedTuple):
+    """How much more a metre costs, at least, for its place: in shares of the least cost of one."""
+
+    value: NDArray[
+        np.float32
+    ]  # (rows, columns) least about each sample; no rows where none has one
+    origin_x: float  # of the sample (0, 0)
+    origin_y: float
+    cell: float
+    near: float  # the share where the body touches an obstacle, 0: none
+    within: float  # [m] of the body, from which on it is 0
+    reach: float  # [m] that the body is nearer than the middle of a cell at least
+
+
 class DistanceGrid(NamedTuple):
     """Distances in the plane that know the obstacles, as far as they are grown."""
 
@@ -175,6 +189,7 @@ class DistanceGrid(NamedTuple):
     queue: CellQueue
     layout: GridLayout
     walls: GridWalls
+    prices: LeastPrices
 
 
 class CostTable(NamedTuple):

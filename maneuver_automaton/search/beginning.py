@@ -169,7 +169,7 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
         task=task,
         library=library.arrays,
         scene=query.scene(),
-        grid=with_cells(grid, cells),
+        grid=with_cells(grid, cells)._replace(prices=query.least_prices(grid)),
         table=NO_TABLE,
     )
     n = 1 + len(query.goals)

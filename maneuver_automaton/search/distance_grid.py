@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -12,7 +13,13 @@ from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.search import _kernels_distance
 from maneuver_automaton.search._kernels_distance import BUCKETS
-from maneuver_automaton.search.arrays import CellQueue, DistanceGrid, GridLayout, GridWalls
+from maneuver_automaton.search.arrays import (
+    CellQueue,
+    DistanceGrid,
+    GridLayout,
+    GridWalls,
+    LeastPrices,
+)
 
 MOST_CELLS = 1_000_000
 OCTILE = 1.0823922002923938  # 1 / cos(pi / 8): most of a path along cells over a straight one
@@ -23,6 +30,7 @@ COARSEST = 1.05  # half diagonals of a coarse cell over the body's inscribed rad
 
 # A grid without cells, where no obstacle is static: the straight line is as good.
 NONE = np.zeros(0, dtype=np.int64)
+NO_PRICES = LeastPrices(np.zeros((0, 0), dtype=np.float32), 0.0, 0.0, 1.0, 0.0, 1.0, 0.0)
 NO_GRID = DistanceGrid(
     value=NONE,
     rank=NONE,
@@ -31,6 +39,7 @@ NO_GRID = DistanceGrid(
     queue=CellQueue(np.zeros(0), NONE, NONE, NONE),
     layout=GridLayout(0.0, 0.0, 1.0, 0, 0, 1, 0, 0, 0, 0),
     walls=GridWalls(0.0, 0.0, -math.inf, 0),
+    prices=NO_PRICES,
 )
 
 
@@ -41,9 +50,12 @@ def distance_grid(
     aim: Array,
     *,
     coarse: bool = False,
+    prices: Callable[[DistanceGrid], LeastPrices] | None = None,
     prepared: Prepared = RECENT,
 ) -> DistanceGrid:
     """Distances from `seeds` (n, 2 or more) inside `box` (4,), grown towards `aim` (2 or more,).
+
+    Where places cost something, `prices` says what they cost at least in cells of a grid.
 
     Coarse cells, where the body is large enough for them, show fewer passages to be closed, and
     take a ninth of the time.
@@ -60,6 +72,7 @@ def distance_grid(
     if not world.arrays.field.distance.size:
         return NO_GRID
     grid = laid_grid(world, box, aim, coarse=coarse)
+    grid = grid if prices is None else grid._replace(prices=prices(grid))
     n = grid.layout.columns * grid.layout.rows
     most = 8 * n + 8  # each cell is reached once from each of its neighbours at most
     memory = prepared.room(2 * n + 3 * most, np.int64)

@@ -240,7 +240,15 @@ def distance_grids(query: LatticeQuery) -> Grids:
 def _grid(query: LatticeQuery, sign: float, *, coarse: bool) -> DistanceGrid:
     """Distances to where searches along time lead, or those against it."""
     seeds, aim = (query.goals, query.start) if sign > 0.0 else (query.start[None], query.goals[0])
-    return distance_grid(query.plane, query.box, seeds, aim, coarse=coarse, prepared=query.prepared)
+    return distance_grid(
+        query.plane,
+        query.box,
+        seeds,
+        aim,
+        coarse=coarse,
+        prices=query.least_prices,
+        prepared=query.prepared,
+    )
 
 
 def _enclosed(query: LatticeQuery, grids: Grids) -> str:

@@ -21,9 +21,10 @@ from maneuver_automaton.collision.world import World
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem, SearchSettings
 from maneuver_automaton.search._kernels_place import places_cost, word_place
-from maneuver_automaton.search.arrays import Scene
+from maneuver_automaton.search.arrays import DistanceGrid, LeastPrices, Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
+from maneuver_automaton.search.place_arrays import least_prices
 from maneuver_automaton.search.scene import (
     Ends,
     Worlds,
@@ -150,6 +151,16 @@ class LatticeQuery:
     def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
         """A word of steps in the automaton's numbers, with its cost."""
         return self.with_places(word_of_steps(steps, goal=goal, library=self.library.priced))
+
+    def least_prices(self, grid: DistanceGrid) -> LeastPrices:
+        """What places cost at least in cells of a grid."""
+        return least_prices(
+            self.problem,
+            self.around.place,
+            grid.layout.cell,
+            inscribed=self.plane.body.inscribed,
+            per_metre=float(self.library.per_metre),
+        )
 
     def with_places(self, word: Word) -> Word:
         """The word with what its places cost added to its cost."""

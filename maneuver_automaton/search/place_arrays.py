@@ -6,13 +6,15 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_with
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.places import Clearance, PlaceCost, allowed, bound
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.arrays import PlaceArrays
+from maneuver_automaton.search.arrays import LeastPrices, PlaceArrays
+from maneuver_automaton.search.distance_grid import NO_PRICES
 from maneuver_automaton.search.lattice_library import LatticeLibrary
 
 TURNS = 32  # headings of a raster, where they matter
@@ -73,6 +75,40 @@ def place_arrays(
     return kept._replace(
         weight=found.weight, within=found.within, per_second=found.per_second, step=step
     )
+
+
+def least_prices(
+    problem: Problem, place: PlaceArrays, cell: float, *, inscribed: float, per_metre: float
+) -> LeastPrices:
+    """What a step between cells of a grid [m] costs for its place at least, for its estimates.
+
+    Whatever the heading, within a cell and a half: where the step begins and ends. A body whose
+    inscribed disc is about its pose is nearer to obstacles than the pose by its radius.
+    """
+    if not per_metre > 0.0:
+        return NO_PRICES
+    found, samples = NO_PRICES, place.value
+    if samples.size:
+
+        def least() -> NDArray[np.float32]:
+            from scipy import ndimage
+
+            flat = samples[:2].min(axis=(0, 1)) / per_metre
+            size = 2 * math.ceil((1.5 * cell + place.cell) / place.cell) + 1
+            return np.asarray(ndimage.minimum_filter(flat, size, mode="nearest"), np.float32)
+
+        key = ("least prices", cell, per_metre, place.cell, place.origin_x, place.origin_y)
+        found = found._replace(
+            value=kept_with(problem.setting, (*key, *samples.shape), least),
+            origin_x=place.origin_x,
+            origin_y=place.origin_y,
+            cell=place.cell,
+        )
+    if place.weight > 0.0 and not place.per_second and inscribed > 0.0:
+        reach = inscribed - 1.5 * math.sqrt(2.0) * cell
+        near = place.weight / per_metre
+        found = found._replace(near=near, within=place.within, reach=reach)
+    return found
 
 
 def known_distance(problem: Problem) -> float:
