@@ -41,6 +41,12 @@ WALLS = (
     Obstacle(Disc(0.7, [9.0, -2.5])),
     Obstacle(Polygon([[14, -1.5], [16, -4], [12, -4]])),
 )
+MEADOW = shapely.MultiPolygon(
+    [
+        shapely.Polygon([[3.0, -6.0], [13.0, -6.0], [13.0, 2.5], [3.0, 3.5]]),
+        shapely.box(6.5, 3.2, 9.5, 6.0),
+    ]
+)
 LAWN = Polygon([[2.0, -3.0], [7.5, -3.0], [6.0, 3.0], [3.0, 3.0]])
 
 
@@ -209,9 +215,8 @@ def test_plans_say_what_they_cost_and_where():
     assert planner.problem([0, 0, 0], [18, 0.5, 0]).place_costs == planner.place_costs
 
 
-@pytest.mark.parametrize("name", ["clearance_corridor"])
-def test_a_car_keeps_to_the_middle(name):
-    here = load_scenario(f"scenarios/{name}.yaml").problem
+def test_a_car_keeps_to_the_middle():
+    here = load_scenario("scenarios/clearance_corridor.yaml").problem
     result = plan(here, time_limit=6.0)
     poses = result.plan.sample().pose
     first = poses[(poses[:, 0] > 6.0) & (poses[:, 0] < 9.0)]
@@ -219,6 +224,16 @@ def test_a_car_keeps_to_the_middle(name):
     without = plan(replace(here, place_costs=()), time_limit=2.0)
     assert result.cost < here.cost_of(without.plan)
     assert result.audit.min_clearance_m > without.audit.min_clearance_m
+
+
+def test_the_way_leads_round_ground_that_has_a_price():
+    """Straight across it costs 31, round both pieces 20.4 along cells: which leads the search."""
+    here = load_scenario("scenarios/priced_ground.yaml").problem
+    result = plan(here, time_limit=60.0)
+    assert result.cost < 21.5
+    way = shapely.LineString(result.plan.sample().pose[:, :2])
+    across = sum(way.intersection(one).length for one in MEADOW.geoms)
+    assert across < 0.5
 
 
 @pytest.mark.parametrize(

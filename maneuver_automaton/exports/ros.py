@@ -99,9 +99,10 @@ def ros_messages(
         velocities and accelerations in `frame`, by the model's equations where it is known,
         otherwise by differences, as of the parts; `nav_trajectory`, a nav_msgs/Trajectory of the
         vehicle, whose velocities and accelerations are those ahead, to the left and about the
-        vertical, which the message leaves open, and whose efforts (and accelerations, where the model is not
-        known) are nan, which says that they are not set; and lists of one message for every pose:
-        `cmd_vel`, of geometry_msgs/TwistStamped in `body_frame`; `tf`, of tf2_msgs/TFMessage; and
+        vertical (the message leaves that open), and whose efforts, and accelerations where the
+        model is not known, are nan, which says that they are not set; and lists of one message for
+        every pose: `cmd_vel`, of geometry_msgs/TwistStamped in `body_frame`; `tf`, of
+        tf2_msgs/TFMessage; and
         for a model with a steering angle `ackermann_cmd`, of ackermann_msgs/AckermannDriveStamped.
         Of several vehicles all topics but `tf`, and the frames of their bodies, begin with the name
         of the vehicle and a slash.

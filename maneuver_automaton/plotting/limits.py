@@ -1,4 +1,4 @@
-"""Draw the limits that no body touches: the bounds of the pose, and zones of some motions only."""
+"""Draw bounds of the pose, zones of some motions only, and ground that has a price."""
 
 from __future__ import annotations
 
@@ -19,11 +19,14 @@ from maneuver_automaton.collision import Disc, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import blocked_rectangles, outlines, rings_of
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.places import Ground
 from maneuver_automaton.plotting.colors import GREY, Color
 from maneuver_automaton.plotting.style import line_handle
 from maneuver_automaton.problem import Bounds
 
 ZONE: Color = (0.76, 0.56, 0.02)
+GROUND: Color = (0.35, 0.55, 0.20)
+MOST_SHADE = 0.3  # of the dearest ground
 HATCHES = ("//", "\\\\", "xx", "..", "--", "||")  # of zones that ask for different things
 DASHES = (0, (6.0, 3.0))
 FAR_M = 1e6  # a side without a limit is drawn so far, and cut off by the picture
@@ -65,6 +68,55 @@ def draw_limits(ax: Axes, zones: Sequence[Zone], bounds: Bounds) -> LimitArtists
     for part in (*artists.zones, artists.bounds):
         ax.add_collection(part, autolim=False)
     return artists
+
+
+def draw_ground(ax: Axes, grounds: Sequence[Ground]) -> list[Artist]:
+    """Shade ground that has a price, the darker the higher, on `ax`, which keeps its limits.
+
+    Examples
+    --------
+    >>> from matplotlib.figure import Figure
+    >>> from maneuver_automaton.collision import Box
+    >>> lawn, mud = Ground(Box([4.0, 2.0]), price=1.0), Ground(Box([1.0, 1.0]), price=3.0)
+    >>> drawn = draw_ground(Figure().add_subplot(), [lawn, mud])
+    >>> [round(float(one.get_facecolor()[0, 3]), 3) for one in drawn]
+    [0.1, 0.3]
+    """
+    most = max((one.price for one in grounds if one.areas), default=1.0) or 1.0
+    artists: list[Artist] = []
+    for one in grounds:
+        if one.raster is None:
+            shade = (*GROUND, MOST_SHADE * one.price / most)
+            areas = PathCollection(
+                [shape_path(area) for area in one.areas], facecolors=[shade], linewidths=0.0,
+                zorder=0.6,
+            )  # fmt: skip
+            artists.append(ax.add_collection(areas, autolim=False))
+            continue
+        values = np.asarray(one.raster.values, dtype=np.float64)
+        rows, columns = values.shape
+        corners = np.stack(np.meshgrid(np.arange(columns + 1), np.arange(rows + 1)), axis=-1)
+        corners = SE2(one.raster.origin).act(corners * one.raster.resolution)
+        span = float(np.ptp(values)) or 1.0
+        shades = np.zeros((rows, columns, 4))
+        shades[..., :3], shades[..., 3] = GROUND, MOST_SHADE * (values - values.min()) / span
+        limits = ax.get_xlim(), ax.get_ylim()
+        mesh = ax.pcolormesh(corners[..., 0], corners[..., 1], shades, zorder=0.6)
+        ax.set(xlim=limits[0], ylim=limits[1])
+        artists.append(mesh)
+    return artists
+
+
+def ground_handles(grounds: Sequence[Ground]) -> tuple[list[Artist], list[str]]:
+    """Legend handles of ground that has a price: what each costs, and one for all rasters."""
+    most = max((one.price for one in grounds if one.areas), default=1.0) or 1.0
+    shades: dict[str, float] = {}
+    for one in grounds:
+        if one.raster is None:
+            shades[f"ground: {one.price:g} per {one.per}"] = MOST_SHADE * one.price / most
+        else:
+            shades["hills" if one.raster.are_heights else "ground by a raster"] = MOST_SHADE
+    return [Patch(color=(*GROUND, shade)) for shade in shades.values()], [*shades]
 
 
 def limit_handles(zones: Sequence[Zone], bounds: Bounds) -> tuple[list[Artist], list[str]]:

@@ -14,7 +14,13 @@ from matplotlib.patches import Patch
 from maneuver_automaton.plotting.cast import Cast, cast_of, set_view
 from maneuver_automaton.plotting.colors import INK, LANE, SEQUENCE
 from maneuver_automaton.plotting.ends import end_handles
-from maneuver_automaton.plotting.limits import draw_limits, limit_handles, shape_path
+from maneuver_automaton.plotting.limits import (
+    draw_ground,
+    draw_limits,
+    ground_handles,
+    limit_handles,
+    shape_path,
+)
 from maneuver_automaton.plotting.obstacles import draw_obstacles, obstacle_handles
 from maneuver_automaton.plotting.paths import draw_path, path_entries
 from maneuver_automaton.plotting.searches import draw_nodes
@@ -103,11 +109,13 @@ def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
     fleeting = cast.recording.world.fleeting
     around = draw_obstacles(ax, scene.obstacles, time=times, fleeting=fleeting)
     limits = draw_limits(ax, scene.zones, scene.bounds)
+    ground = draw_ground(ax, cast.recording.world.ground)
     parts: dict[str, Any] = {
         "lanes": lanes, "obstacles": around.static, "traffic": around.moving,
         "tracks": around.tracks, "bounds": limits.bounds,
     }  # fmt: skip
     parts |= {f"map {k}": one for k, one in enumerate(around.maps)}
+    parts |= {f"ground {k}": one for k, one in enumerate(ground)}
     return parts | {f"zone {k}": one for k, one in enumerate(limits.zones)}
 
 
@@ -121,8 +129,15 @@ def plane_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], li
         driven, ends = vehicle_entries(cast, moving=moving), ([], [])
     lanes = ([Patch(facecolor=LANE)], ["lane"]) if world.lanes else ([], [])
     around = obstacle_handles(scene.obstacles, scene.times[:1] if moving else scene.times)
-    limits = limit_handles(scene.zones, scene.bounds)
-    rows: list[tuple[Sequence[Artist], Sequence[str]]] = [driven, ends, lanes, around, limits]
+    limits, ground = limit_handles(scene.zones, scene.bounds), ground_handles(world.ground)
+    rows: list[tuple[Sequence[Artist], Sequence[str]]] = [
+        driven,
+        ends,
+        lanes,
+        around,
+        ground,
+        limits,
+    ]
     if (
         not moving
         and cast.recording.search is not None

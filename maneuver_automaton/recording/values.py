@@ -19,6 +19,7 @@ from maneuver_automaton.automaton.plan_arrays import PlanArrays, arrays_at, join
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.models import Model
+from maneuver_automaton.places import Ground
 from maneuver_automaton.problem import Bounds, Goal, Problem, Via
 
 MOST_DIGITS = 6  # of a number in a heading
@@ -271,6 +272,7 @@ class Environment:
 
     obstacles: tuple[AnyObstacle, ...] = ()
     zones: tuple[Zone, ...] = ()
+    ground: tuple[Ground, ...] = ()
     bounds: Bounds = field(default_factory=Bounds)
     lanes: tuple[Array, ...] = ()  # outlines (n, 2) of pieces of road [m]
     margin: float = 0.0  # [m] that any two movers keep
@@ -386,6 +388,14 @@ def world_of(*problems: Problem, margin: float = 0.0) -> Environment:
     return Environment(
         obstacles=tuple(around.values()),
         zones=tuple({id(zone): zone for one in problems for zone in one.zones}.values()),
+        ground=tuple(
+            {
+                id(cost): cost
+                for one in problems
+                for cost in one.place_costs
+                if isinstance(cost, Ground)
+            }.values()
+        ),
         bounds=problems[0].bounds if len(problems) == 1 else _loosest(problems),
         margin=margin,
     )
