@@ -26,7 +26,7 @@ _T = TypeVar("_T")
 _Number = TypeVar("_Number", np.float64, np.int64)
 
 
-class _Kept(dict[Hashable, Callable[..., Any]]):
+class _Kept(dict[Hashable, Any]):
     """The functions that remember, by what they stand for; copies begin without any."""
 
     def __reduce__(self) -> tuple[type[_Kept], tuple[()]]:
@@ -53,7 +53,14 @@ def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
     >>> kept_with(one, "spare", list), kept_with(Library(), "spare", list)
     ([3], [])
     """
-    return _kept_by(owner, make, lambda _: make())(key)
+    kept: dict[Hashable, Any] = owner.__dict__.setdefault("_kept", _Kept())
+    kind = getattr(make, "__code__", make)  # a function within another is made anew at every call
+    results: dict[Hashable, _T] = kept.setdefault(("with", kind), {})
+    value = results.pop(key) if key in results else make()
+    results[key] = value  # the last of all that were asked for
+    while len(results) > MOST:
+        results.pop(next(iter(results)))
+    return value
 
 
 def kept_by_first(

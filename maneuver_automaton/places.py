@@ -205,7 +205,8 @@ class _Near:
         centers = np.column_stack([SE2(frames).act(middle), np.zeros(len(frames))])
         found = around.nearest(parts_of(()), centers, np.zeros(len(frames))).distance - reach
         near = np.flatnonzero(found < self.clearance.within)
-        found[near] = around.nearest(body, frames[near], np.zeros(near.size)).distance
+        times, within = np.zeros(near.size), self.clearance.within
+        found[near] = around.nearest(body, frames[near], times, within=within).distance
         return found
 
     def _level_with(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -110,19 +111,8 @@ class _Distances:
         height: tuple[float, float],
         offset: Array,
     ) -> None:
-        import shapely
-
         self.bodies, self.height, self.offset = bodies, height, offset
-        flat: list[tuple[tuple[float, float] | None, Any, float]] = []
-        for one in obstacles:
-            if isinstance(one, OccupancyMap):
-                flat.append((None, _blocked(one), 0.0))
-            elif isinstance(one, Obstacle) and one.motion is None:
-                core, radius = _core(one.shape)
-                flat.append((one.height, core, radius))
-        for _, core, _ in flat:
-            shapely.prepare(core)
-        self.obstacles = flat
+        self.obstacles = _standing(obstacles)
 
     def __call__(self, elements: Any, shares: Array, poses: Array, within: float) -> Array:
         """Distances (n,) [m] that are right where they are less than `within`."""
@@ -152,6 +142,24 @@ class _Distances:
             return np.ones(len(poses), dtype=np.bool_)
         z = poses[:, 3] if poses.shape[1] > 3 else np.zeros(len(poses))
         return np.asarray((z + low <= height[1]) & (z + high >= height[0]))
+
+
+@functools.lru_cache(maxsize=8)
+def _standing(
+    obstacles: tuple[AnyObstacle, ...],
+) -> list[tuple[tuple[float, float] | None, Any, float]]:
+    """What stands still: its heights, its geometry and a radius around it; of the last maps."""
+    import shapely
+
+    found: list[tuple[tuple[float, float] | None, Any, float]] = []
+    for one in obstacles:
+        if isinstance(one, OccupancyMap):
+            found.append((None, _blocked(one), 0.0))
+        elif isinstance(one, Obstacle) and one.motion is None:
+            found.append((one.height, *_core(one.shape)))
+    for _, core, _ in found:
+        shapely.prepare(core)
+    return found
 
 
 def _core(shape: Shape) -> tuple[Any, float]:
@@ -212,4 +220,4 @@ def _blocked(one: OccupancyMap) -> Any:
         axis=1,
     )
     placed_corners = placed(np.asarray(one.origin)[None, None, :3], corners)[..., :2]
-    return shapely.union_all(shapely.polygons(placed_corners))
+    return shapely.multipolygons(shapely.polygons(placed_corners))  # a union may lose some
