@@ -29,7 +29,7 @@ from maneuver_automaton.places import PlaceCost, check_place_costs
 from maneuver_automaton.planning.many import plan_many_on
 from maneuver_automaton.planning.plan import plan_in, prepare
 from maneuver_automaton.planning.result import PlanResult, Workspace
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings, Via
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +124,22 @@ class Planner:
         start_time: float = 0.0,
         start_trim: str | None = None,
         start_state: ArrayLike | Mapping[str, float] | None = None,
+        via: Via | ArrayLike | Sequence[Via] = (),
+        order: str = "given",
     ) -> Problem:
         """The problem of one query; `start_trim` or `start_state` goes before the planner's own."""
+        one = self._between(start, goals, start_time, start_trim, start_state)
+        on_the_way: Any = via
+        return one if len(np.atleast_1d(via)) == 0 else replace(one, via=on_the_way, order=order)
+
+    def _between(
+        self,
+        start: ArrayLike,
+        goals: ArrayLike | Goal | Sequence[Goal],
+        start_time: float,
+        start_trim: str | None,
+        start_state: ArrayLike | Mapping[str, float] | None,
+    ) -> Problem:
         if start_state is not None:
             return self._first.starting_at(
                 start, time=start_time, goals=goals, trim=start_trim, state=start_state
@@ -172,17 +186,25 @@ class Planner:
         start_time: float = 0.0,
         start_trim: str | None = None,
         start_state: ArrayLike | Mapping[str, float] | None = None,
+        via: Via | ArrayLike | Sequence[Via] = (),
+        order: str = "given",
         gap: float | None = None,
         watch: Watch | None = None,
     ) -> PlanResult:
         """Plan as `plan` does for the problem from `start` (dof,) to `goals`, at `start_time` [s].
 
         It starts in `start_trim`, or in the reduced state `start_state`, or else in the planner's
-        own trim; a `Goal` names the last one. What
-        is proven for a `gap` is kept, and known at once from other starts to the same goals.
+        own trim; a `Goal` names the last one. It passes `via` in their `order`. What is proven for
+        a `gap` is kept, and known at once from other starts to the same goals.
         """
         problem = self.problem(
-            start, goals, start_time=start_time, start_trim=start_trim, start_state=start_state
+            start,
+            goals,
+            start_time=start_time,
+            start_trim=start_trim,
+            start_state=start_state,
+            via=via,
+            order=order,
         )
         return plan_in(
             self.workspace,

@@ -282,9 +282,13 @@ WITH_INERTIA = {
     "helicopter_city",
     "hovercraft",
     "lane_change",
+    "off_the_library",
     "robot_with_inertia",
     "tpcap_full",
     "trailer",
+    "tugger_train",
+    "two_trailers",
+    "wheel_loader",
     "yard_loop",
 }
 

@@ -218,3 +218,11 @@ def test_a_file_reads_back():
 def test_a_malformed_file_is_told(line, said):
     with pytest.raises(InvalidScenario, match=said):
         scenario_of_text(HEAD + f"via:\n  - {line}\n", name="via")
+
+
+def test_a_planner_passes_poses_on_the_way():
+    robot = ma.Automaton.of_controls(ma.Unicycle(), {"ahead": (1.0, 0.0), "left": (1.0, 1.0)})
+    way = [ma.Via([4, 0, 0])]
+    result = ma.Planner(robot).plan([0, 0, 0], [8, 0, 0], via=way, time_limit=20.0)
+    assert result.cost == pytest.approx(8.0)
+    assert len(result.via) == 1

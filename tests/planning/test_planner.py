@@ -20,7 +20,7 @@ from maneuver_automaton.search import cost_to_go, lattice_library, scene
 from tests import inertia, scenes
 from tests.search.cases import TABLE_2, robot
 
-QUERY = {"start", "goals", "start_time"}
+QUERY = {"start", "goals", "start_time", "start_state", "via", "order"}
 
 
 def test_every_field_of_a_problem_is_stated_once():

@@ -13,7 +13,7 @@ from tests.scenario.files import SCENARIO, TRIMS, automaton, but, grid
 UNIT = "{min: -1, max: 1, step: 1}"
 TOP = (
     "schema, name, vehicle, automaton, start, goal, cost, horizon, bounds_m, margin_m, obstacles, "
-    "zones, search, receding_horizon"
+    "zones, via, order, search, receding_horizon"
 )
 MODELS = (
     "unicycle, car, second_order_unicycle, second_order_car, accelerating_car, "

@@ -30,7 +30,8 @@ receding_horizon:
 """
 KEYS = "step_s, steps, margin, retimed, pieces, stay, disturbance"
 OF_DISTURBANCE = (
-    "position_m, heading_rad, measured_position_m, measured_heading_rad, twist_scale, pushes, "
+    "position_m, heading_rad, measured_position_m, measured_heading_rad, reduced_state, "
+    "twist_scale, pushes, "
     "delay_steps, seed"
 )
 
