@@ -38,7 +38,8 @@ def _kept_by(owner: Any, kind: Hashable, make: Callable[..., _T]) -> Callable[..
     kept: _Kept = owner.__dict__.setdefault("_kept", _Kept())
     if kind not in kept:
         kept[kind] = functools.lru_cache(MOST)(make)
-    return kept[kind]
+    remembers: Callable[..., _T] = kept[kind]
+    return remembers
 
 
 def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
