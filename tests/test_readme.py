@@ -180,9 +180,11 @@ def test_commands_run(clone):
 
 def test_the_yaml_is_that_of_the_scenario():
     page = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
-    text, obstacles = blocks("yaml", page)
+    text, on_the_way, obstacles = blocks("yaml", page)
     assert (ROOT / "scenarios" / "parking.yaml").read_text(encoding="utf-8").endswith(text)
     assert len(scenario_of_text(text + obstacles, name="README").problem.obstacles) == 4
+    free = text.replace("horizon: {time_s: 8.0, max_trims: 4}\n", "")
+    assert len(scenario_of_text(free + on_the_way, name="README").problem.via) == 4
 
 
 def test_several_vehicles_are_a_scenario(tmp_path):
