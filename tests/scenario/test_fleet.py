@@ -79,7 +79,7 @@ TOP = (
 )
 ENTRY = (
     "name, priority, leaves, start_time_s, vehicle, automaton, start, goal, cost, horizon, "
-    "bounds_m, margin_m, obstacles, zones, via, order, search, receding_horizon"
+    "bounds_m, margin_m, obstacles, zones, search, receding_horizon"
 )
 
 

@@ -174,7 +174,7 @@ MALFORMED: dict[str, tuple[str | bytes, str]] = {
     ),
     "goal is a word": (
         goal(" home"),
-        ":10: goal: got 'home', need a mapping with the keys pose, trim, heading, "
+        ":10: goal: got 'home', need a mapping with the keys pose, trim, state, heading, "
         "tolerance_m, tolerance_rad",
     ),
     "second goal bad": (
