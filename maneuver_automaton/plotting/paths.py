@@ -133,8 +133,10 @@ def path_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], lis
     more: list[tuple[Artist, str]] = []
     swept = bool(scene.body and one.track.pieces)
     if swept:
-        by = " and the ".join(["swept by the body", *(part.name for part in scene.carried)])
-        more.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), by))
+        names_of_parts = [part.name.replace("_", " ") for part in scene.carried]
+        by = f" and the {names_of_parts[0]}" if names_of_parts else ""
+        by = " and all that it pulls" if len(names_of_parts) > 1 else by
+        more.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), f"swept by the body{by}"))
     if swept and scene.moves:
         said = "body at the same times"
         more.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), said))

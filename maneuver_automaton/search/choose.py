@@ -131,11 +131,14 @@ def _seconds(automaton: Automaton, most: int, tail: int) -> float:
 
 
 def _affordable(problem: Problem, goal: Goal) -> bool:
-    """Whether every admitted word can be searched in a moment."""
-    most = problem.horizon.max_trims
+    """Whether every admitted word can be searched in a moment, and within the expansions."""
+    most, limit = problem.horizon.max_trims, problem.search.max_expansions
     if most is None or most > MOST_TRIMS - int(goal.free_heading):
         return False
-    return _seconds(problem.automaton, most, int(goal.free_heading)) <= AFFORDABLE
+    moving = int(problem.automaton.body_velocities.any(axis=1).sum())
+    words = sum(moving * (moving - 1) ** n for n in range(most))
+    quick = _seconds(problem.automaton, most, int(goal.free_heading)) <= AFFORDABLE
+    return quick and (limit is None or words <= limit)
 
 
 MOST_LASTING = 4  # moving trims of a word
