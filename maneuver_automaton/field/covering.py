@@ -22,10 +22,11 @@ from maneuver_automaton.collision import (
     Obstacle,
     Polygon,
 )
-from maneuver_automaton.collision.outline import outlines
+from maneuver_automaton.collision.outline import outlines, united
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.field.ordering import cheapest_order, least_order_cost
 from maneuver_automaton.groups import SE2, LieGroup
+from maneuver_automaton.places import moved
 from maneuver_automaton.planning import Planner, PlanResult, PlanStatus, plan_many
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.primitives import Trim
@@ -163,7 +164,7 @@ class FieldProblem:
             if isinstance(one.shape, Disc):
                 inner -= shapely.Point(*one.shape.center).buffer(one.shape.radius)
             else:
-                inner -= shapely.union_all(outlines(one.shape))
+                inner -= united(outlines(one.shape))
         inner = inner.buffer(-self.headland, join_style="mitre")
         if inner.is_empty:
             room = shapely.maximum_inscribed_circle(self.whole).length
@@ -194,6 +195,7 @@ class FieldProblem:
             self.planner,
             obstacles=tuple(one.moved(by) for one in self.planner.obstacles),
             zones=tuple(one.moved(by) for one in self.planner.zones),
+            place_costs=tuple(moved(one, by) for one in self.planner.place_costs),
         )
         return replace(self, planner=there, shape=self.shape.moved(by), direction=direction)
 

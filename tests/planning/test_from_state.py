@@ -9,6 +9,7 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.audit import audit_plan
+from maneuver_automaton.automaton.cutting import begin_state
 from maneuver_automaton.formats.plan_json import load_plan, save_plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.checking import check_plan
@@ -163,3 +164,17 @@ def test_maneuvers_meet_their_ends(name: str) -> None:
     assert made
     for one in made:
         assert maneuver_defect(model, one, source=here, target=target) < 1e-6
+
+
+def test_a_fleet_starts_in_the_states_of_its_vehicles() -> None:
+    library, body = ma.load_stock_library("second_order_car"), ma.Box([4.0, 1.8])
+    ways = ([0.0, 0.0, 0.0], [20.0, 3.0, 0.0]), ([20.0, -4.0, np.pi], [0.0, -6.0, np.pi])
+    states = [1.37, 0.12], None
+    problems = [
+        ma.Problem(library, start, goal, start_state=state, footprint=body)
+        for (start, goal), state in zip(ways, states, strict=True)
+    ]
+    result = ma.plan_fleet(ma.FleetProblem(problems), time_limit=6.0)
+    first = result.results["1"]
+    assert first.audit.passed
+    np.testing.assert_allclose(begin_state(first.plan), states[0], atol=1e-12)
