@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -112,13 +113,20 @@ def trims_lasting(motion: Plan) -> list[tuple[Trim, float]]:
     ]
 
 
-def hitch_length(vehicle: Vehicle) -> float:
-    return float(getattr(vehicle.automaton.model, "hitch_length", 0.0))
+def joints(vehicle: Vehicle) -> list[tuple[float, float]]:
+    """How far [m] each joint is behind the axle that pulls it, and the next axle behind that."""
+    model: Any = vehicle.automaton.model
+    if model.name == "articulated_vehicle":
+        return [(model.front, model.rear)]
+    if model.name == "tractor_with_trailers":
+        offsets = (model.hitch_offset, model.hitch_offset_2, model.hitch_offset_3)
+        return list(zip(offsets, model.lengths, strict=False))
+    return [(0.0, model.hitch_length)] if model.name == "car_with_trailer" else []
 
 
 def around(vehicle: Vehicle, course: Course, footprint: Sequence[Shape]) -> Bodies:
     """Geometries of the vehicle and what it carries along a course."""
-    return outside.bodies(course, footprint, vehicle.parts, hitch_length=hitch_length(vehicle))
+    return outside.bodies(course, footprint, vehicle.parts, joints=joints(vehicle))
 
 
 def fine(vehicle: Vehicle, motion: Plan) -> Course:

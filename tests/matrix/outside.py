@@ -206,18 +206,23 @@ def bodies(
     footprint: Sequence[Shape],
     parts: Mapping[str, Sequence[Shape]] | None = None,
     *,
-    hitch_length: float = 0.0,
+    joints: Sequence[tuple[float, float]] = (),
 ) -> Bodies:
-    """The body along a course (n,), its trailer included.
+    """The body along a course (n,), what it pulls included.
 
-    A trailer's axle is `hitch_length` [m] behind the vehicle's, its heading less by the first
-    component of the reduced state.
+    Each joint is so far [m] behind the axle that pulls it, and the next axle behind the joint; its
+    heading is less by the angle at the joint, the next component of the reduced state.
     """
     placed = [(core(shape), course.flat) for shape in footprint]
-    for shapes in (parts or {}).values():
-        heading = course.flat[:, 2] - course.state[:, 0]
-        behind = hitch_length * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-        frames = np.column_stack([course.pose[:, :2] - behind, heading])
+    frames = np.array(course.flat[:, :3])
+    for k, (shapes, (offset, length)) in enumerate(
+        zip((parts or {}).values(), joints, strict=True)
+    ):
+        place, heading = frames[:, :2], frames[:, 2]
+        place = place - offset * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        heading = heading - course.state[:, k]
+        place = place - length * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+        frames = np.column_stack([place, heading])
         placed += [(core(shape), frames) for shape in shapes]
     columns = [_geometries(_placed(corners, poses)) for (corners, _), poses in placed]
     return Bodies(np.stack(columns, axis=-1), np.array([radius for (_, radius), _ in placed]))

@@ -369,7 +369,7 @@ ALL = (
         library=_stock("tractor_with_trailers"),
         footprint=(Box([7.0, 2.5], [2.1, 0.0]),),
         parts={"trailer": (Box([3.0, 2.4]),), "trailer_2": (Box([11.0, 2.5], [2.5, 0.0]),)},
-        goal=(40.0, 8.0, 0.2),
+        goal=(60.0, 10.0, 0.2),
         moving_trim="speed 2, steering 0",
         inertia=True,
     ),
