@@ -53,7 +53,7 @@ def loop_of(name: str, seed: int) -> ma.ClosedLoop:
         search=ma.SearchSettings(improve=False, polish=False),
     )
     upset = Disturbance(reduced_state=deviations, seed=seed)
-    return simulate(problem, step=0.5, steps=SHORT, time_limit=1.0, disturbance=upset)
+    return simulate(problem, step=0.5, steps=SHORT, time_limit=2.0, disturbance=upset)
 
 
 def check(loop: ma.ClosedLoop) -> None:
@@ -82,6 +82,7 @@ def test_goes_on_from_a_disturbed_state(name: str) -> None:
 
 
 @pytest.mark.exhaustive
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(SEEDS))
 @pytest.mark.parametrize("name", CASES)
 def test_five_hundred_loops(name: str, seed: int) -> None:
