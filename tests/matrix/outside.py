@@ -216,7 +216,7 @@ def bodies(
     placed = [(core(shape), course.flat) for shape in footprint]
     frames = np.array(course.flat[:, :3])
     for k, (shapes, (offset, length)) in enumerate(
-        zip((parts or {}).values(), joints, strict=True)
+        zip((parts or {}).values(), joints, strict=False)
     ):
         place, heading = frames[:, :2], frames[:, 2]
         place = place - offset * np.stack([np.cos(heading), np.sin(heading)], axis=-1)
