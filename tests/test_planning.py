@@ -571,7 +571,11 @@ def test_bounds_that_no_plan_found_keeps_to():
 def test_too_few_expansions():
     for horizon in (Horizon(max_trims=4), Horizon(time=8.0, max_trims=4)):
         result = planned(
-            ROBOT, [0, 1, 0.5], [0, 0, 0], horizon=horizon, search=SearchSettings(max_expansions=1)
+            ROBOT,
+            [0, 1, 0.5],
+            [0, 0, 0],
+            horizon=horizon,
+            search=SearchSettings(method="words", max_expansions=1),
         )
         assert (result.status, result.reason) == (
             PlanStatus.OUT_OF_BUDGET, "no plan within 60 s and the expansions allowed"

@@ -71,7 +71,7 @@ class TractorWithTrailers(Vehicle):
     >>> truck.reduced_names, truck.part_names
     (('hitch', 'hitch_2'), ('trailer', 'trailer_2'))
     >>> truck.part_poses(np.zeros(2)).tolist()
-    [[[-5.6, 0.0, 0.0], [-13.6, 0.0, 0.0]]]
+    [[-5.6, 0.0, 0.0], [-13.6, 0.0, 0.0]]
     """
 
     wheelbase: float  # [m]

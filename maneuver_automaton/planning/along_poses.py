@@ -249,10 +249,13 @@ class _Search:
         self.arrivals = [(k, to) for k, way in enumerate(self.ways) for to in way.arrivals]
         self.numbers = {(k, to.key): a for a, (k, to) in enumerate(self.arrivals)}
         self.bounds = np.zeros((n + 1, n + 1))
+        # a maneuver from a state of no trim is no word of the library
+        between = self.legs.between
+        bounded = replace(between, horizon=middle.horizon) if between.has_states else middle
         for i, k in self._pairs():
             ends = goals if k == n else (self.ways[k].around,)
             begin = None if i == n else self.ways[i].around
-            self.bounds[i, k] = min(_set_bound(middle, begin, end) for end in ends)
+            self.bounds[i, k] = min(_set_bound(bounded, begin, end) for end in ends)
         self.costs = np.full((len(self.arrivals) + 1,) * 2, np.inf)
         rows: list[list[int]] = [[] for _ in range(n)]
         for a, (k, _) in enumerate(self.arrivals):

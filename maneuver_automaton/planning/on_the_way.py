@@ -34,7 +34,7 @@ def passed_on_the_way(problem: Problem, plan: Plan) -> tuple[Passed, ...]:
     >>> from maneuver_automaton import Automaton, Unicycle, Via
     >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0)})
     >>> problem = Problem(robot, [0, 0, 0], [3, 0, 0], via=Via([2, 0, 0]))
-    >>> [(one.number, one.time) for one in passed_on_the_way(
+    >>> [(one.number, round(one.time, 6)) for one in passed_on_the_way(
     ...     problem, Plan([0, 0, 0], robot.trims, durations=[3.0]))]
     [(1, 2.0)]
     """
