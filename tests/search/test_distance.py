@@ -14,6 +14,7 @@ from maneuver_automaton.search.distance_grid import MOST_CELLS, distance_grid, s
 from tests.collision import scenes
 from tests.reference_collision import shapely_world, still, world_around
 from tests.reference_lattice import cells_open, centre_clearances, grid_distances
+from tests.search.cases import compiled_only
 
 CAR, DISC = scenes.FOOTPRINTS["car"], (Disc(0.6),)
 RING = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -76,6 +77,7 @@ def test_little_is_looked_at_where_little_is_asked():
     assert grid.state[1] < 0.2 * grid.value.size
 
 
+@compiled_only
 def test_beside_a_wall_no_more_is_looked_at_and_the_value_is_that_of_all():
     """Cells that a wall may cut come last, but what leads into one is known before."""
     rng = np.random.default_rng(3)

@@ -11,6 +11,7 @@ from maneuver_automaton.search.lattice import forward_word, reversed_query
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.words.word import Word, plan_of, word_of_plan
+from tests.search.cases import compiled_only
 
 TURNS = {"ahead": (1, 0), "left": (1, 0.3), "right": (1, -0.3), "back": (-1, 0), "rest": (0, 0)}
 CAR = ma.Automaton.of_controls(ma.Unicycle(), TURNS)
@@ -99,6 +100,7 @@ def corridor(*costs):
     )
 
 
+@compiled_only
 def test_in_a_corridor_a_car_keeps_to_the_middle():
     plain, near = ma.plan(corridor()), corridor(ma.Clearance(4.0, 1.5))
     result = ma.plan(near)
@@ -117,6 +119,7 @@ def test_in_a_corridor_a_car_keeps_to_the_middle():
     assert result.lower_bound <= result.cost
 
 
+@compiled_only
 def test_dear_ground_in_the_open_is_worth_a_detour():
     lawn = ma.Ground(ma.Box([6.0, 8.0], [10.0, 1.0]), price=3.0)
     problem = ma.Problem(
@@ -136,6 +139,7 @@ def test_dear_ground_in_the_open_is_worth_a_detour():
     assert seen == pytest.approx(result.cost, rel=5e-3, abs=0.1)
 
 
+@compiled_only
 @pytest.mark.parametrize("by", [SE2([30.0, -7.0, 2.0])])
 def test_a_moved_problem_has_the_moved_plan(by):
     problem = corridor(ma.Clearance(4.0, 1.5))
