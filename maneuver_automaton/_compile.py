@@ -91,13 +91,12 @@ def bare_inner_kernel(function: Kernel) -> Kernel:
     return _later(function, _inner, NO_COUNTS)
 
 
-def inlined_kernel(function: Kernel) -> Kernel:
-    """A `bare_inner_kernel` that LLVM merges into its callers, wherever they call it.
+def shared_kernel(function: Kernel) -> Kernel:
+    """A `bare_inner_kernel` that is compiled once, and called where it lies by those that call it.
 
-    A call hands over every field of every structure it is given, hundreds of words for a scene;
-    merged, none is copied. It is typed once, on its own.
+    For what many kernels need and takes long enough that a call counts for nothing.
     """
-    return _later(function, _inner, {"forceinline": True, **NO_COUNTS})
+    return _later(function, _shared, NO_COUNTS)
 
 
 def plain(function: Kernel) -> Kernel:
@@ -105,7 +104,7 @@ def plain(function: Kernel) -> Kernel:
 
     Examples
     --------
-    >>> @inlined_kernel
+    >>> @bare_inner_kernel
     ... def double(x):
     ...     return 2.0 * x
     >>> plain(double)(1.5)
@@ -189,14 +188,23 @@ def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     )(function)
 
 
-def _cached(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+def _shared(function: Callable[..., Any], options: dict[str, Any]) -> Any:
+    how = _pipeline("SharedCompiler")
+    if not how:  # compiled plainly, it is linked into what calls it
+        return _inner(function, options)
+    return _cached(function, {"no_cpython_wrapper": True, **options}, "SharedCompiler")
+
+
+def _cached(
+    function: Callable[..., Any], options: dict[str, Any], compiler: str = "KernelCompiler"
+) -> Any:
     import numba
 
     compiled = numba.njit(
         nogil=True,
         error_model="numpy",
         no_cfunc_wrapper=True,
-        **_pipeline("KernelCompiler"),
+        **_pipeline(compiler),
         **options,
     )(function)
     folder = kernel_folder()

@@ -24,10 +24,11 @@ from numba.core.types.containers import BaseTuple
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
 from maneuver_automaton._compile_all import compile_missing, processors
 from maneuver_automaton._kernel_folders import shipped_folder
+from maneuver_automaton._kernel_list import kernel_named
 
 ENDING = ".nbc"
 OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
-FORMAT = 2  # of the files; counts into their names
+FORMAT = 3  # of the files; counts into their names
 
 
 class KernelCache:
@@ -42,7 +43,7 @@ class KernelCache:
             If its source is not in a file.
         """
         code = function.__code__
-        self.folder = folder
+        self.folder, self.function = folder, function
         self.name = f"{function.__module__}.{function.__qualname__}".replace("<locals>.", "")
         closed = [cell.cell_contents for cell in function.__closure__ or ()]
         self.made_from = (
@@ -75,9 +76,19 @@ class KernelCache:
                 content = read_checked(path, trusted=True)
                 if content is None:
                     continue
-                stated, payload = pickle.loads(content)
-                if stated == signature:
-                    return CompileResult._rebuild(target_context, *payload)
+                stated, notes, payload = pickle.loads(content)
+                if stated != signature:
+                    continue
+                for name, args in notes["shares"]:  # before what calls it where it lies
+                    kernel_named(name).compile(args)  # type: ignore[attr-defined]
+                compiled = CompileResult._rebuild(target_context, *payload)
+                vars(compiled.library).update(notes)
+                if notes["stated"] is None:
+                    return compiled
+                from maneuver_automaton._linking import interpreted
+
+                made_of = self.function, compiled.fndesc, compiled.environment, compiled.library
+                return compiled._replace(entry_point=interpreted(*made_of))
             except Exception as error:  # noqa: BLE001, the kernel is compiled whatever is wrong here
                 say_once("damaged", f"{path}: {error or type(error).__name__}: compiled again")
         return None
@@ -90,7 +101,9 @@ class KernelCache:
             return
         path = self.folder / self._file(signature, compiled.codegen.magic_tuple())
         try:
-            write_checked(path, dumps((signature, compiled._reduce())))
+            notes = {"shares": [], "stated": None}
+            notes |= {name: getattr(compiled.library, name, it) for name, it in notes.items()}
+            write_checked(path, dumps((signature, notes, compiled._reduce())))
         except OSError as error:
             why = error.strerror or error
             say_once("not kept", f"{self.folder}: compiled kernels cannot be kept here: {why}")

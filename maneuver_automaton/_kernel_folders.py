@@ -14,7 +14,7 @@ from pathlib import Path
 
 from maneuver_automaton._cache_files import distrusted, say_once
 
-HOW = ("_compile.py", "_linking.py")  # how kernels are compiled
+HOW = ("_compile.py", "_linking.py", "_records.py")  # how kernels are compiled
 SHIPPED = "compiled"  # folder of the package
 KERNELS = "kernels-"  # what the names of folders of compiled kernels begin with
 

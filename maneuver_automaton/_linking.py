@@ -21,9 +21,11 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
 
 from maneuver_automaton._cache_files import PLAINLY, say_once
+from maneuver_automaton._records import hand_over_by_address
 
 CALLED = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object, ctypes.py_object, ctypes.c_void_p)
 
+hand_over_by_address()
 NAMES_ONLY = "maneuver_automaton.names_only"  # marks a module that defines no more than names
 
 
@@ -33,7 +35,7 @@ class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
     def finalize(self) -> None:
         """Link what is called, and leave the rest to the kernel that it becomes part of."""
         self._raise_if_finalized()
-        _check_what_is_called(self)
+        _separate(self)
         for library in dict.fromkeys(self._linking_libraries):
             self._reload_init.update(library._reload_init)
             self._final_module.link_in(library._get_module_for_linking(), preserve=True)
@@ -45,9 +47,12 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
     """Code that Python calls, with what it calls in its turn."""
 
     def finalize(self) -> None:
-        """Link what is called."""
-        _check_what_is_called(self)
+        """Link what is called, but for what is shared: that is there already."""
+        _separate(self)
         super().finalize()
+
+    def _verify_declare_only_symbols(self) -> None:
+        """What is shared stays a name, which is known by now."""
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Its machine code and its names; what it was made from, thrice as long, serves nobody."""
@@ -75,8 +80,23 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
 
-def _check_what_is_called(caller: JITCodeLibrary) -> None:
-    """Refuse calls of kernels that Python calls: once loaded, there is nothing of them to link."""
+class SharedLibrary(KernelLibrary):
+    """Code that kernels call where it lies, under a name that is the same in every process."""
+
+    stated: tuple[str, Any]  # its name and the types of its arguments
+
+
+def _separate(caller: JITCodeLibrary) -> None:
+    """Take what is shared out of what a library is linked with, and note it.
+
+    Calls of kernels that Python calls are refused: once loaded, there is nothing of them to link.
+    """
+    called = list(dict.fromkeys(caller._linking_libraries))
+    caller._linking_libraries = [one for one in called if getattr(one, "stated", None) is None]
+    shares = [one.stated for one in called if getattr(one, "stated", None) is not None]
+    for library in caller._linking_libraries:
+        shares += getattr(library, "shares", [])
+    caller.shares = list(dict.fromkeys(shares))
     for library in caller._linking_libraries:
         module = library._shared_module
         names_only = module and any(one.name == NAMES_ONLY for one in module.global_variables)
@@ -86,6 +106,19 @@ def _check_what_is_called(caller: JITCodeLibrary) -> None:
 
 def _defined(values: Iterable[Any]) -> list[Any]:
     return [one for one in values if not one.is_declaration and one.linkage != Linkage.internal]
+
+
+def interpreted(function: Any, stated: Any, env: Any, library: Any) -> Any:
+    """What Python, from which tests call a function that only kernels call, has in its place."""
+    called = CALLED(lambda closure, args, keywords: function(*args))
+    return _dynfunc.make_function(
+        stated.lookup_module(),
+        stated.qualname,
+        stated.qualname,
+        ctypes.cast(called, ctypes.c_void_p).value,
+        env,
+        (library, called),
+    )
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -100,17 +133,8 @@ class LinkedLowering(NativeLowering):  # type: ignore[misc]
         state.flags.no_compile = True
         super().run_pass(state)
         state.library.finalize()
-        lowered = state["cr"]
-        name, function = lowered.fndesc.qualname, state.func_id.func
-        called = CALLED(lambda closure, args, keywords: function(*args))
-        entry = _dynfunc.make_function(
-            lowered.fndesc.lookup_module(),
-            name,
-            name,
-            ctypes.cast(called, ctypes.c_void_p).value,
-            lowered.env,
-            (state.library, called),
-        )
+        lowered, function = state["cr"], state.func_id.func
+        entry = interpreted(function, lowered.fndesc, lowered.env, state.library)
         state["cr"] = lowered._replace(cfunc=entry)
         state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
         return True
@@ -127,6 +151,27 @@ class KernelLowering(NativeLowering):  # type: ignore[misc]
         state.library = KernelLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class SharedLowering(NativeLowering):  # type: ignore[misc]
+    """Lower a function that kernels call where it lies."""
+
+    _name = "shared_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower into a library of its own, whose name does not tell one process from another."""
+        function = state.func_id.func
+        state.library = SharedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.library.stated = f"{function.__module__}.{function.__qualname__}", state.args
+        state.func_id.unique_id = "s"
+        super().run_pass(state)
+        lowered = state["cr"]
+        entry = interpreted(function, lowered.fndesc, lowered.env, state.library)
+        state["cr"] = lowered._replace(cfunc=entry)
+        state.targetctx.insert_user_function(entry, lowered.fndesc, [state.library])
+        return True
 
 
 class LinkingCompiler(Compiler):  # type: ignore[misc]
@@ -157,6 +202,12 @@ class KernelCompiler(LinkedCompiler):
     """Compiler of functions that Python calls."""
 
     lowering = KernelLowering
+
+
+class SharedCompiler(LinkedCompiler):
+    """Compiler of functions that kernels call where they lie."""
+
+    lowering = SharedLowering
 
 
 @functools.cache

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.bounds._kernels_dual import LANES, gather
 from maneuver_automaton.bounds.arrays import Single
 
@@ -25,7 +25,7 @@ ROWS = 48  # of the array `w`
 Six: TypeAlias = tuple[np.float32, np.float32, np.float32, np.float32, np.float32, np.float32]
 
 
-@inlined_kernel
+@bare_inner_kernel
 def room_of_row(
     least: Six,
     apart: tuple[np.float32, np.float32, np.float32, np.float32, np.float32],

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.bounds.arrays import PoseArrays
 
 BLOCKED, UNKNOWN, FREE = 0, 1, 2  # states of a box
 
 
-@inlined_kernel
+@bare_inner_kernel
 def greatest_turned(along: float, across: float, c: float, s: float) -> float:
     """Upper bound of a component of a vector that turns by at most an angle to either side.
 
@@ -24,7 +24,7 @@ def greatest_turned(along: float, across: float, c: float, s: float) -> float:
     return max(along, along * c) + abs(across) * s
 
 
-@inlined_kernel
+@bare_inner_kernel
 def least_turned(along: float, across: float, c: float, s: float) -> float:
     """Lower bound of the component, as in `greatest_turned`."""
     return min(along, along * c) - abs(across) * s

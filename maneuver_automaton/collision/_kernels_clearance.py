@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision.arrays import Buckets, Field, SweptAreas, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.collision.convex import Solids
@@ -20,7 +20,7 @@ NEGLIGIBLE = 1e-7  # [m] no rounding is as large
 ROUGH = 1e-6  # share of a radius by which a corner has to be higher to be passed over
 
 
-@inlined_kernel
+@bare_inner_kernel
 def from_segment(
     x: float, y: float, ax: float, ay: float, bx: float, by: float
 ) -> tuple[float, float]:
@@ -40,7 +40,7 @@ def point_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: fl
     return ex * ex + ey * ey
 
 
-@inlined_kernel
+@bare_inner_kernel
 def separation(
     body: Body | SweptAreas,
     b: int,
@@ -170,7 +170,7 @@ def core_distance(
     return distance, axis_x, axis_y
 
 
-@inlined_kernel
+@bare_inner_kernel
 def piece_clearance(
     body: Body,
     b: int,
@@ -207,7 +207,7 @@ def piece_clearance(
     return distance - rounding, axis_x, axis_y
 
 
-@inlined_kernel
+@bare_inner_kernel
 def field_bound(field: Field, body: Body, x: float, y: float, c: float, s: float) -> float:
     """Lower bound of the clearance from the distances stored at cell centres, by discs."""
     best = math.inf
@@ -293,7 +293,7 @@ def corner_time(a: float, b: float, ahead: float, turn: float, limit: float) -> 
     return max(reach - now if turn > 0.0 else reach + now, 0.0) / abs(turn)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def stays_above(a: float, b: float, ahead: float, turn: float, limit: float, most: float) -> bool:
     """Whether a corner on a circle, as in `corner_time`, surely does not meet `limit` by `most`.
 
@@ -311,7 +311,7 @@ def stays_above(a: float, b: float, ahead: float, turn: float, limit: float, mos
     return ahead + a + min(falls, 0.0) - rest > limit + ROUGH * size
 
 
-@inlined_kernel
+@bare_inner_kernel
 def axis_time(
     body: Body,
     b: int,
@@ -455,7 +455,7 @@ def near_step(
     return min(step, most), min(nearest, step * speed)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def static_clearance(
     world: WorldArrays, body: Body, x: float, y: float, c: float, s: float
 ) -> float:

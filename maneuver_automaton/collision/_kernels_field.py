@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import inlined_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import point_to_segment
 
 
@@ -164,7 +164,7 @@ def write_map(
             distance[j, i] = min(distance[j, i], resolution * value)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cells_between(low: float, high: float, origin: float, cell: float, n: int) -> tuple[int, int]:
     """First cell of a row of `n` that an interval touches, and the one after the last."""
     return max(0, math.floor((low - origin) / cell)), min(n, math.floor((high - origin) / cell) + 1)

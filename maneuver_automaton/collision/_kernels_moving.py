@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
 from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
 from maneuver_automaton.collision.arrays import MovingObstacles
@@ -14,7 +14,7 @@ from maneuver_automaton.groups._kernels import coast, compose
 SOON = 1e-11  # [s] a knot that is nearer in time counts as reached: in it nothing moves 1e-9 m
 
 
-@inlined_kernel
+@bare_inner_kernel
 def knot_before(moving: MovingObstacles, m: int, time: float) -> int:
     """The last knot at or before `time`, which is after the first one and before the last."""
     low, high = moving.first_knot[m], moving.first_knot[m + 1] - 1
@@ -32,7 +32,7 @@ def knot_before(moving: MovingObstacles, m: int, time: float) -> int:
         middle = (low + high) // 2
 
 
-@inlined_kernel
+@bare_inner_kernel
 def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, float, float]:
     """Pose (x, y, heading) of a moving obstacle, held before its first knot and after."""
     k_0, k_1 = moving.first_knot[m], moving.first_knot[m + 1]
@@ -55,7 +55,7 @@ def obstacle_pose(moving: MovingObstacles, m: int, time: float) -> tuple[float, 
     return x, y, heading
 
 
-@inlined_kernel
+@bare_inner_kernel
 def closing_of(
     moving: MovingObstacles,
     m: int,
@@ -108,7 +108,7 @@ def closing_of(
     return closing, lasting
 
 
-@inlined_kernel
+@bare_inner_kernel
 def moving_clearance(
     moving: MovingObstacles,
     m: int,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision.arrays import MovingObstacles, Slabs
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
@@ -19,14 +19,14 @@ from maneuver_automaton.groups._kernels import coast, compose
 LONGER = 1.0 + 1e-12  # than a straight path by rounding, squared
 
 
-@inlined_kernel
+@bare_inner_kernel
 def bulge(length: float, d_x: float, d_y: float) -> float:
     """How far a path is outside the box around its ends, at most, by its length and its chord."""
     square = LONGER * length * length - (d_x * d_x + d_y * d_y)
     return 0.5 * math.sqrt(square) if square > 0.0 else 0.0
 
 
-@inlined_kernel
+@bare_inner_kernel
 def middle_after(moving: MovingObstacles, m: int, k: int, time: float) -> tuple[float, float]:
     """Place of an obstacle's middle at a time, as the motion after knot `k` has it.
 
@@ -49,7 +49,7 @@ def middle_after(moving: MovingObstacles, m: int, k: int, time: float) -> tuple[
     return x + c * m_x - s * m_y, y + s * m_x + c * m_y
 
 
-@inlined_kernel
+@bare_inner_kernel
 def middle_speed(moving: MovingObstacles, m: int, k: int) -> float:
     """How fast an obstacle's middle is after knot `k`, at most; not the last knot."""
     m_x, m_y = moving.middle[m, 0], moving.middle[m, 1]
@@ -62,7 +62,7 @@ def middle_speed(moving: MovingObstacles, m: int, k: int) -> float:
     return most / float(moving.time[k + 1] - moving.time[k])
 
 
-@inlined_kernel
+@bare_inner_kernel
 def widen(
     box: Array, row: int, x: float, y: float, to_x: float, to_y: float, around: float
 ) -> None:
@@ -118,7 +118,7 @@ def write_slabs(
                 widen(box, row, x, y, to_x, to_y, 0.0)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def slabs_during(slabs: Slabs, clock: float, duration: float) -> tuple[int, int]:
     """Two slabs side by side, or one twice, that hold all times of a motion."""
     low, high = min(clock, clock + duration), max(clock, clock + duration)
@@ -130,7 +130,7 @@ def slabs_during(slabs: Slabs, clock: float, duration: float) -> tuple[int, int]
     return a, b
 
 
-@inlined_kernel
+@bare_inner_kernel
 def swept_box(
     body: Body,
     x: float,
@@ -157,7 +157,7 @@ def swept_box(
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def apart_during(
     slabs: Slabs,
     n: int,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_moving import free_of_moving
 from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
 from maneuver_automaton.collision.arrays import MovingObstacles, Slabs
@@ -58,7 +58,7 @@ def first_meetings(
                 out[m] = clock + free
 
 
-@inlined_kernel
+@bare_inner_kernel
 def one_of(moving: MovingObstacles, m: int) -> MovingObstacles:
     """One of several moving obstacles by itself."""
     return MovingObstacles(

@@ -12,7 +12,7 @@ import math
 from typing import NamedTuple
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.refinement._kernels_word import (
     GAIN,
     admitted,
@@ -64,7 +64,7 @@ def spliced(
     return ended(task, word, n, size)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def put_middle(
     lib: LatticeArrays, word: WordArrays, words: IntArray, scratch: Scratch, which: int, m: int
 ) -> int:
@@ -163,7 +163,7 @@ def drawn_section(one: Improving, n: int, cost: float, draw: Array) -> Section:
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cheapest_of(scratch: Scratch, n: int) -> float:
     """Least cost of `n` candidates; inf if there are none."""
     least = math.inf
@@ -172,7 +172,7 @@ def cheapest_of(scratch: Scratch, n: int) -> float:
     return least
 
 
-@inlined_kernel
+@bare_inner_kernel
 def words_to(lib: LatticeArrays, free_heading: bool) -> tuple[IntArray, int]:
     """Words of a connection and how many of them are tried."""
     if free_heading:

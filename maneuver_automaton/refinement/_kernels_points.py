@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.refinement._kernels_word import (
     GAIN,
     admitted,
@@ -79,7 +79,7 @@ def price_along(one: Improving, j: int) -> float:
     return price
 
 
-@inlined_kernel
+@bare_inner_kernel
 def trim_at(lib: LatticeArrays, word: WordArrays, j: int) -> tuple[int, int]:
     """Trim at a point, as the search for connections is told: any where all are of one class."""
     trim = (

@@ -10,7 +10,7 @@ The arrays are those of `arrays.WordArrays`. `now` is the word; `poses` (n, 4), 
 
 from __future__ import annotations
 
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, shared_kernel
 from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays, WordSteps
 from maneuver_automaton.search._kernels_coast import (
     coast_free,
@@ -99,7 +99,7 @@ def unroll(lib: LatticeArrays, word: WordArrays, n: int) -> None:
     word.times[n] = time
 
 
-@inlined_kernel
+@bare_inner_kernel
 def owner(word: WordArrays, n: int, time: float) -> int:
     """Number of the last trim that has begun at a time: its coast, or the maneuver after it."""
     # By halving: `times` rise, and times[low] <= time < times[high], the ends aside.
@@ -113,7 +113,7 @@ def owner(word: WordArrays, n: int, time: float) -> int:
     return low
 
 
-@inlined_kernel
+@bare_inner_kernel
 def pose_at(
     lib: LatticeArrays, word: WordArrays, k: int, time: float
 ) -> tuple[float, float, float, float]:
@@ -123,7 +123,7 @@ def pose_at(
     return coasted(lib, word.now.trims[k], begin, t)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def price_of_transition(lib: LatticeArrays, word: WordArrays, k: int) -> float:
     """Price of what leads to trim `k` from the trim before."""
     if word.now.edges[k] >= 0:
@@ -131,7 +131,7 @@ def price_of_transition(lib: LatticeArrays, word: WordArrays, k: int) -> float:
     return lib.library.switch
 
 
-@inlined_kernel
+@bare_inner_kernel
 def gear_before(lib: LatticeArrays, word: WordArrays, k: int) -> int:
     """Sign of the last forward speed up to trim `k`, that included."""
     gear = 0
@@ -141,7 +141,7 @@ def gear_before(lib: LatticeArrays, word: WordArrays, k: int) -> int:
     return gear
 
 
-@inlined_kernel
+@bare_inner_kernel
 def gear_after(lib: LatticeArrays, word: WordArrays, n: int, k: int) -> int:
     """Sign of the first forward speed from trim `k` on."""
     gear = 0
@@ -155,7 +155,7 @@ def gear_after(lib: LatticeArrays, word: WordArrays, n: int, k: int) -> int:
 # its new length; where there is no room for it, one that `admitted` refuses.
 
 
-@inlined_kernel
+@bare_inner_kernel
 def begun(task: ImproveTask, word: WordArrays) -> int:
     """Begin the new word: in the trim of the old one, where a word has to begin in a given trim."""
     if not task.given_ends:
@@ -216,7 +216,7 @@ def append_after(lib: LatticeArrays, word: WordArrays, size: int, k: int, t: flo
     return append(lib, word, size, word.now.trims[k], t)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def ended(task: ImproveTask, word: WordArrays, n: int, size: int) -> int:
     """End the new word: in the trim of the old one, of `n` trims, where that is given."""
     if not task.given_ends or size >= word.new.trims.shape[0]:
@@ -244,7 +244,7 @@ def admitted(lib: LatticeArrays, task: ImproveTask, word: WordArrays, size: int)
     return duration <= task.limits.most_time
 
 
-@bare_inner_kernel
+@shared_kernel
 def still_free(one: Improving, size: int, begin: float) -> bool:
     """Whether the word in `word.new` is free after `begin` [s], where obstacles move."""
     # What ends before `begin` is driven as before, and was proven then.

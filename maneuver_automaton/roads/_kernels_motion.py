@@ -14,7 +14,13 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import (
+    bare_inner_kernel,
+    bare_kernel,
+    inner_kernel,
+    kernel,
+    shared_kernel,
+)
 from maneuver_automaton.collision._kernels_advancement import free_of_static
 from maneuver_automaton.collision._kernels_moving import free_of_moving
 from maneuver_automaton.roads.arrays import (
@@ -194,7 +200,7 @@ def maneuvers_between(limits: Limits, trims: RoadTrims, most: int) -> Maneuvers:
     )
 
 
-@bare_inner_kernel
+@shared_kernel
 def free_tick(
     clearing: Clearing,
     before: tuple[float, float, float],

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision.world import HALF_TURN, SHARE
 from maneuver_automaton.search._kernels_distance import detour_of, grid_layout, sow
@@ -35,7 +35,7 @@ from maneuver_automaton.search.arrays import (
 NOT_BEGUN = -1  # in place of whether a search may go on
 
 
-@inlined_kernel
+@bare_inner_kernel
 def rounded(value: float) -> float:
     """A number as `world.rounded` rounds it."""
     return math.copysign(np.rint(value * SHARE) / SHARE, value)

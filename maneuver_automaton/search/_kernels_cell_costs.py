@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
 from maneuver_automaton.search._kernels_cell_turns import (
     TINY,
     Four,
@@ -151,7 +151,7 @@ def closed_form(problem: WordProblem, word: IntArray, triple: IntArray, q: int) 
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def least_costs(known: ClosedForm, low: float, high: float) -> tuple[float, float]:
     """Lower bounds of what coasting costs in a word whose free time is from `low` to `high`.
 

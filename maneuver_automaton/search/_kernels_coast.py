@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
@@ -129,13 +129,13 @@ def part_free(
     return free_time(world, body, x, y, heading, v_x, v_y, turn, speed, t, keep, margin, clock)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def is_one_in_plane(scene: Scene, lib: LatticeArrays) -> bool:
     """Whether one body moves among obstacles in one plane, without zones."""
     return scene.layers.low.shape[0] == 1 and scene.layers.flat and lib.parts.n == 1
 
 
-@inlined_kernel
+@bare_inner_kernel
 def coast_proven(
     scene: Scene,
     lib: LatticeArrays,
@@ -171,7 +171,7 @@ def coast_proven(
     return free, clearance
 
 
-@inlined_kernel
+@bare_inner_kernel
 def edge_swept(
     scene: Scene, lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
 ) -> int:
@@ -189,7 +189,7 @@ def edge_swept(
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def swept_end(
     lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
 ) -> tuple[float, float]:
@@ -249,7 +249,7 @@ def coast_proven_everywhere(
     return free, nearest if nearest < math.inf else scene.far
 
 
-@inlined_kernel
+@bare_inner_kernel
 def coast_inside(
     scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> bool:
@@ -260,7 +260,7 @@ def coast_inside(
     return inside and inside_window(scene.window, pose[0], pose[1], pose[2], twist, t)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def coasted(
     lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> tuple[float, float, float, float]:
@@ -282,7 +282,7 @@ def edge_end(
     return x, y, heading, pose[3] + moved[3]
 
 
-@inlined_kernel
+@bare_inner_kernel
 def coast_free(
     scene: Scene,
     lib: LatticeArrays,
@@ -329,14 +329,14 @@ def may_stay(
     return True
 
 
-@inlined_kernel
+@bare_inner_kernel
 def is_still(lib: LatticeArrays, trim: int) -> bool:
     """Whether a trim stands still; a rest may be as short as it likes."""
     twist = lib.library.twists[trim]
     return not (twist[0] != 0.0 or twist[1] != 0.0 or twist[2] != 0.0 or twist[3] != 0.0)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def too_short(lib: LatticeArrays, trim: int, run: float, least_coast: float) -> bool:
     """Whether a trim that moves has begun, and does not yet last as long as it must."""
     return trim != NO_TRIM and 0.0 < run < least_coast and not is_still(lib, trim)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, kernel
 from maneuver_automaton.collision.arrays import Field
 from maneuver_automaton.search.arrays import DistanceGrid
 
@@ -19,7 +19,7 @@ BUCKETS = 256  # a power of two, more than ``NARROW * DIAGONAL + DIAGONAL``, see
 LISTED, N_SETTLED, AT_RIM, FAR, WRITTEN, NOW = range(6)  # places in `grid.state`
 
 
-@inlined_kernel
+@bare_inner_kernel
 def grid_layout(
     origin: float, low: float, high: float, cell: float, field_cell: float, stride: int
 ) -> tuple[int, int, float]:
@@ -33,7 +33,7 @@ def grid_layout(
     return first, max(last - first, 0) + 1, origin + first * cell
 
 
-@inlined_kernel
+@bare_inner_kernel
 def detour_of(columns: int, rows: int) -> int:
     """How much longer a path is preferred to one through a wall thinner than a cell [units]."""
     return DETOUR * (columns + rows) * STRAIGHT

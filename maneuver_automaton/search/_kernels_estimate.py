@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, kernel
 from maneuver_automaton.collision.arrays import Field
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_distance import distance_at, pop, push
@@ -19,7 +19,7 @@ from maneuver_automaton.search._kernels_nodes import FULL_TURN
 from maneuver_automaton.search.arrays import CostTable, DistanceGrid, Task
 
 
-@inlined_kernel
+@bare_inner_kernel
 def table_value(
     table: CostTable, task: Task, aim: int, x: float, y: float, heading: float
 ) -> float:
@@ -62,7 +62,7 @@ def table_to_go(table: CostTable, task: Task, x: float, y: float, heading: float
     return least
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cost_to_go(
     task: Task,
     grid: DistanceGrid,
@@ -97,7 +97,7 @@ def cost_to_go(
     return estimate + known.surplus[trim]  # of no trim, -1, the last
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cell_of(x: float, y: float, heading: float, cell: float, half: int, n_headings: int) -> int:
     """Number of the cell of a pose, of all headings, rows and columns; -1 outside."""
     i = math.floor(x / cell + 0.5) + half

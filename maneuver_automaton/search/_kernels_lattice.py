@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, shared_kernel
 from maneuver_automaton.collision._kernels_clearance import field_bound
 from maneuver_automaton.collision._kernels_swept import FREE as NOTHING_MET
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, overlaps
@@ -90,7 +90,7 @@ def expand(search: LatticeSearch, n: int, upper_bound: float) -> int:
     return expanded(search, n, upper_bound)
 
 
-@bare_inner_kernel
+@shared_kernel
 def expanded(search: LatticeSearch, n: int, upper_bound: float) -> int:
     """Expand up to `n` nodes, the roots first; stops at the first connection if the task says so.
 
@@ -157,7 +157,7 @@ def _push_roots(
         add_node(arrays, slot, key, row, (-1, trim, 0, 0, r, ROOTED), order)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
     """Children of a node by coasts of the trims of its class, shorter ones first.
 
@@ -333,7 +333,7 @@ def relax_maneuvers(search: LatticeSearch, node: int, upper_bound: float) -> Non
         add_node(arrays, slot, key, row, link, cost + weight * ahead)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def connect_ends(search: LatticeSearch, node: int, upper_bound: float, estimate: float) -> None:
     """Analytic expansion: reach the other end by a word; keeps the cheapest plan found.
 

@@ -30,7 +30,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search.arrays import CellSizes, LatticeArrays, SearchArrays, Task
 from maneuver_automaton.words._kernels_library import class_of
@@ -60,7 +60,7 @@ PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
 ) = range(13)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cells_along(cell: float, far: float, others: int) -> int:
     """Number of cells along a side of a window [m] that have numbers of their own, a power of two.
 
@@ -75,7 +75,7 @@ def cells_along(cell: float, far: float, others: int) -> int:
     return sides
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cell_key(
     cells: CellSizes, pose: tuple[float, float, float, float], layer: int, time: float, fine: int
 ) -> int:
@@ -103,7 +103,7 @@ def cell_key(
     return ((above * turns + k) * sides + j) * sides + i
 
 
-@inlined_kernel
+@bare_inner_kernel
 def layer_of(cells: CellSizes, lib: LatticeArrays, trim: int, gear: int, n_trims: int) -> int:
     """Number of a node's layer: its class, and the gear, trim and count that prices or limits need.
 
@@ -119,7 +119,7 @@ def layer_of(cells: CellSizes, lib: LatticeArrays, trim: int, gear: int, n_trims
     return layer
 
 
-@inlined_kernel
+@bare_inner_kernel
 def first_slot(key: int, mask: int) -> int:
     """Row of a hash table, of `mask` + 1 rows, at which the probes for a key begin.
 
@@ -131,7 +131,7 @@ def first_slot(key: int, mask: int) -> int:
     return ((mixed * 0x9E3779B1) >> 15) & mask
 
 
-@inlined_kernel
+@bare_inner_kernel
 def slot_of(table: IntArray, generation: int, key: int) -> int:
     """Row of a key in the hash table, or the free one where it belongs.
 
@@ -145,14 +145,14 @@ def slot_of(table: IntArray, generation: int, key: int) -> int:
     return slot
 
 
-@inlined_kernel
+@bare_inner_kernel
 def node_in(table: IntArray, generation: int, slot: int) -> int:
     """Node that a row of the hash table holds; -1 if it is free."""
     entry = table[slot, 1]
     return entry & NODE_BITS if entry >> 31 == generation else -1
 
 
-@inlined_kernel
+@bare_inner_kernel
 def add_node(
     arrays: SearchArrays,
     slot: int,
@@ -180,7 +180,7 @@ def add_node(
     state[HEAP] += 1
 
 
-@inlined_kernel
+@bare_inner_kernel
 def open_node(arrays: SearchArrays, task: Task, upper_bound: float) -> int:
     """The most promising node that is open, taken from the heap; -1 if there is none."""
     links, state = arrays.links, arrays.state

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, shared_kernel
 from maneuver_automaton.collision._kernels_clearance import SHARP, field_bound, near_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.collision.arrays import WorldArrays
@@ -28,7 +28,7 @@ GAUSS = 0.5 / math.sqrt(3.0)  # of a step: both points of the rule from its midd
 AHEAD, BACK, LASTING = range(3)  # sheets of the raster: per metre ahead and back, per second
 
 
-@inlined_kernel
+@bare_inner_kernel
 def places_cost(scene: Scene) -> bool:
     """Whether there is anything to be paid for places."""
     return scene.place.weight > 0.0 or scene.place.value.shape[3] > 0
@@ -85,7 +85,7 @@ def raster_rate(place: PlaceArrays, x: float, y: float, heading: float, sheet: i
     return found
 
 
-@inlined_kernel
+@bare_inner_kernel
 def place_rate(
     place: PlaceArrays, pose: tuple[float, float, float, float], twist: Array, nearest: float
 ) -> float:
@@ -104,7 +104,7 @@ def place_rate(
     return rate
 
 
-@bare_inner_kernel
+@shared_kernel
 def coast_place(
     scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> float:
@@ -149,7 +149,7 @@ def part_along(
     return x, y, heading, pose[3] + 0.5 * (pieces.low[k] + pieces.high[k])
 
 
-@bare_inner_kernel
+@shared_kernel
 def edge_place(
     scene: Scene, lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
 ) -> float:

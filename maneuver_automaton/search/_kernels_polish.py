@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, shared_kernel
 from maneuver_automaton.search._kernels_problem import (
     Candidates,
     Found,
@@ -208,7 +208,7 @@ def polish_candidates(
     polish_all(problem, links, candidates, found, max_trims)
 
 
-@inner_kernel
+@shared_kernel
 def polish_all(
     problem: WordProblem, links: Links, candidates: Candidates, found: Found, max_trims: int
 ) -> None:

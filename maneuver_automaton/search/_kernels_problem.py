@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
 from maneuver_automaton.groups._kernels import back_from, compose
 from maneuver_automaton.words._kernels_times import TimesProblem
 
@@ -116,7 +116,7 @@ def word_extra(problem: WordProblem, word: IntArray, n: int) -> float:
     return problem.fixed[COST] + switch_prices(problem, word, n)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def switch_prices(problem: WordProblem, word: IntArray, n: int) -> float:
     """Price of the switches of a word.
 
@@ -228,7 +228,7 @@ def room_for(problem: WordProblem, n: int) -> WordProblem:
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def look_ahead(
     problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int
 ) -> None:
@@ -258,7 +258,7 @@ def look_ahead(
         before = after
 
 
-@inlined_kernel
+@bare_inner_kernel
 def class_after(problem: WordProblem, links: Links, word: IntArray, n: int, i: int) -> int:
     """Class of trims that the transition before position `i` leads to; -1 for no transition.
 
@@ -271,7 +271,7 @@ def class_after(problem: WordProblem, links: Links, word: IntArray, n: int, i: i
     return links.goal
 
 
-@inlined_kernel
+@bare_inner_kernel
 def look(
     problem: WordProblem, links: Links, seen: WordProblem, word: IntArray, n: int, rows: IntArray
 ) -> None:
@@ -303,7 +303,7 @@ def look(
             seen.trims.parallel[k, i] = seen.trims.parallel[i, k]
 
 
-@inlined_kernel
+@bare_inner_kernel
 def copy_row(problem: WordProblem, trim: int, seen: WordProblem, row: int) -> None:
     """What a search knows of a trim, as a row of the problem that is seen."""
     seen.trims.numbers[row] = trim

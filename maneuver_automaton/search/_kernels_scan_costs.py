@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_problem import (
     AIM,
@@ -40,7 +40,7 @@ def affordable(
     return reach
 
 
-@inlined_kernel
+@bare_inner_kernel
 def any_node_may_do(
     problem: WordProblem,
     candidates: Candidates,
@@ -97,7 +97,7 @@ def any_node_may_do(
     return False
 
 
-@inlined_kernel
+@bare_inner_kernel
 def nearly_cheap(problem: WordProblem, word: IntArray, n: int, upper_bound: float) -> float:
     """What the trims of a word may cost at a node for it to be looked at."""
     if problem.scan.slack == np.inf:
@@ -119,7 +119,7 @@ def may_be_cheap(one: float, other: float, most: float) -> bool:
     return min(one, other) - change < most
 
 
-@inlined_kernel
+@bare_inner_kernel
 def coasting_cost(
     problem: WordProblem, word: IntArray, triple: IntArray, free: int, time: float, solved: Array
 ) -> float:
@@ -133,7 +133,7 @@ def coasting_cost(
     return cost
 
 
-@inlined_kernel
+@bare_inner_kernel
 def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int) -> float:
     """Best price per metre among the trims of a word but one; -inf where one of them pays."""
     price = np.inf
@@ -145,7 +145,7 @@ def least_per_metre(problem: WordProblem, word: IntArray, n: int, left_out: int)
     return price
 
 
-@inlined_kernel
+@bare_inner_kernel
 def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) -> float:
     """Lower bound of what coasting costs in a word whose first trim lasts `time`.
 
@@ -166,7 +166,7 @@ def least_after(problem: WordProblem, trim: int, time: float, per_metre: float) 
     return problem.library.rates[trim] * time + (left * per_metre if left > NONE_LEFT else 0.0)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def is_met_nearby(
     problem: WordProblem, word: IntArray, triple: IntArray, lack: float, before: float
 ) -> bool:

@@ -33,7 +33,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.search._kernels_connection import edge_inside, edge_proven
@@ -67,7 +67,7 @@ COLUMN, ROW, STATE, PARENT, EDGE = range(5)
 ) = range(7)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def place_in(table: IntArray, column: int, row: int) -> tuple[int, int, int]:
     """Number of a place, -1 if it has none; its row of the hash table, and its key there."""
     key = ((column & 0x3FFFFFFF) << ROW_BITS) | (row & 0x3FFFFFFF)
@@ -75,7 +75,7 @@ def place_in(table: IntArray, column: int, row: int) -> tuple[int, int, int]:
     return node_in(table, SEARCH, slot), slot, key
 
 
-@inlined_kernel
+@bare_inner_kernel
 def place_of(search: GraphArrays, column: int, row: int) -> int:
     """Number of a place, a new one if it has none."""
     place, slot, key = place_in(search.table, column, row)
@@ -88,7 +88,7 @@ def place_of(search: GraphArrays, column: int, row: int) -> int:
     return place
 
 
-@inlined_kernel
+@bare_inner_kernel
 def least_to_go(
     aims: Aims, free: FreeCosts, cell: float, column: int, row: int, state: int
 ) -> float:
@@ -111,7 +111,7 @@ def least_to_go(
     return float(max(max(least, 0.0) * aims.per_metre + aims.surplus[state], free.most))
 
 
-@inlined_kernel
+@bare_inner_kernel
 def aim_at(aims: Aims, x: float, y: float, state: int) -> int:
     """Number of the aim that holds a place of the lattice [m] in a state; -1 if none does."""
     for g in range(aims.place.shape[0]):
@@ -121,7 +121,7 @@ def aim_at(aims: Aims, x: float, y: float, state: int) -> int:
     return -1
 
 
-@inlined_kernel
+@bare_inner_kernel
 def clearance_at(tested: Tested, pose: tuple[float, float, float, float]) -> float:
     """Clearance of the body at a pose beyond the distance to keep: a bound, exact near contact."""
     x, y, heading, z = pose
@@ -135,7 +135,7 @@ def clearance_at(tested: Tested, pose: tuple[float, float, float, float]) -> flo
     return least
 
 
-@inlined_kernel
+@bare_inner_kernel
 def is_far_inside(window: Array, x: float, y: float, travel: float) -> bool:
     """Whether a pose that moves no farther than `travel` stays inside a window."""
     d_x, d_y = x - window[4], y - window[5]
@@ -148,7 +148,7 @@ def is_far_inside(window: Array, x: float, y: float, travel: float) -> bool:
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def met_along(
     coarse: Tested,
     fine: Tested,
@@ -180,7 +180,7 @@ def met_along(
     return FREE if edge_proven(fine.scene, fine.lib, edge, pose, 0.0) >= 0.0 else BLOCKED
 
 
-@inlined_kernel
+@bare_inner_kernel
 def pose_of(
     lattice: StateLattice, column: int, row: int, state: int
 ) -> tuple[float, float, float, float]:
@@ -189,7 +189,7 @@ def pose_of(
     return x + c * u - s * v, y + s * u + c * v, turn + lattice.heading[state], 0.0
 
 
-@inlined_kernel
+@bare_inner_kernel
 def end_of(
     search: GraphArrays, lattice: StateLattice, item: int
 ) -> tuple[int, int, int, int, int, float]:

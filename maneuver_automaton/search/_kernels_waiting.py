@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, inlined_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.search._kernels_coast import coast_free, coast_proven, may_stay
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search.arrays import PathArrays, PathSearch
@@ -107,7 +107,7 @@ def _reach(search: PathSearch, joint: int, arrival: float, parent: int, left: fl
     return until
 
 
-@inlined_kernel
+@bare_inner_kernel
 def _pose(path: PathArrays, joint: int) -> tuple[float, float, float, float]:
     """Pose (x, y, heading, z) at a joint."""
     return path.poses[joint, 0], path.poses[joint, 1], path.poses[joint, 2], path.poses[joint, 3]

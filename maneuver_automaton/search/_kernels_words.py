@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, shared_kernel
 from maneuver_automaton.search._kernels_polish import polish_all
 from maneuver_automaton.search._kernels_problem import (
     COST,
@@ -224,7 +224,7 @@ def passing_words(
             closed_form_words(seen, candidates, kept, n - 1, triple, room, upper_bound)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def first_of_class(links: Links, wanted: int) -> int:
     """The first trim of a class."""
     for trim in range(links.class_of.size):
@@ -233,7 +233,7 @@ def first_of_class(links: Links, wanted: int) -> int:
     return -1
 
 
-@inlined_kernel
+@bare_inner_kernel
 def promising(
     problem: WordProblem, left: WordProblem, word: IntArray, n: int, upper_bound: float
 ) -> bool:
@@ -273,7 +273,7 @@ def promising(
 # inlined or called, a scan of words with transitions takes twice the time.
 
 
-@inner_kernel
+@shared_kernel
 def propose_words(
     problem: WordProblem,
     links: Links,
@@ -356,7 +356,7 @@ def word_of_number(n_trims: int, word: IntArray, n: int, number: int, tail: int)
         number //= n_trims
 
 
-@inlined_kernel
+@bare_inner_kernel
 def prepare_word(
     problem: WordProblem,
     candidates: Candidates,

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import inlined_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
 from maneuver_automaton.words.library import LibraryArrays
 
 NO_TRIM = -1
 
 
-@inlined_kernel
+@bare_inner_kernel
 def price_of_switch(lib: LibraryArrays, before: int, gear: int, trim: int) -> float:
     """Price of going on with `trim` after `before`, in `gear` the last that drove."""
     price = 0.0
@@ -22,13 +22,13 @@ def price_of_switch(lib: LibraryArrays, before: int, gear: int, trim: int) -> fl
     return price
 
 
-@inlined_kernel
+@bare_inner_kernel
 def class_of(lib: LibraryArrays, trim: int) -> int:
     """Class of a trim; of none the first, to which a kinematic vehicle's trims belong."""
     return lib.class_of[trim] if trim >= 0 else 0
 
 
-@inlined_kernel
+@bare_inner_kernel
 def displacement_of(lib: LibraryArrays, before: int, after: int) -> tuple[float, float, float]:
     """Displacement (x, y, heading) of the transition between two trims."""
     a, b = class_of(lib, before), class_of(lib, after)
@@ -39,19 +39,19 @@ def displacement_of(lib: LibraryArrays, before: int, after: int) -> tuple[float,
     )
 
 
-@inlined_kernel
+@bare_inner_kernel
 def rise_of(lib: LibraryArrays, before: int, after: int) -> float:
     """Altitude that the transition between two trims gains."""
     return lib.transitions.displacement[class_of(lib, before), class_of(lib, after), 3]
 
 
-@inlined_kernel
+@bare_inner_kernel
 def cost_between(lib: LibraryArrays, before: int, after: int) -> float:
     """Cost of the transition between two trims; inf where there is none."""
     return lib.transitions.cost[class_of(lib, before), class_of(lib, after)]
 
 
-@inlined_kernel
+@bare_inner_kernel
 def time_between(lib: LibraryArrays, before: int, after: int) -> float:
     """Duration of the transition between two trims."""
     return lib.transitions.time[class_of(lib, before), class_of(lib, after)]

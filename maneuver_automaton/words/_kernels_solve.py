@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton._compile import inner_kernel, kernel, shared_kernel
 from maneuver_automaton.words._kernels_times import (
     TimesProblem,
     assign,
@@ -299,7 +299,7 @@ def finish(
     return worst, slope, p
 
 
-@inner_kernel
+@shared_kernel
 def solve_from(problem: TimesProblem, times: Array, barrier: float) -> tuple[int, Array, float]:
     """Interior point, then refinement; `times` in place. Returns (status, multipliers, slope)."""
     n = times.size

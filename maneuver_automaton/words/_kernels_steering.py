@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inlined_kernel, inner_kernel, kernel
+from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 
 
 @inner_kernel
@@ -161,7 +161,7 @@ def steer_two(
         out[0], out[1] = two_lines(z - d, v_a, v_b * unit(heading), tolerance)
 
 
-@inlined_kernel
+@bare_inner_kernel
 def steer(
     a: tuple[complex, float],
     step_ab: tuple[complex, float],
