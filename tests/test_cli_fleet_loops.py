@@ -97,6 +97,7 @@ class TestMpc:
         ):
             assert said in printed.out
 
+    @pytest.mark.slow
     def test_the_loop_is_that_of_the_library(self, driven, monkeypatch):
         """Bit for bit, from the same first plans: these go by the clock."""
         scenario = load_scenario("x.yaml")
@@ -233,7 +234,11 @@ class TestMpc:
 
 @pytest.mark.parametrize(
     "file",
-    [one for one in SCENARIOS if "receding_horizon:" in one.read_text()],
+    [
+        pytest.param(one, marks=[] if one.stem == "alcove" else pytest.mark.slow)
+        for one in SCENARIOS
+        if "receding_horizon:" in one.read_text()
+    ],
     ids=lambda f: f.stem,
 )
 def test_every_scenario_with_a_loop(file, folder):

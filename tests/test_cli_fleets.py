@@ -417,7 +417,7 @@ def test_every_scenario_plans(path):
         time_limit=120.0,
         objective=scenario.settings.objective,
         orders=scenario.settings.orders,
-        max_rounds=2,
+        max_rounds=0,
     )
     assert result.status is fleet.FleetStatus.FOUND, result.reasons
     assert result.clearance_m >= scenario.fleet.margin - 1e-9

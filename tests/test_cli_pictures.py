@@ -42,6 +42,7 @@ def plan(folder, processors):
 
 
 @linux
+@pytest.mark.slow
 def test_pictures_are_the_same_wherever_they_are_drawn(tmp_path):
     there = os.sched_getaffinity(0)
     if len(there) < 2:
