@@ -9,6 +9,7 @@ from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
 QUICK = {  # the others are slow
+    "show in a notebook": ("plan", "fleet", "statistics"),
     "film": ("plan",),
     "row of a folder": ("closed loop", "road fleet"),
 }
