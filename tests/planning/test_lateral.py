@@ -124,6 +124,7 @@ def test_a_limit_costs_what_optimal_control_says(limited):
 
 
 @compiled_only
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
     zone = Zone(shape=PLANE, max_lateral_acceleration=MOST)

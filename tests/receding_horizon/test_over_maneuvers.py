@@ -409,6 +409,7 @@ def test_a_vehicle_that_cannot_rest_meets_zones_and_a_fixed_time(case):
 
 
 class TestAmongWhatMoves:
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_a_moved_problem_has_the_moved_loop(self):
         """The goal is taken until a disc leaves it: it approaches, waits, and arrives."""
@@ -427,6 +428,7 @@ class TestAmongWhatMoves:
         assert [step.decision for step in one.steps] == [step.decision for step in two.steps]
         assert (move @ SE2(one.poses)).pose[:, :2] == pytest.approx(two.poses[:, :2], abs=1e-6)
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_where_it_stands_it_makes_room(self):
         """Its goal is walled in, so that there is no plan; what comes drives over its start."""
@@ -469,6 +471,7 @@ class TestAmongWhatMoves:
             )
             assert audit.passed, audit.reason
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_what_has_stopped_is_planned_around_as_if_it_had_always_stood(self):
         stopped = Motion([0.0, 1.0], [[2.5, 3.0, 0.0], [2.5, 0.2, 0.0]])
