@@ -153,8 +153,9 @@ def with_inertia(n: Plain) -> float | None:
     return ma.plan(stated, time_limit=n(60)).cost
 
 
-QUICK = (planned, verified)
+QUICK = (planned,)
 OTHERS = (
+    verified,
     planned_in_free_space,
     planned_within,
     planned_among_movers,

@@ -189,9 +189,9 @@ def test_plans_say_what_they_cost_and_where():
     assert result.audit.passed
     assert result.certificate is None
     assert result.cost == pytest.approx(here.cost_of(result.plan))
-    assert result.cost <= here.cost_of(plan(replace(here, place_costs=()), time_limit=60.0).plan) * (
-        1 + 1e-9
-    )
+    assert result.cost <= here.cost_of(
+        plan(replace(here, place_costs=()), time_limit=60.0).plan
+    ) * (1 + 1e-9)
     assert result.audit.place_price == pytest.approx(
         result.cost - here.invariant_cost_of(result.plan), abs=1e-3 * result.cost
     )

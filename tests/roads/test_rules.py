@@ -11,7 +11,7 @@ import pytest
 from maneuver_automaton.cli import run
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.recording.road_drives import joint_notes
-from maneuver_automaton.roads import RoadVehicle, drive_road, drive_roads, plan_road
+from maneuver_automaton.roads import RoadVehicle, drive_road, drive_roads, plan_road, plan_roads
 from maneuver_automaton.roads.lanelets import Lanelet, StopLine
 from maneuver_automaton.roads.route import route_of
 from maneuver_automaton.roads.rules import barriers
@@ -177,20 +177,19 @@ def test_a_moved_scene_has_the_moved_drive(tmp_path):
     np.testing.assert_allclose(here.decision.states, there.decision.states, atol=1e-7)
 
 
-def test_several_vehicles_obey_each_for_itself(tmp_path):
+@pytest.mark.parametrize("move", [plan_roads, pytest.param(drive_roads, marks=pytest.mark.slow)])
+def test_several_vehicles_obey_each_for_itself(tmp_path, move):
     lights = light(8, ("red", 40), ("green", 1000))
     first, second = (
         scene_of(tmp_path, *road(LIGHT, lights, x=x, speed=8.0, end=end))
         for x, end in ((40.0, 160), (15.0, 260))
     )
-    scenes = {"first": first, "second": second}
-    drive = drive_roads(scenes)
-    for found in (drive.before, drive):
-        assert len(found.plans) == 2
-        for one in found.results.values():
-            times, middle, _ = driven_of(one)
-            assert times[over(middle[:, 0])].min() >= 4.0
-        assert joint_notes(found) == []
+    found = move({"first": first, "second": second})
+    assert len(found.plans) == 2
+    for one in found.results.values():
+        times, middle, _ = driven_of(one)
+        assert times[over(middle[:, 0])].min() >= 4.0
+    assert joint_notes(found) == []
 
 
 def test_notes_are_in_the_terminal_and_in_the_documents(tmp_path, monkeypatch, capsys):
