@@ -23,7 +23,7 @@ os.environ.pop("COLUMNS", None)  # pytest's readline sets it for the processes o
 if _kernels is None:  # the user's cache cannot be written, or not be trusted
     kernel_folder.cache_clear()
 
-SOME = 3  # every third of the slow parameters of a test is tried before a change is offered
+SOME = 6  # every sixth of the slow parameters of a test is tried before a change is offered
 
 for name, examples in (("few", FEW), ("many", MANY)):
     settings.register_profile(

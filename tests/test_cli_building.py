@@ -20,7 +20,10 @@ trims: {speed: [-0.5, 0.0, 0.5], turn_rate: [-1.0, 0.0, 1.0]}
 
 @pytest.mark.parametrize(
     ("command", "text", "shown"),
-    [("build", ROBOT, "joining the trims"), ("design", FILE, "choosing trims, and proving")],
+    [
+        ("build", ROBOT, "joining the trims"),
+        pytest.param("design", FILE, "choosing trims, and proving", marks=pytest.mark.slow),
+    ],
 )
 def test_a_terminal_shows_that_something_goes_on(tmp_path, command, text, shown):
     (tmp_path / "a.yaml").write_text(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -39,10 +40,21 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a fleet and its loop."""
+    made = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(made)
+        Path("x.yaml").write_text(LOOP)
+        assert run(["mpc", "x.yaml", "--quiet"]) == 0
+    return made
+
+
 @pytest.fixture
-def driven(folder):
-    """The document of a loop."""
-    assert run(["mpc", "x.yaml", "--quiet", "--no-plot"]) == 0
+def driven(folder, made):
+    """The document of a loop, and its files in the current folder."""
+    shutil.copytree(made / "out", "out")
     return document()
 
 
@@ -85,6 +97,7 @@ class TestMpc:
         ):
             assert said in printed.out
 
+    @pytest.mark.slow
     def test_the_loop_is_that_of_the_library(self, driven, monkeypatch):
         """Bit for bit, from the same first plans: these go by the clock."""
         scenario = load_scenario("x.yaml")
@@ -221,7 +234,11 @@ class TestMpc:
 
 @pytest.mark.parametrize(
     "file",
-    [one for one in SCENARIOS if "receding_horizon:" in one.read_text()],
+    [
+        pytest.param(one, marks=[] if one.stem == "alcove" else pytest.mark.slow)
+        for one in SCENARIOS
+        if "receding_horizon:" in one.read_text()
+    ],
     ids=lambda f: f.stem,
 )
 def test_every_scenario_with_a_loop(file, folder):
@@ -322,7 +339,6 @@ def test_a_damaged_file_is_told_in_one_line(driven, capsys, change):
 
 class TestPlot:
     def test_picture_film_and_page(self, driven):
-        assert run(["mpc", "x.yaml", "--quiet"]) == 0
         drawn = Path("out/closed_loop.png").read_bytes()
         assert run(["plot", "out/closed_loop.json", "--out", "again.png"]) == 0
         same = Path("again.png").read_bytes() == drawn  # pytest would compare them byte by byte

@@ -26,6 +26,7 @@ from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import crossing, least_distances
 from tests.formats.outside import DATA, needs_data
 from tests.formats.test_cl_cbs import PROBLEM
+from tests.quickly import quick_are
 from tests.scenario.files import SCENARIO
 
 SCENARIOS = sorted((Path(__file__).parents[1] / "scenarios/fleets").glob("*.yaml"))
@@ -407,7 +408,11 @@ class TestFile:
         assert not one_alone.passed  # b has none
 
 
-@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    quick_are([one for one in SCENARIOS if one.stem not in ("alcove", "forklift_yard")], SCENARIOS),
+    ids=lambda path: path.stem,
+)
 def test_every_scenario_plans(path):
     """Each vehicle alone, then all: found, proven apart, each at its goal."""
     assert path.read_text(encoding="utf-8").startswith("# ")
@@ -417,7 +422,7 @@ def test_every_scenario_plans(path):
         time_limit=120.0,
         objective=scenario.settings.objective,
         orders=scenario.settings.orders,
-        max_rounds=2,
+        max_rounds=0,
     )
     assert result.status is fleet.FleetStatus.FOUND, result.reasons
     assert result.clearance_m >= scenario.fleet.margin - 1e-9

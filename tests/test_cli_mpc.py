@@ -355,6 +355,7 @@ def test_a_tiny_budget_still_arrives(folder):
     assert kinds <= {"time budget"}
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_an_animation_on_demand(folder):
     Path("x.yaml").write_text(LOOP.replace("step_s: 0.5", "step_s: 2.0"))

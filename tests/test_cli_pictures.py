@@ -42,6 +42,7 @@ def plan(folder, processors):
 
 
 @linux
+@pytest.mark.slow
 def test_pictures_are_the_same_wherever_they_are_drawn(tmp_path):
     there = os.sched_getaffinity(0)
     if len(there) < 2:
@@ -53,7 +54,11 @@ def test_pictures_are_the_same_wherever_they_are_drawn(tmp_path):
 
 @linux
 @pytest.mark.parametrize(
-    ("what", "said"), [("write, {path!r}, 'drawn'", "True"), ("fail, {path!r}", "False")]
+    ("what", "said"),
+    [
+        pytest.param("write, {path!r}, 'drawn'", "True", marks=pytest.mark.slow),
+        ("fail, {path!r}", "False"),
+    ],
 )
 def test_what_fails_is_told(what, said, tmp_path):
     if len(os.sched_getaffinity(0)) < 2:

@@ -37,6 +37,7 @@ def test_a_scenario_is_driven(folder, capsys):
     assert "reached" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn(folder):
     assert run(["mpc", "road.xml", "--steps", "5", "--animate", "--quiet"]) == 1
     for name in ("closed_loop.png", "closed_loop.gif", "closed_loop.html"):

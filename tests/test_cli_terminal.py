@@ -63,6 +63,7 @@ def test_cost_bound_gap_and_clearance_are_shown_in_place(tmp_path, more):
     assert "\n" not in text.strip()  # one line, written again and again
 
 
+@pytest.mark.slow
 def test_quiet_is_quiet_on_a_terminal_too(tmp_path):
     scenario = SCENARIOS / "parking.yaml"
     assert on_a_terminal("plan", scenario, "--no-plot", "--quiet", cwd=tmp_path) == ""

@@ -52,11 +52,22 @@ def room_of(path: Path) -> str:
     return parts[0] if len(parts) > 1 else "top"
 
 
+def statements_in(node: ast.AST) -> Iterator[ast.AST]:
+    """What is directly within a node, without expressions, of which there are many."""
+    return (one for one in ast.iter_child_nodes(node) if not isinstance(one, ast.expr))
+
+
+def all_statements(tree: ast.AST) -> Iterator[ast.AST]:
+    for child in statements_in(tree):
+        yield child
+        yield from all_statements(child)
+
+
 def imports_of(tree: ast.AST) -> Iterator[tuple[str, bool]]:
     """Modules that a file imports, for types alone too, and whether within a function."""
 
     def walk(node: ast.AST, *, within: bool) -> Iterator[tuple[str, bool]]:
-        for child in ast.iter_child_nodes(node):
+        for child in statements_in(node):
             if isinstance(child, ast.ImportFrom) and child.module:
                 yield from ((f"{child.module}.{one.name}", within) for one in child.names)
             elif isinstance(child, ast.Import):
@@ -83,7 +94,7 @@ def circles() -> list[list[str]]:
 
 def classes() -> Iterator[tuple[Path, ast.ClassDef]]:
     for path, tree in trees().items():
-        yield from ((path, node) for node in ast.walk(tree) if isinstance(node, ast.ClassDef))
+        yield from ((path, node) for node in all_statements(tree) if isinstance(node, ast.ClassDef))
 
 
 def is_record(node: ast.ClassDef) -> bool:
@@ -124,7 +135,7 @@ def one_use_functions() -> list[str]:
     short = {}
     for path, tree in trees().items():
         used.update(re.findall(r"\w+", path.read_text(encoding="utf-8")))
-        for node in ast.walk(tree):
+        for node in all_statements(tree):
             if not isinstance(node, ast.FunctionDef) or node.decorator_list:
                 continue
             body = node.body[1:] if ast.get_docstring(node) else node.body

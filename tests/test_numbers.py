@@ -153,8 +153,16 @@ def with_inertia(n: Plain) -> float | None:
     return ma.plan(stated, time_limit=n(60)).cost
 
 
-QUICK = (planned, planned_in_free_space, verified)
-OTHERS = (planned_within, planned_among_movers, planned_by_a_planner, driven, with_inertia)
+QUICK = (planned,)
+OTHERS = (
+    verified,
+    planned_in_free_space,
+    planned_within,
+    planned_among_movers,
+    planned_by_a_planner,
+    driven,
+    with_inertia,
+)
 SCENES = {one.__name__: one for one in QUICK + OTHERS}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib.metadata
 import json
 import re
@@ -15,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import maneuver_automaton as ma
+from tests.test_house import imports_of, trees
 
 HEAVY = ("numba", "scipy", "networkx", "matplotlib", "fcl", "casadi", "pydantic", "shapely", "yaml")
 
@@ -106,12 +106,8 @@ def distributions_of(requirements: Iterable[str]) -> set[str]:
 def imported() -> set[str]:
     """Distributions of all modules that the package imports, wherever in its files."""
     names = set()
-    for path in (ROOT / "maneuver_automaton").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Import):
-                names |= {alias.name.partition(".")[0] for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                names.add(node.module.partition(".")[0])
+    for tree in trees().values():
+        names |= {name.partition(".")[0] for name, _ in imports_of(tree)}
     outside = names - set(sys.stdlib_module_names) - {"maneuver_automaton"}
     return {DISTRIBUTIONS.get(name, name.replace("_", "-")) for name in outside}
 

@@ -63,9 +63,11 @@ LONG = {  # pages whose code, and words in commands that, take seconds
     "tight_aisle",
     "trailers",
     "tune",
+    "wind",
     "turn_on_the_spot",
     "why_no_plan",
 }
+LONGEST = {"gear_changes", "replanning", "tight_aisle"}
 
 
 def blocks(language: str, text: str = TEXT) -> list[str]:
@@ -80,16 +82,18 @@ def code_of_pages() -> list[Any]:
             match["code"],
             match["output"],
             id=f"{page.stem}: {first_words(match['code'])}",
-            marks=[pytest.mark.slow] if page.stem in LONG or takes_long(match["code"]) else [],
+            marks=marks_of(page, match["code"]),
         )
         for page, text in TEXTS.items()
         for match in measure.CODE.finditer(text)
     ]
 
 
-def takes_long(code: str) -> bool:
-    """Whether a block goes through many scenarios, or starts processes."""
-    return "for name" in code or "distributed" in code
+def marks_of(page: Path, code: str) -> list[pytest.MarkDecorator]:
+    """How long a block takes that goes through many scenarios, or starts processes."""
+    several = "for name" in code
+    long = [pytest.mark.slow] if several or page.stem in LONG or "distributed" in code else []
+    return [*long, pytest.mark.exhaustive] if several or page.stem in LONGEST else long
 
 
 def first_words(text: str) -> str:

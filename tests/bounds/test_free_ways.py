@@ -19,7 +19,7 @@ FIELD = Path(__file__).parents[3] / "shared" / "data" / "field"
 ROBOT = Automaton.of_controls(
     Unicycle(), {"ahead": (0.4, 0.0), "left": (0.3, 0.6), "right": (0.3, -0.6), "spin": (0.0, 0.6)}
 )
-QUICKLY = range(0, 5000, 167)
+QUICKLY = range(0, 5000, 334)
 
 
 def batches(all_of_them, *, quick):
@@ -90,6 +90,7 @@ def test_a_wall_that_thick_parts_enclose_is_still_proven():
         )
 
 
+@pytest.mark.slow
 def test_towers_that_can_be_flown_over_enclose_nothing():
     glider = UserModel(
         name="glider",

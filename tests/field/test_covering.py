@@ -115,6 +115,7 @@ def test_swaths_keep_away_from_what_stands_in_the_field():
     assert problem.inner.distance(shapely.Point(20.0, 17.0)) > 6.0
 
 
+@pytest.mark.slow
 def test_with_inertia_swaths_are_driven_at_speed():
     car = ma.SecondOrderCar(wheelbase=2.0, max_speed=2.0, max_acceleration=1.0, max_steering=0.6,
                             max_steering_rate=1.0)  # fmt: skip

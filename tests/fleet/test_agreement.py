@@ -118,6 +118,8 @@ def driven_without(*numbers: int, steps: int = 40):
     return log, drops
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_each_message_lost_in_turn():
     """Whichever message is lost: every guarantee holds, and both arrive."""
     whole, drops = driven_without()

@@ -7,6 +7,7 @@ import pytest
 from benchmarks.fleets import DATA, least_distance
 from maneuver_automaton.fleet import FleetStatus, plan_fleet
 from maneuver_automaton.scenario import load_scenario
+from tests.quickly import quick_are
 
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the given problems are not here")
 
@@ -38,7 +39,7 @@ def check(name, most):
     assert result.lower_bound <= result.cost
 
 
-@pytest.mark.parametrize("name", SMALL)
+@pytest.mark.parametrize("name", quick_are([name for name in SMALL if "alcove" not in name], SMALL))
 def test_few_vehicles(name):
     check(name, SMALL[name])
 

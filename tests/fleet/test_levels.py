@@ -218,6 +218,7 @@ def test_pictures_show_the_distance_in_space():
     assert shown.min() == pytest.approx(2.5 - 1.5 - 0.3)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_moved_fleet_in_space_has_the_moved_plans():
     one = plan_fleet(over_a_truck(1.5), time_limit=30.0, max_rounds=0)

@@ -26,6 +26,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.robots import ROBOT, least_distance
 from tests.inertia import unicycle_automaton
+from tests.quickly import quick_are
 
 FIELD = Path(__file__).parents[2] / "../shared/data/field"
 BODY = Disc(0.3)
@@ -61,7 +62,7 @@ def is_good(fleet, result):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", quick_are([0, 1], range(3)))
 def test_who_stands_in_the_way_on_open_floor_is_passed(kind, seed):
     rng = np.random.default_rng(seed)
     by = SE2([*rng.uniform(-9.0, 9.0, 2), rng.uniform(-3.0, 3.0)])
@@ -75,7 +76,13 @@ def test_who_stands_in_the_way_on_open_floor_is_passed(kind, seed):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("idle", "turned"), [(3.5, 0.0), (2.2, 0.0), (4.8, math.pi)])
+@pytest.mark.parametrize(
+    ("idle", "turned"),
+    [
+        (2.2, 0.0),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in ((3.5, 0), (4.8, math.pi))),
+    ],
+)
 def test_who_stands_in_a_corridor_makes_room_in_the_bay(kind, idle, turned):
     fleet = bay(kind, idle, turned=turned)
     result = plan_fleet(fleet, time_limit=120.0, max_rounds=0)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.fleet import FleetProblem, simulate_fleet, verify_driven
+from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet, verify_driven
 from maneuver_automaton.formats.closed_loop_json import driven_document
 from maneuver_automaton.formats.documents import read_document
 from maneuver_automaton.formats.fleet_loop_json import (
@@ -39,10 +39,15 @@ LOOPS = {
 }
 
 
+def first_of(fleet):
+    """Plans to begin with, which nothing improves until a time is over."""
+    return plan_fleet(fleet, time_limit=60.0, max_rounds=0)
+
+
 @pytest.fixture(scope="module", params=LOOPS)
 def log(request):
     fleet = crossing(tolerance=0.05)
-    return simulate_fleet(fleet, step=0.5, steps=30, first_time_limit=1.0, **LOOPS[request.param])
+    return simulate_fleet(fleet, step=0.5, steps=30, first=first_of(fleet), **LOOPS[request.param])
 
 
 def document_of(log):
@@ -94,6 +99,7 @@ def test_a_vehicle_is_written_as_one_alone(log):
             np.testing.assert_allclose(plan.end, one["steps"][-1]["pose"], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_vehicles_with_inertia_and_other_kinds(tmp_path):
     scenario = load_scenario(SCENARIOS / "fleets" / "airfield.yaml")
     log = simulate_fleet(scenario.fleet, step=1.0, steps=12, first_time_limit=1.0)
@@ -111,7 +117,7 @@ def test_vehicles_with_inertia_and_other_kinds(tmp_path):
 def test_who_leaves_ends_where_it_left(tmp_path):
     fleet = crossing(tolerance=0.05)
     fleet = FleetProblem(fleet.problems, names=fleet.names, leaves=(True, False))
-    log = simulate_fleet(fleet, step=0.5, first_time_limit=1.0)
+    log = simulate_fleet(fleet, step=0.5, first=first_of(fleet))
     found = document_of(log)["vehicles"]["a"]
     assert found["reached"]
     assert found["steps"][-1]["time_s"] >= found["arrived_s"]
@@ -121,7 +127,8 @@ def test_who_leaves_ends_where_it_left(tmp_path):
 
 
 def test_interrupted_and_sources(tmp_path):
-    log = simulate_fleet(crossing(tolerance=0.05), step=0.5, steps=2, first_time_limit=1.0)
+    fleet = crossing(tolerance=0.05)
+    log = simulate_fleet(fleet, step=0.5, steps=2, first=first_of(fleet))
     path = tmp_path / "out" / "closed_loop.json"
     path.parent.mkdir()
     source = {"file": tmp_path / "x.yaml", "with": None, "case": None}
@@ -165,7 +172,8 @@ def test_interrupted_and_sources(tmp_path):
     ],
 )  # fmt: skip
 def test_a_damaged_file_is_told(tmp_path, change, message):
-    log = simulate_fleet(crossing(tolerance=0.05), step=0.5, steps=2, first_time_limit=1.0)
+    fleet = crossing(tolerance=0.05)
+    log = simulate_fleet(fleet, step=0.5, steps=2, first=first_of(fleet))
     path = tmp_path / "closed_loop.json"
     document = json.loads(json.dumps(document_of(log)))
     change(document)

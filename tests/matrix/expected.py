@@ -63,7 +63,18 @@ SLOW = {
             "same_plan_twice",
         )
     ),
-    *(("dear_switch_among_obstacles", vehicle) for vehicle in ("grid", "omni")),
+    *(
+        ("dear_switch_among_obstacles", vehicle)
+        for vehicle in (
+            "boat",
+            "car",
+            "four_wheel_steering_car",
+            "grid",
+            "omni",
+            "rear_steered_car",
+        )
+    ),
+    ("switch_price", "grid"),
 }
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
@@ -72,8 +83,7 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     ("boat", "loop_noise"),
     *(("stage", feature) for feature in ("discs", "moving_obstacles", "loop_obstacles")),
     ("stage", "moved_problem_among_obstacles"),
-    *(("user", feature) for feature in ("moving_ends", "loop", "polishing")),
-    ("boat_in_current", "plan_file"),
+    *(("user", feature) for feature in ("loop", "polishing")),
 }
 WITH_INERTIA_LONG = ("plan_file",)
 LONG_ONE_BY_ONE = {  # with -m slow
@@ -84,12 +94,12 @@ LONG_ONE_BY_ONE = {  # with -m slow
     ("glider", "heights"),
     ("car", "several_parts"),
     ("grid", "zones_crossed"),
-    ("boat_in_current", "loop"),
+    *(("boat_in_current", feature) for feature in ("loop", "plan_file")),
     ("user", "discs"),
     ("boat", "max_time_among_obstacles"),
     ("boat", "moved_problem_among_obstacles"),
     ("boat", "pictures"),
-    *(("user", feature) for feature in ("max_trims", "resume", "alternatives")),
+    *(("user", feature) for feature in ("max_trims", "resume", "alternatives", "moving_ends")),
     ("user", "same_plan_twice_among_obstacles"),
     ("hovercraft", "max_trims"),
     ("second_order_unicycle", "loop_obstacles"),
@@ -119,12 +129,15 @@ QUICK = frozenset(_quick())
 LONG = frozenset(_long())  # with -m slow; all that is in neither takes longest, -m exhaustive
 SLOW_MUTANTS = frozenset(
     {
+        "alternatives_among_obstacles",
         "carried_parts",
         "heights",
+        "max_time_among_obstacles",
         "moved_problem_among_obstacles",
         "moving_ends",
         "planner_with_all",
         "polishing",
+        "polishing_past_movers",
         "same_plan_twice_among_obstacles",
     }
 )

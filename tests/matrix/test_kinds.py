@@ -8,7 +8,11 @@ from tests.matrix.kinds import ACTIONS, KINDS, NOT_YET, SENSELESS, Refused
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
-QUICK = {"film": ("plan",), "row of a folder": ("plan", "closed loop")}  # the others are slow
+QUICK = {  # the others are slow
+    "show in a notebook": ("plan", "fleet", "statistics"),
+    "film": ("plan",),
+    "row of a folder": ("closed loop", "road fleet"),
+}
 
 
 def _cells():

@@ -203,7 +203,9 @@ def judged(problem, result):
     np.testing.assert_allclose(state[2:] - state[2], 0.0, atol=1e-4)
 
 
-@pytest.mark.parametrize("back", [False, True], ids=["there", "back again"])
+@pytest.mark.parametrize(
+    "back", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["there", "back again"]
+)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_plan_among_obstacles_is_driven_anew(name, back):
     problem = ma.load_scenario(SCENARIOS / f"{name}.yaml").problem

@@ -174,7 +174,7 @@ def test_a_fleet_starts_in_the_states_of_its_vehicles() -> None:
         ma.Problem(library, start, goal, start_state=state, footprint=body)
         for (start, goal), state in zip(ways, states, strict=True)
     ]
-    result = ma.plan_fleet(ma.FleetProblem(problems), time_limit=6.0)
+    result = ma.plan_fleet(ma.FleetProblem(problems), time_limit=60.0, max_rounds=0)
     first = result.results["1"]
     assert first.audit.passed
     np.testing.assert_allclose(begin_state(first.plan), states[0], atol=1e-12)

@@ -19,6 +19,7 @@ from maneuver_automaton.problem import Bounds, Horizon, Problem, SearchSettings
 from maneuver_automaton.search.lattice_trims import coarse_trims
 from maneuver_automaton.words.library import moving_trims
 from tests.planning.test_among_obstacles import assert_moved
+from tests.quickly import quick_are
 from tests.search.cases import compiled_only
 from tests.solids import check_plan
 
@@ -76,7 +77,10 @@ def test_a_plan_keeps_all_promises(name):
     assert lasting.min() >= horizon.min_coast - 1e-9
 
 
-@pytest.mark.parametrize("name", ["time", "mixed", "car", "switches cost", "any heading"])
+@pytest.mark.parametrize(
+    "name",
+    quick_are(["mixed", "any heading"], ["time", "mixed", "car", "switches cost", "any heading"]),
+)
 def test_all_trims_are_never_dearer_than_the_few_that_are_searched(name):
     """The searches are those of the few, expansion by expansion; the others only gain."""
     problem = CASES[name]
@@ -105,12 +109,12 @@ def test_an_effort_is_spread_over_the_time_there_is():
         assert result.plan.duration > 0.95 * 12.0
 
 
-@pytest.mark.parametrize("name", ["mixed", "car", "effort in a fixed time"])
+@pytest.mark.parametrize("name", quick_are(["mixed"], ["mixed", "car", "effort in a fixed time"]))
 def test_a_moved_problem_has_the_moved_plan(name):
     assert assert_moved(CASES[name], SE2([3.0, -2.0, 0.7]))
 
 
-@pytest.mark.parametrize("name", ["mixed", "effort in a fixed time"])
+@pytest.mark.parametrize("name", quick_are(["mixed"], ["mixed", "effort in a fixed time"]))
 def test_the_same_expansions_find_the_same_plan(name):
     again = plan(CASES[name], time_limit=LIMIT)
     assert again.plan.word == planned(name).plan.word

@@ -124,6 +124,8 @@ def test_a_limit_costs_what_optimal_control_says(limited):
 
 
 @compiled_only
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
     zone = Zone(shape=PLANE, max_lateral_acceleration=MOST)
     found = plan(posed(zones=[zone]), time_limit=200.0)
@@ -134,6 +136,7 @@ def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
 
 
 @compiled_only
+@pytest.mark.slow
 def test_a_zone_holds_in_its_half_of_the_plane(limited):
     zone = Zone(shape=BEYOND, max_lateral_acceleration=1.0)
     found = plan(posed(zones=[zone]), time_limit=200.0)

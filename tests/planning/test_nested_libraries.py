@@ -41,7 +41,11 @@ def problem(count: int, goal: list[float]) -> ma.Problem:
 
 
 @pytest.mark.parametrize(
-    ("goal", "optimum"), [([10.77, -4.52, -0.48], 11.83), ([0.28, 10.81, -2.24], 21.951)]
+    ("goal", "optimum"),
+    [
+        ([10.77, -4.52, -0.48], 11.83),
+        pytest.param([0.28, 10.81, -2.24], 21.951, marks=pytest.mark.slow),
+    ],
 )
 def test_turns_of_few_curvatures_are_polished_to_those_of_many(goal, optimum):
     """The optimum: the least cost that 17 curvatures or another start have led to."""
@@ -50,6 +54,8 @@ def test_turns_of_few_curvatures_are_polished_to_those_of_many(goal, optimum):
     assert costs == pytest.approx([optimum] * 3, rel=SAME)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_what_turns_in_another_way_is_moved_with_its_problem():
     pytest.importorskip("casadi")
     here = problem(3, [10.77, -4.52, -0.48])

@@ -165,6 +165,8 @@ def test_a_moved_scene_and_a_later_start_have_the_moved_polished_plan():
     np.testing.assert_allclose((by @ SE2(here.plan.end)).pose, moved.plan.end, atol=1e-6)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_what_moves_but_stays_is_polished_as_what_stands():
     stays = Obstacle(Box([0.8, 0.6]), motion=Motion([0.0, 9.0], [[2.0, 0.2, 0.5]] * 2))
     stands = Obstacle(Box([0.8, 0.6], [2.0, 0.2], 0.5))
@@ -173,6 +175,8 @@ def test_what_moves_but_stays_is_polished_as_what_stands():
     assert one.cost == pytest.approx(other.cost, rel=2e-3)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_behind_a_wall_that_drives_ahead_it_arrives_as_soon_as_on_paper():
     """Where it is as slow as the wall it touches that, and brakes to the goal from there."""
     wall = Motion([0.0, 40.0], [[1.0, 0.0, 0.0], [11.0, 0.0, 0.0]])
@@ -190,6 +194,7 @@ def test_behind_a_wall_that_drives_ahead_it_arrives_as_soon_as_on_paper():
     assert least - 1e-6 <= found[-1].duration < least + 0.06
 
 
+@pytest.mark.slow
 def test_what_comes_and_goes_leaves_the_plan_as_it_is_or_better():
     gate = Obstacle(Box([0.2, 12.0], [2.0, 0.0]), present_s=(0.0, 11.0))
     problem = posed(gate, search=SearchSettings(max_expansions=2000))
@@ -199,6 +204,7 @@ def test_what_comes_and_goes_leaves_the_plan_as_it_is_or_better():
     assert least <= result.cost <= unpolished(problem).cost
 
 
+@pytest.mark.slow
 def test_in_closed_loop_past_what_moves_no_motion_of_one_piece_is_driven():
     loop = simulate(posed(crossing()), step=0.5, steps=40, time_limit=60.0)
     assert loop.reached

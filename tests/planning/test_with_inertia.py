@@ -94,11 +94,11 @@ def test_a_moved_problem_has_the_moved_plan():
         [6.0, 2.0, 1.0],
         obstacles=(Obstacle(Box([1.0, 2.0], [3.0, 0.5])),),
         footprint=Box([0.5, 0.3]),
-        search=SearchSettings(max_expansions=3000),
+        search=SearchSettings(max_expansions=3000, improve=False),
         cost=Cost(time=1.0, effort=0.1),
         horizon=Horizon(max_time=500.0),
     )
-    one, other = plan(problem, time_limit=2.0), plan(problem.moved(by), time_limit=2.0)
+    one, other = plan(problem, time_limit=60.0), plan(problem.moved(by), time_limit=60.0)
     first, second = one.improvements[0][1], other.improvements[0][1]
     assert first == pytest.approx(second, abs=1e-9)
     assert other.terminal_error.position_m < 1e-9

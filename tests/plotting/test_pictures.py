@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from maneuver_automaton.collision import Box, Disc
-from maneuver_automaton.fleet import FleetProblem, simulate_fleet
+from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import Look, draw_plane, figure_of, player_of, save_picture
@@ -467,7 +467,8 @@ class TestFleets:
 
 def fleet_loop(**more):
     fleet = robots.crossing(tolerance=0.1, margin=0.2)
-    return simulate_fleet(fleet, step=0.5, steps=40, first_time_limit=1.0, **more)
+    first = plan_fleet(fleet, time_limit=60.0, max_rounds=0)
+    return simulate_fleet(fleet, step=0.5, steps=40, first=first, **more)
 
 
 @pytest.fixture(scope="module")

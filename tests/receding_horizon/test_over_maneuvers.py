@@ -34,6 +34,7 @@ from maneuver_automaton.receding_horizon import (
 from maneuver_automaton.receding_horizon.rest_of_plan import rested
 from tests.inertia import ROBOT, car_automaton, resting, unicycle_automaton
 from tests.matrix.vehicles import VEHICLES
+from tests.quickly import quick_are
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -408,6 +409,7 @@ def test_a_vehicle_that_cannot_rest_meets_zones_and_a_fixed_time(case):
 
 
 class TestAmongWhatMoves:
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_a_moved_problem_has_the_moved_loop(self):
         """The goal is taken until a disc leaves it: it approaches, waits, and arrives."""
@@ -426,6 +428,8 @@ class TestAmongWhatMoves:
         assert [step.decision for step in one.steps] == [step.decision for step in two.steps]
         assert (move @ SE2(one.poses)).pose[:, :2] == pytest.approx(two.poses[:, :2], abs=1e-6)
 
+    @pytest.mark.exhaustive
+    @pytest.mark.slow
     def test_where_it_stands_it_makes_room(self):
         """Its goal is walled in, so that there is no plan; what comes drives over its start."""
         cage = [Box([0.2, 4.2], [9.0 + side, 0.0]) for side in (2.0, -2.0)]
@@ -444,6 +448,7 @@ class TestAmongWhatMoves:
         assert loop.min_clearance_m > 0.0
         assert_nothing_interrupted(loop)
 
+    @pytest.mark.slow
     def test_every_step_holds_a_motion_that_stays_free(self):
         """What a step holds is free to its end, and after it where the vehicle then stands."""
         problem = posed(
@@ -466,6 +471,7 @@ class TestAmongWhatMoves:
             )
             assert audit.passed, audit.reason
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_what_has_stopped_is_planned_around_as_if_it_had_always_stood(self):
         stopped = Motion([0.0, 1.0], [[2.5, 3.0, 0.0], [2.5, 0.2, 0.0]])
@@ -482,7 +488,7 @@ class TestAmongWhatMoves:
         assert one.reached
         assert one.cost <= two.cost * 1.2
 
-    @pytest.mark.parametrize("inertia", [True, False])
+    @pytest.mark.parametrize("inertia", quick_are([False], [True, False]))
     def test_what_appears_where_it_stands_is_foreseen(self, inertia):
         """A gate closes over its start for good while it waits for the goal to be left."""
         controls = {"rest": (0.0, 0.0), "on": (1.0, 0.0), "left": (0.8, 0.8), "back": (-0.6, 0.0)}
@@ -501,7 +507,7 @@ class TestAmongWhatMoves:
         assert loop.min_clearance_m > 0.0
         assert not any(step.decision is Decision.MITIGATED for step in loop.steps)
 
-    @pytest.mark.parametrize("begins_there", [True, False])
+    @pytest.mark.parametrize("begins_there", quick_are([False], [True, False]))
     def test_at_its_goal_it_makes_room_for_what_comes(self, begins_there):
         """It drives to its goal, or stands there at first, and stays until a disc comes."""
         coming = Motion([4.0, 10.0], [[2.0, -4.0, 0.0], [2.0, 4.0, 0.0]])
@@ -535,7 +541,7 @@ class TestAmongWhatMoves:
             assert here.margin == pytest.approx(0.5 * clearance, abs=1e-9)
             assert broken == f"the clearance is {clearance:g} m, need 4 m"
 
-    @pytest.mark.parametrize("static", [True, False])
+    @pytest.mark.parametrize("static", quick_are([False], [True, False]))
     def test_pushed_within_its_margin_it_drives_on_and_says_so(self, static):
         wall = Box([4.0, 0.2], [0.0, -0.35])  # 0.1 m beside the body
         problem = posed(

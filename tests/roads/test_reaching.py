@@ -23,6 +23,7 @@ from maneuver_automaton.roads import (
     road_planner,
 )
 from tests.formats.outside import DATA, needs_data
+from tests.quickly import quick_are
 from tests.roads.files import LANES, interval, lanelet, parked, problem, scene_of
 
 LIMIT = 300.0  # [s] that nobody waits for: searches end by themselves
@@ -206,7 +207,11 @@ def test_it_waits_where_nobody_comes():
 
 @needs_data
 @pytest.mark.parametrize(
-    "name", ["stop-at-place", "slow-down-two-lanes", "braking-is-a-plan", "late-goal"]
+    "name",
+    quick_are(
+        ["braking-is-a-plan", "slow-down-two-lanes"],
+        ["stop-at-place", "slow-down-two-lanes", "braking-is-a-plan", "late-goal"],
+    ),
 )
 def test_files_of_others_are_planned_and_driven(name):
     scene = ma.load_scenario(DATA / "field" / "roads" / f"{name}.xml").scene
@@ -215,6 +220,7 @@ def test_files_of_others_are_planned_and_driven(name):
 
 
 @needs_data
+@pytest.mark.slow
 def test_it_is_not_hit_where_it_stands():
     scene = ma.load_scenario(DATA / "commonroad" / "scenarios" / "CHN_Sha-7_1_T-1.xml").scene
     assert drive_scene(road_planner(scene)).status == "reached"

@@ -118,6 +118,7 @@ def test_a_call_serves_every_query_of_its_setting(change) -> None:
         beginning.end(query, one, prepared)
 
 
+@compiled_only  # the first one searches all there is
 @pytest.mark.parametrize(
     ("start", "goal"),
     [

@@ -16,6 +16,7 @@ from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.waiting import MOST_PIECES, is_free, with_waits
 from maneuver_automaton.words.word import Word, word_of_steps
+from tests.quickly import draws
 
 ROBOT = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
 WAY = word_of_steps([(-1, 1, 6.0)], goal=0)
@@ -86,7 +87,7 @@ def test_a_free_way_needs_no_rest():
     assert timed.duration == pytest.approx(6.0)
 
 
-@settings(max_examples=15)
+@settings(max_examples=draws(16))
 @given(
     st.lists(
         st.tuples(st.floats(1.0, 5.0), st.floats(-8.0, 0.0), st.floats(0.4, 2.0)),
