@@ -40,6 +40,16 @@ class _Intervals(NamedTuple):
     begin: Array  # (n,) [s] since the primitive began
     end: Array  # (n,)
 
+    def halved(self, rows: NDArray[np.bool_]) -> _Intervals:
+        """Halves of some of them."""
+        piece, begin, end = self.piece[rows], self.begin[rows], self.end[rows]
+        middle = 0.5 * (begin + end)
+        return _Intervals(
+            np.repeat(piece, 2),
+            np.column_stack([begin, middle]).ravel(),
+            np.column_stack([middle, end]).ravel(),
+        )
+
 
 def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> PlacePrice:
     """The integral of a cost along a plan, to `SHARE` of it and of what the plan costs `beside`.
@@ -82,7 +92,7 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
         split = off > 0.25 * SHARE * whole / len(off)
         done += float(fine[~split].sum())
         doubt += float(off[~split].sum())
-        todo = _halved(todo, split)
+        todo = todo.halved(split)
     else:
         doubt += float(off[split].sum())
         done += float(fine[split].sum())
@@ -96,16 +106,19 @@ class _Motion:
         self.cost, self.plan, self.model = cost, plan, model
         self.group = group_of(plan.start.size)
         self.begins = plan.switching_poses
+        self.linked = [k for k, one in enumerate(plan.primitives) if not isinstance(one, Trim)]
+        dof, n_z = plan.start.size, len(model.reduced_names)
+        self.twists, self.states = (np.zeros((len(plan.primitives), n)) for n in (dof, n_z))
+        for k, one in enumerate(plan.primitives):
+            if isinstance(one, Trim):
+                self.twists[k], self.states[k] = one.body_velocity, one.reduced_state
 
     def at(self, piece: IntArray, since: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Rates per second (n, k), and where the vehicle may be, in pieces (n, 1) at times [s]."""
-        dof, pieces = self.plan.start.size, np.broadcast_to(piece, since.shape)
-        steps, twists = np.zeros((*since.shape, dof)), np.zeros((*since.shape, dof))
-        states = np.zeros((*since.shape, len(self.model.reduced_names)))
-        for k in np.unique(piece):
-            here = pieces == k
-            steps[here], twists[here], states[here] = self._within(int(k), since[here])
-        poses = (self.group(self.begins[pieces]) @ self.group(steps)).pose
+        pieces, dof = np.broadcast_to(piece, since.shape), self.plan.start.size
+        poses, twists, states = (
+            one.reshape(*since.shape, -1) for one in self.steps(pieces.ravel(), since.ravel())
+        )
         with_states = getattr(self.cost, "rates_along", None)
         rates = np.asarray(
             self.cost.rates(poses, twists)
@@ -124,13 +137,19 @@ class _Motion:
             rates = rates * np.linalg.norm(twists[..., way], axis=-1)
         return rates, allowed(self.cost, poses, twists)
 
-    def _within(self, k: int, since: Array) -> tuple[Array, Array, Array]:
-        """Motion since a primitive began, twists and reduced states, at times (n,) [s]."""
+    def steps(self, piece: IntArray, since: Array) -> tuple[Array, Array, Array]:
+        """Poses, twists and reduced states (n, ...) in pieces (n,) at times (n,) [s] in each."""
+        twists, states = self.twists[piece], self.states[piece]
+        steps = self.group.exp(since[:, None] * twists).pose
+        for k in self.linked:
+            here = np.flatnonzero(piece == k)
+            if here.size:
+                steps[here], twists[here], states[here] = self._along(k, since[here])
+        return (self.group(self.begins[piece]) @ self.group(steps)).pose, twists, states
+
+    def _along(self, k: int, since: Array) -> tuple[Array, Array, Array]:
+        """Motion since a maneuver began, twists and reduced states, at times (n,) [s]."""
         primitive: Any = self.plan.primitives[k]
-        if isinstance(primitive, Trim):
-            twists = np.tile(primitive.body_velocity, (since.size, 1))
-            states = np.tile(primitive.reduced_state, (since.size, 1))
-            return self.group.exp(since[:, None] * twists).pose, twists, states
         course = primitive.course
         if course is None:
             raise ValueError(f"maneuver {primitive.name!r}: has no course, so no price of places")
@@ -156,28 +175,26 @@ class _Motion:
 
 def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     """Stretches of a plan that are not longer than a scale [m], and do not turn far."""
-    pieces, begins, ends = list[Any](), list[Array](), list[Array]()
-    for k, (primitive, lasting) in enumerate(
-        zip(plan.primitives, plan.primitive_durations.tolist(), strict=True)
-    ):
-        if lasting <= 0.0:
-            continue
-        if isinstance(primitive, Trim):
-            edges = np.array([0.0, lasting])
-            steps = np.abs(lasting * primitive.body_velocity[None])
-        else:
-            edges, steps = _between_controls(primitive)
-        way = np.linalg.norm(steps[:, [0, 1, *range(3, steps.shape[1])]], axis=1)
-        parts = np.maximum(np.ceil(np.maximum(way / scale, steps[:, 2] / TURN)), 1.0).astype(int)
-        row = np.repeat(np.arange(len(parts)), parts)
-        share = (np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[row]
-        times = np.append(edges[row] + share * np.diff(edges)[row], edges[-1])
-        pieces.append(np.full(len(times) - 1, k))
-        begins.append(times[:-1])
-        ends.append(times[1:])
-    if not pieces:
-        return _Intervals(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-    return _Intervals(np.concatenate(pieces), np.concatenate(begins), np.concatenate(ends))
+    count, lasting = len(plan.primitives), plan.primitive_durations
+    steps = np.zeros((count, plan.start.size))
+    linked = list[tuple[int, Array, Array]]()
+    for k, one in enumerate(plan.primitives):
+        if isinstance(one, Trim):
+            steps[k] = one.body_velocity * lasting[k]
+        elif lasting[k] > 0.0:
+            linked.append((k, *_between_controls(one)))
+    coasts = np.flatnonzero([isinstance(one, Trim) for one in plan.primitives] & (lasting > 0.0))
+    piece = np.concatenate([coasts, *(np.full(len(ways), k) for k, _, ways in linked)])
+    begin = np.concatenate([np.zeros(len(coasts)), *(edges[:-1] for _, edges, _ in linked)])
+    end = np.concatenate([lasting[coasts], *(edges[1:] for _, edges, _ in linked)])
+    ways = np.abs(np.concatenate([steps[coasts], *(ways for _, _, ways in linked)]))
+    way = np.sqrt((np.delete(ways, 2, axis=1) ** 2).sum(axis=1))
+    parts = np.maximum(np.ceil(np.maximum(way / scale, ways[:, 2] / TURN)), 1.0).astype(np.int64)
+    row = np.repeat(np.arange(len(parts)), parts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    length = ((end - begin) / parts)[row]
+    first = begin[row] + number * length
+    return _Intervals(piece[row].astype(np.int64), first, first + length)
 
 
 def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
@@ -189,13 +206,3 @@ def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
     rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
     steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
     return course.time[rows], steps
-
-
-def _halved(todo: _Intervals, split: NDArray[np.bool_]) -> _Intervals:
-    piece, begin, end = todo.piece[split], todo.begin[split], todo.end[split]
-    middle = 0.5 * (begin + end)
-    return _Intervals(
-        np.repeat(piece, 2),
-        np.column_stack([begin, middle]).ravel(),
-        np.column_stack([middle, end]).ravel(),
-    )

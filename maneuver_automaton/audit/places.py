@@ -10,19 +10,24 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.audit.drive import DrivenPlan
 from maneuver_automaton.audit.frames import FrameMotion, Spans, placed
 from maneuver_automaton.collision.shapes import AnyObstacle, Disc, Obstacle, OccupancyMap, Shape
 from maneuver_automaton.places import Clearance, PlaceCost
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
-CLOSE = 5e-5  # of that cost: stretches are halved until what is still open is less
-LONGEST = 0.25  # [s] of a stretch, before any is halved
+CLOSE = 1e-4  # of that cost: stretches are halved until what is still open is less
+LONGEST = 0.5  # [s], [m] of a stretch, before any is halved
 MOST_ROUNDS = 22
-# Lobatto's rule with four points: ends count, so that no jump of a rate hides beyond the last one
-SHARES = 0.5 + 0.5 * np.array([-1.0, -math.sqrt(0.2), math.sqrt(0.2), 1.0])
-WEIGHTS = np.array([1.0, 5.0, 5.0, 1.0]) / 12.0
+MANY = 4  # obstacles near to a shape, from which on a tree finds the nearest sooner
+# Lobatto's rule with four points, and Kronrod's seven that contain them: ends count, so that no
+# jump of a rate hides beyond the last one. Source: Gander and Gautschi (2000), Adaptive quadrature.
+SHARES = 0.5 + 0.5 * np.array(
+    [-1.0, -math.sqrt(2.0 / 3.0), -math.sqrt(0.2), 0.0, math.sqrt(0.2), math.sqrt(2.0 / 3.0), 1.0]
+)
+LOBATTO = np.array([1.0, 0.0, 5.0, 0.0, 5.0, 0.0, 1.0]) / 12.0
+KRONROD = np.array([77.0, 432.0, 625.0, 672.0, 625.0, 432.0, 77.0]) / 2940.0
 
 
 class MovingShapes(NamedTuple):
@@ -44,13 +49,13 @@ def price_again(
 ) -> float:
     """The integral of a cost along a drive whose poses are counted from a place (dof,).
 
-    By Lobatto's rule on each stretch, against the same on its halves.
+    By two rules on each stretch, which is halved where they differ.
     """
     near = _Distances(bodies, obstacles, body_height, offset)
+    lasting = np.diff(drive.frames.times)
 
     def rates(spans: Spans) -> Array:
-        lengths = spans.end - spans.begin
-        shares = spans.begin[:, None] + lengths[:, None] * SHARES
+        shares = spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES
         elements = np.repeat(spans.element, SHARES.size)
         at = shares.ravel()
         poses = drive.frames.at(elements, at) + offset
@@ -62,35 +67,36 @@ def price_again(
             found = np.asarray(cost.rates(poses, twists), dtype=np.float64)
         if cost.per == "metre":
             found = found * np.sqrt((np.delete(twists, 2, axis=1) ** 2).sum(axis=1))
-        seconds = np.diff(drive.frames.times)[spans.element] * lengths
-        return np.asarray(found.reshape(shares.shape) @ WEIGHTS * seconds)
+        return found.reshape(shares.shape)
 
     spans, _ = drive.between_samples()
     if not len(spans.element):
         return 0.0
-    spans = _no_longer(spans, np.diff(drive.frames.times), drive.frames.speed)
-    done, now = 0.0, rates(spans)
+    spans = _no_longer(spans, lasting, drive.frames.speed)
+    if isinstance(cost, Clearance):
+        spans = near.come_near(spans, lasting, cost.within)
+    done = 0.0
     for _ in range(MOST_ROUNDS):
-        middle = 0.5 * (spans.begin + spans.end)
-        halves = Spans(
-            np.repeat(spans.element, 2),
-            np.stack([spans.begin, middle], axis=1).ravel(),
-            np.stack([middle, spans.end], axis=1).ravel(),
-        )
-        finer = rates(halves)
-        sums = finer.reshape(-1, 2).sum(axis=1)
-        off = np.abs(sums - now)
+        values = rates(spans)
+        seconds = lasting[spans.element] * (spans.end - spans.begin)
+        fine = values @ KRONROD * seconds
+        off = np.abs(fine - values @ LOBATTO * seconds)
         if off.sum() <= CLOSE * whole:
-            return done + float(sums.sum())
+            return done + float(fine.sum())
         again = off > 0.25 * CLOSE * whole / len(off)
-        done += float(sums[~again].sum())
-        rows = np.repeat(again, 2)
-        spans, now = halves.of(rows), finer[rows]
-    return done + float(now.sum())
+        done += float(fine[~again].sum())
+        rest, fine = spans.of(again), fine[again]
+        middle = 0.5 * (rest.begin + rest.end)
+        spans = Spans(
+            np.repeat(rest.element, 2),
+            np.stack([rest.begin, middle], axis=1).ravel(),
+            np.stack([middle, rest.end], axis=1).ravel(),
+        )
+    return done + float(fine.sum())
 
 
 def _no_longer(spans: Spans, lasting: Array, speeds: Array) -> Spans:
-    """The stretches cut to a quarter second, and to a quarter metre."""
+    """The stretches cut to half a second, and to half a metre."""
     seconds = (spans.end - spans.begin) * lasting[spans.element]
     most = np.maximum(seconds, seconds * speeds[spans.element]) / LONGEST
     parts = np.maximum(np.ceil(most), 1.0).astype(np.int64)
@@ -112,7 +118,19 @@ class _Distances:
         offset: Array,
     ) -> None:
         self.bodies, self.height, self.offset = bodies, height, offset
-        self.obstacles = _standing(obstacles)
+        self.standing = _standing(obstacles)
+
+    def come_near(self, spans: Spans, lasting: Array, within: float) -> Spans:
+        """The stretches in which anything may be nearer than `within` [m]."""
+        kept = np.zeros(len(spans.element), dtype=np.bool_)
+        seconds = lasting[spans.element] * (spans.end - spans.begin)
+        for body in self.bodies:
+            middles = body.frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + self.offset
+            moved = 0.5 * seconds * body.frames.speed[spans.element]
+            far = max(map(_reach, body.shapes), default=0.0)
+            for one in self.standing:
+                kept[one.around(middles, far + within + moved)[0]] = True
+        return spans.of(kept)
 
     def __call__(self, elements: Any, shares: Array, poses: Array, within: float) -> Array:
         """Distances (n,) [m] that are right where they are less than `within`."""
@@ -123,17 +141,22 @@ class _Distances:
             frames = body.frames.at(elements, shares) + self.offset
             for shape in body.shapes or (None,):
                 far = 0.0 if shape is None else _reach(shape)
-                near = [
-                    self._meets(height, poses) & (_from_box(frames, one) < far + wide + within)
-                    for height, one, wide in self.obstacles
-                ]
-                used = np.flatnonzero(np.any(near, axis=0)) if near else np.zeros(0, dtype=np.int64)
-                cores, radius = _moved(shape, frames[used])
-                for rows, (_, obstacle, wide) in zip(near, self.obstacles, strict=True):
-                    some = np.flatnonzero(rows[used])
-                    apart = shapely.distance(cores[some], obstacle) - radius - wide
-                    here = used[some]
-                    least[here] = np.minimum(least[here], np.maximum(apart, 0.0))
+                for one in self.standing:
+                    frame, which = one.around(frames, far + within)
+                    level = self._meets(one.height, poses)[frame]
+                    frame, which = frame[level], which[level]
+                    if not frame.size:
+                        continue
+                    used, row = np.unique(frame, return_inverse=True)
+                    cores, radius = _moved(shape, frames[used])
+                    if frame.size > MANY * used.size and not one.wide.any():
+                        (row, _), apart = one.tree.query_nearest(
+                            cores, all_matches=False, return_distance=True
+                        )
+                        frame = used[row]
+                    else:
+                        apart = shapely.distance(cores[row], one.cores[which]) - one.wide[which]
+                    np.minimum.at(least, frame, np.maximum(apart - radius, 0.0))
         return least
 
     def _meets(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:
@@ -144,22 +167,45 @@ class _Distances:
         return np.asarray((z + low <= height[1]) & (z + high >= height[0]))
 
 
+class _Standing(NamedTuple):
+    """What stands still, of one height: geometries, each with a radius around it."""
+
+    height: tuple[float, float] | None
+    cores: Any  # (m,)
+    wide: Array  # (m,) [m]
+    tree: Any
+
+    def around(self, frames: Array, reach: Any) -> tuple[IntArray, IntArray]:
+        """Frames (n, dof), and what may be nearer to their places than `reach` [m]."""
+        import shapely
+
+        x, y, by = frames[:, 0], frames[:, 1], reach + self.wide.max()
+        frame, which = self.tree.query(shapely.box(x - by, y - by, x + by, y + by))
+        return frame, which
+
+
 @functools.lru_cache(maxsize=8)
-def _standing(
-    obstacles: tuple[AnyObstacle, ...],
-) -> list[tuple[tuple[float, float] | None, Any, float]]:
-    """What stands still: its heights, its geometry and a radius around it; of the last maps."""
+def _standing(obstacles: tuple[AnyObstacle, ...]) -> list[_Standing]:
+    """What stands still, by heights, round or not; of the last maps."""
     import shapely
 
-    found: list[tuple[tuple[float, float] | None, Any, float]] = []
+    found: dict[Any, list[tuple[Any, float]]] = {}
     for one in obstacles:
         if isinstance(one, OccupancyMap):
-            found.append((None, _blocked(one), 0.0))
+            found.setdefault((None, False), []).extend((cell, 0.0) for cell in _blocked(one))
         elif isinstance(one, Obstacle) and one.motion is None:
-            found.append((one.height, *_core(one.shape)))
-    for _, core, _ in found:
-        shapely.prepare(core)
-    return found
+            core, wide = _core(one.shape)
+            found.setdefault((one.height, wide > 0.0), []).append((core, wide))
+    return [
+        _Standing(
+            height,
+            cores := np.array([core for core, _ in solids], dtype=object),
+            np.array([wide for _, wide in solids]),
+            shapely.STRtree(cores),
+        )
+        for (height, _), solids in found.items()
+        if solids
+    ]
 
 
 def _core(shape: Shape) -> tuple[Any, float]:
@@ -176,15 +222,6 @@ def _reach(shape: Shape) -> float:
     if isinstance(shape, Disc):
         return float(np.hypot(*shape.center)) + shape.radius
     return float(np.hypot(*np.asarray(shape.corners).T).max())
-
-
-def _from_box(frames: Array, obstacle: Any) -> Array:
-    """Distances (n,) [m] of frames from the box around an obstacle."""
-    low_x, low_y, high_x, high_y = obstacle.bounds
-    x, y = frames[:, 0], frames[:, 1]
-    d_x = np.maximum(np.maximum(low_x - x, x - high_x), 0.0)
-    d_y = np.maximum(np.maximum(low_y - y, y - high_y), 0.0)
-    return np.asarray(np.hypot(d_x, d_y))
 
 
 def _moved(shape: Shape | None, frames: Array) -> tuple[Any, float]:
@@ -208,7 +245,7 @@ def _moved(shape: Shape | None, frames: Array) -> tuple[Any, float]:
 
 
 def _blocked(one: OccupancyMap) -> Any:
-    """The blocked cells of a map as one geometry."""
+    """The blocked cells of a map."""
     import shapely
 
     row, column = np.nonzero(one.blocked)
@@ -220,4 +257,4 @@ def _blocked(one: OccupancyMap) -> Any:
         axis=1,
     )
     placed_corners = placed(np.asarray(one.origin)[None, None, :3], corners)[..., :2]
-    return shapely.multipolygons(shapely.polygons(placed_corners))  # a union may lose some
+    return shapely.polygons(placed_corners)
