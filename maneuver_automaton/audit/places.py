@@ -20,6 +20,7 @@ AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
 CLOSE = 1e-4  # of that cost: stretches are halved until what is still open is less
 LONGEST = 0.5  # [s], [m] of a stretch, before any is halved
 MOST_ROUNDS = 22
+NEAREST = np.zeros(0, dtype=np.int64)  # in place of which obstacle it is
 MANY = 4  # obstacles near to a shape, from which on a tree finds the nearest sooner
 # Lobatto's rule with four points, and Kronrod's seven that contain them: ends count, so that no
 # jump of a rate hides beyond the last one. Source: Gander and Gautschi (2000), Adaptive quadrature.
@@ -51,30 +52,29 @@ def price_again(
 
     By two rules on each stretch, which is halved where they differ.
     """
-    near = _Distances(bodies, obstacles, body_height, offset)
+    near = _Distances(bodies, obstacles, body_height, drive.frames, offset)
     lasting = np.diff(drive.frames.times)
 
     def rates(spans: Spans) -> Array:
-        shares = spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES
-        elements = np.repeat(spans.element, SHARES.size)
-        at = shares.ravel()
-        poses = drive.frames.at(elements, at) + offset
-        twists = drive.twists_at(elements, at)
+        found = np.zeros((len(spans.element), SHARES.size))
+        used = np.arange(len(found))
         if isinstance(cost, Clearance):
-            gap = np.maximum(1.0 - near(elements, at, poses, cost.within) / cost.within, 0.0)
-            found = cost.weight * gap**2
-        else:
+            apart = near(spans, cost.within)
+            used = np.flatnonzero((apart < cost.within).any(axis=1))
+            found[used] = cost.weight * (1.0 - apart[used] / cost.within) ** 2
+        at = _nodes(spans.of(used))
+        twists = drive.twists_at(*at).reshape(used.size, SHARES.size, offset.size)
+        if not isinstance(cost, Clearance):
+            poses = (drive.frames.at(*at) + offset).reshape(twists.shape)
             found = np.asarray(cost.rates(poses, twists), dtype=np.float64)
         if cost.per == "metre":
-            found = found * np.sqrt((np.delete(twists, 2, axis=1) ** 2).sum(axis=1))
-        return found.reshape(shares.shape)
+            found[used] *= np.sqrt((np.delete(twists, 2, axis=2) ** 2).sum(axis=2))
+        return found
 
     spans, _ = drive.between_samples()
     if not len(spans.element):
         return 0.0
     spans = _no_longer(spans, lasting, drive.frames.speed)
-    if isinstance(cost, Clearance):
-        spans = near.come_near(spans, lasting, cost.within)
     done = 0.0
     for _ in range(MOST_ROUNDS):
         values = rates(spans)
@@ -93,6 +93,12 @@ def price_again(
             np.stack([middle, rest.end], axis=1).ravel(),
         )
     return done + float(fine.sum())
+
+
+def _nodes(spans: Spans) -> tuple[IntArray, Array]:
+    """Elements, and shares of them, at all `SHARES` of stretches (n * 7,)."""
+    shares = spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES
+    return np.repeat(spans.element, SHARES.size), shares.ravel()
 
 
 def _no_longer(spans: Spans, lasting: Array, speeds: Array) -> Spans:
@@ -115,56 +121,82 @@ class _Distances:
         bodies: Sequence[MovingShapes],
         obstacles: tuple[AnyObstacle, ...],
         height: tuple[float, float],
+        vehicle: FrameMotion,
         offset: Array,
     ) -> None:
-        self.bodies, self.height, self.offset = bodies, height, offset
+        self.height, self.vehicle, self.offset = height, vehicle, offset
         self.standing = _standing(obstacles)
+        self.outlines = [
+            (body.frames, _Outline.of(shape)) for body in bodies for shape in body.shapes or (None,)
+        ]
 
-    def come_near(self, spans: Spans, lasting: Array, within: float) -> Spans:
-        """The stretches in which anything may be nearer than `within` [m]."""
-        kept = np.zeros(len(spans.element), dtype=np.bool_)
-        seconds = lasting[spans.element] * (spans.end - spans.begin)
-        for body in self.bodies:
-            middles = body.frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + self.offset
-            moved = 0.5 * seconds * body.frames.speed[spans.element]
-            far = max(map(_reach, body.shapes), default=0.0)
+    def __call__(self, spans: Spans, within: float) -> Array:
+        """Distances (n, 7) at `SHARES` of stretches, or `within` [m] if they are more.
+
+        Obstacles that are too far in the middle of a stretch are so all along.
+        """
+        least = np.full((len(spans.element), SHARES.size), within)
+        for frames, outline in self.outlines:
+            seconds = np.diff(frames.times)[spans.element] * (spans.end - spans.begin)
+            fastest = (frames.speed + frames.turn * outline.far)[spans.element]
+            enough = within + 0.5 * seconds * fastest
+            middles = frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + self.offset
             for one in self.standing:
-                kept[one.around(middles, far + within + moved)[0]] = True
-        return spans.of(kept)
-
-    def __call__(self, elements: Any, shares: Array, poses: Array, within: float) -> Array:
-        """Distances (n,) [m] that are right where they are less than `within`."""
-        import shapely
-
-        least = np.full(len(poses), within)
-        for body in self.bodies:
-            frames = body.frames.at(elements, shares) + self.offset
-            for shape in body.shapes or (None,):
-                far = 0.0 if shape is None else _reach(shape)
-                for one in self.standing:
-                    frame, which = one.around(frames, far + within)
-                    level = self._meets(one.height, poses)[frame]
-                    frame, which = frame[level], which[level]
-                    if not frame.size:
-                        continue
-                    used, row = np.unique(frame, return_inverse=True)
-                    cores, radius = _moved(shape, frames[used])
-                    if frame.size > MANY * used.size and not one.wide.any():
-                        (row, _), apart = one.tree.query_nearest(
-                            cores, all_matches=False, return_distance=True
-                        )
-                        frame = used[row]
-                    else:
-                        apart = shapely.distance(cores[row], one.cores[which]) - one.wide[which]
-                    np.minimum.at(least, frame, np.maximum(apart - radius, 0.0))
+                span, which = one.around(middles, outline.far + enough)
+                used: Array = np.unique(span)
+                if span.size > MANY * used.size and not one.wide.any():
+                    span, which = used, NEAREST
+                apart = one.apart(outline.at(middles[span]), which) - outline.radius
+                near = apart < enough[span]
+                span, which = span[near], which[near] if which.size else which
+                if not span.size:
+                    continue
+                at = _nodes(spans.of(span))
+                bodies = outline.at(frames.at(*at) + self.offset).reshape(-1, SHARES.size)
+                apart = np.maximum(one.apart(bodies, which) - outline.radius, 0.0)
+                apart[~self._meets(one.height, *at).reshape(apart.shape)] = within
+                np.minimum.at(least, span, apart)
         return least
 
-    def _meets(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:
-        low, high = self.height
-        if height is None or (poses.shape[1] == 3 and (low, high) == (0.0, 0.0)):
-            return np.ones(len(poses), dtype=np.bool_)
-        z = poses[:, 3] if poses.shape[1] > 3 else np.zeros(len(poses))
+    def _meets(
+        self, height: tuple[float, float] | None, elements: IntArray, shares: Array
+    ) -> NDArray[np.bool_]:
+        """Where the vehicle is neither above nor below obstacles of a height."""
+        (low, high), in_plane = self.height, self.vehicle.nodes.shape[2] == 3
+        if height is None or (in_plane and (low, high) == (0.0, 0.0)):
+            return np.ones(shares.shape, dtype=np.bool_)
+        z = (self.vehicle.at(elements, shares) + self.offset)[:, 3:].sum(axis=1)
         return np.asarray((z + low <= height[1]) & (z + high >= height[0]))
+
+
+class _Outline(NamedTuple):
+    """A shape of a body: a point with a radius, or rings of corners."""
+
+    rings: tuple[Array, ...]  # (n, 3) each
+    radius: float  # [m]
+    far: float  # [m] of the point that is farthest from the frame
+
+    @classmethod
+    def of(cls, shape: Shape | None) -> _Outline:
+        """The outline of a shape, or of a point."""
+        if shape is None:
+            return cls((np.zeros((1, 3)),), 0.0, 0.0)
+        if isinstance(shape, Disc):
+            far = float(np.hypot(*shape.center)) + shape.radius
+            return cls((np.append(shape.center, 0.0)[None],), shape.radius, far)
+        rings = [np.asarray(ring) for ring in (shape.corners, *getattr(shape, "holes", ()))]
+        far = float(np.hypot(*rings[0].T).max())
+        return cls(tuple(np.column_stack([ring, np.zeros(len(ring))]) for ring in rings), 0.0, far)
+
+    def at(self, frames: Array) -> Any:
+        """The geometry (n,) at frames (n, dof)."""
+        import shapely
+
+        ways = [placed(frames[:, None, :3], ring)[..., :2] for ring in self.rings]
+        if len(self.rings[0]) == 1:
+            return shapely.points(ways[0][:, 0])
+        shells, *holes = (shapely.linearrings(way) for way in ways)
+        return shapely.polygons(shells, holes=np.stack(holes, axis=1) if holes else None)
 
 
 class _Standing(NamedTuple):
@@ -175,13 +207,25 @@ class _Standing(NamedTuple):
     wide: Array  # (m,) [m]
     tree: Any
 
-    def around(self, frames: Array, reach: Any) -> tuple[IntArray, IntArray]:
-        """Frames (n, dof), and what may be nearer to their places than `reach` [m]."""
+    def around(self, frames: Array, reach: Array) -> tuple[IntArray, IntArray]:
+        """Frames (n, dof), and what may be nearer to their places than `reach` (n,) [m]."""
         import shapely
 
         x, y, by = frames[:, 0], frames[:, 1], reach + self.wide.max()
         frame, which = self.tree.query(shapely.box(x - by, y - by, x + by, y + by))
         return frame, which
+
+    def apart(self, bodies: Any, which: IntArray) -> Array:
+        """Distances (n, ...) [m] of the cores of bodies from one obstacle each, or the nearest."""
+        import shapely
+
+        if which is NEAREST:
+            _, away = self.tree.query_nearest(
+                bodies.ravel(), all_matches=False, return_distance=True
+            )
+            return np.asarray(away.reshape(bodies.shape))
+        which = which.reshape(-1, *[1] * (bodies.ndim - 1))
+        return np.asarray(shapely.distance(bodies, self.cores[which]) - self.wide[which])
 
 
 @functools.lru_cache(maxsize=8)
@@ -215,33 +259,6 @@ def _core(shape: Shape) -> tuple[Any, float]:
     if isinstance(shape, Disc):
         return shapely.Point(shape.center), shape.radius
     return shapely.make_valid(shapely.Polygon(shape.corners, getattr(shape, "holes", ()))), 0.0
-
-
-def _reach(shape: Shape) -> float:
-    """The greatest distance [m] of a point of a shape from its frame."""
-    if isinstance(shape, Disc):
-        return float(np.hypot(*shape.center)) + shape.radius
-    return float(np.hypot(*np.asarray(shape.corners).T).max())
-
-
-def _moved(shape: Shape | None, frames: Array) -> tuple[Any, float]:
-    """A shape of a body, or its point, at frames (n, dof)."""
-    import shapely
-
-    if shape is None or isinstance(shape, Disc):
-        center = np.zeros(2) if shape is None else shape.center
-        points = placed(frames[:, :3], np.append(center, 0.0))[:, :2]
-        return shapely.points(points), 0.0 if shape is None else shape.radius
-    rings = [shape.corners, *getattr(shape, "holes", ())]
-    ways = [
-        placed(frames[:, None, :3], np.column_stack([ring, np.zeros(len(ring))]))[..., :2]
-        for ring in rings
-    ]
-    if len(ways) == 1:
-        return shapely.polygons(ways[0]), 0.0
-    holes: list[Any] = [list(row) for row in zip(*ways[1:], strict=True)]
-    bodies = [shapely.Polygon(shell, inner) for shell, inner in zip(ways[0], holes, strict=True)]
-    return np.array(bodies, dtype=object), 0.0
 
 
 def _blocked(one: OccupancyMap) -> Any:
