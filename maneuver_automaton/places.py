@@ -575,16 +575,28 @@ def allowed(cost: PlaceCost, poses: Array, velocities: Array) -> NDArray[np.bool
     return np.ones(poses.shape[:-1], dtype=np.bool_) if own is None else own(poses, velocities)
 
 
-def gradient_of(cost: PlaceCost, poses: Array, velocities: Array) -> Array:
+def rates_along(cost: PlaceCost, poses: Array, velocities: Array, states: Array | None) -> Array:
+    """Rates (...,) where reduced states (..., n_z) are known, which place what is carried."""
+    with_states: Callable[..., Array] | None = getattr(cost, "rates_along", None)
+    if with_states is None:
+        return cost.rates(poses, velocities)
+    return with_states(poses, velocities, states)
+
+
+def gradient_of(
+    cost: PlaceCost, poses: Array, velocities: Array, states: Array | None = None
+) -> Array:
     """Derivatives (..., dof) of the rates by the pose: its own, or central differences."""
     own: Callable[[Array, Array], Array] | None = getattr(cost, "gradient", None)
     if own is not None:
-        return own(poses, velocities)
+        return np.array(own(poses, velocities))
     slopes = np.empty(poses.shape)
     for k in range(poses.shape[-1]):
         step = np.zeros(poses.shape[-1])
         step[k] = STEP
-        ahead, behind = (cost.rates(poses + sign * step, velocities) for sign in (1.0, -1.0))
+        ahead, behind = (
+            rates_along(cost, poses + sign * step, velocities, states) for sign in (1.0, -1.0)
+        )
         slopes[..., k] = (ahead - behind) / (2.0 * STEP)
     return slopes
 
