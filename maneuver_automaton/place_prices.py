@@ -209,7 +209,7 @@ class _Motion:
     def steps(self, piece: IntArray, since: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and reduced states (n, ...) in pieces (n,) at times (n,) [s] in each."""
         twists, states = self.twists[piece], self.states[piece]
-        steps = self.group.exp(since[:, None] * twists).pose
+        steps = np.array(self.group.exp(since[:, None] * twists).pose)
         for k in self.linked:
             here = np.flatnonzero(piece == k)
             if here.size:
