@@ -25,6 +25,7 @@ DENSE = 0.25  # of a scale, and [rad], between samples of a course that is drive
 GAUSS = 0.5 + 0.5 * np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
 WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
 LONGER, LEAST_S = 1.5, 0.5  # than a coast is, and [s]: for how long points are close enough
+MOMENT = 1e-12  # [s] that every coast lasts there
 MOST_INTERVALS = 1 << 16
 NODES = np.linspace(0.0, 1.0, 5)
 COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
@@ -124,8 +125,8 @@ class TimedPrices:
 
     def __init__(self, costs: Sequence[PlaceCost], plan: Plan, model: Model) -> None:
         self.costs, self.plan, self.model = costs, plan, model
-        self.timed = np.flatnonzero([isinstance(one, Trim) for one in plan.primitives])
         longer = replace(plan, durations=np.maximum(LONGER * plan.durations, LEAST_S))
+        self.timed = np.flatnonzero([isinstance(one, Trim) for one in longer.primitives])
         stretches = _first_stretches(longer, min(map(scale_of, costs)))
         lasting = longer.primitive_durations[stretches.piece]
         begin, end = stretches.begin / lasting, stretches.end / lasting
@@ -135,7 +136,8 @@ class TimedPrices:
 
     def at(self, durations: Array) -> tuple[float, Array]:
         """The price, and its derivatives (n,) by the coasting times (n,) [s]."""
-        plan = replace(self.plan, durations=durations)
+        # Beside maneuvers a plan leaves trims out that last no time.
+        plan = replace(self.plan, durations=np.maximum(durations, MOMENT))
         lasting = plan.primitive_durations[self.piece]
         price, slopes = 0.0, np.zeros(len(self.timed))
         for cost in self.costs:

@@ -207,7 +207,7 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
     places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
 
     def cost(times: Array) -> tuple[float, Array]:
-        price, slopes = places.at(np.maximum(times, 0.0)) if places else (0.0, 0.0)
+        price, slopes = places.at(times) if places else (0.0, 0.0)
         return (float(rates @ times) + price) / scale, (rates + slopes) / scale
 
     try:

@@ -88,3 +88,17 @@ def test_a_plan_has_the_best_of_its_times():
     assert result.audit.passed
     again = with_relaxed_end(here, result.plan, here.goals[0])
     assert again is None or here.cost_of(again) > result.cost * (1.0 - 2e-3)
+
+
+@compiled_only
+def test_plans_with_maneuvers_have_slopes_too():
+    here = ma.load_scenario("scenarios/robot_with_inertia.yaml").problem
+    plan = ma.plan(here, time_limit=1.0).plan
+    assert any(plan.maneuvers)
+    here = replace(here, place_costs=ma.Clearance(2.0, 6.0))
+    prices = TimedPrices(here.bound_place_costs, plan, here.automaton.model)
+    price, slopes = prices.at(plan.durations)
+    assert price == pytest.approx(here.place_prices_of(plan)[0].price, rel=5e-3)
+    for k, step in enumerate(1e-4 * np.eye(len(plan.durations))):
+        ahead, now = (prices.at(plan.durations + part)[0] for part in (step, 0.0 * step))
+        assert slopes[k] == pytest.approx((ahead - now) / 1e-4, abs=0.05 * np.abs(slopes).max())
