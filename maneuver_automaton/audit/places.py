@@ -143,7 +143,7 @@ class _Distances:
             middles = frames.at(spans.element, 0.5 * (spans.begin + spans.end)) + self.offset
             for one in self.standing:
                 span, which = one.around(middles, outline.far + enough)
-                used: Array = np.unique(span)
+                used: IntArray = np.unique(span)
                 if span.size > MANY * used.size and not one.wide.any():
                     span, which = used, NEAREST
                 apart = one.apart(outline.at(middles[span]), which) - outline.radius
