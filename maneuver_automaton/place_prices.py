@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.places import PlaceCost, allowed, scale_of
+from maneuver_automaton.places import PlaceCost, allowed, gradient_of, rates_along, scale_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import along
 from maneuver_automaton.primitives.primitive import Trajectory
@@ -20,6 +22,10 @@ SHARE = 2e-4  # of a plan's whole cost: by how much a price may be off, as estim
 TURN = 0.4  # [rad] of an interval at most, before any is halved
 ROUNDS = 24  # in which intervals are halved
 DENSE = 0.25  # of a scale, and [rad], between samples of a course that is driven as sampled
+GAUSS = 0.5 + 0.5 * np.array([-np.sqrt(0.6), 0.0, np.sqrt(0.6)])
+WEIGHTS = np.array([5.0, 8.0, 5.0]) / 18.0
+LONGER, LEAST_S = 1.5, 0.5  # than a coast is, and [s]: for how long points are close enough
+MOMENT = 1e-12  # [s] that every coast lasts there
 MOST_INTERVALS = 1 << 16
 NODES = np.linspace(0.0, 1.0, 5)
 COARSE, FINE = np.array([1, 0, 4, 0, 1]) / 6.0, np.array([1, 4, 2, 4, 1]) / 12.0  # Simpson's rule
@@ -39,6 +45,16 @@ class _Intervals(NamedTuple):
     piece: IntArray  # (n,)
     begin: Array  # (n,) [s] since the primitive began
     end: Array  # (n,)
+
+    def halved(self, rows: NDArray[np.bool_]) -> _Intervals:
+        """Halves of some of them."""
+        piece, begin, end = self.piece[rows], self.begin[rows], self.end[rows]
+        middle = 0.5 * (begin + end)
+        return _Intervals(
+            np.repeat(piece, 2),
+            np.column_stack([begin, middle]).ravel(),
+            np.column_stack([middle, end]).ravel(),
+        )
 
 
 def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> PlacePrice:
@@ -82,11 +98,73 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
         split = off > 0.25 * SHARE * whole / len(off)
         done += float(fine[~split].sum())
         doubt += float(off[~split].sum())
-        todo = _halved(todo, split)
+        todo = todo.halved(split)
     else:
         doubt += float(off[split].sum())
         done += float(fine[split].sum())
     return PlacePrice(done, doubt, refused)
+
+
+class TimedPrices:
+    """What the places of a word cost, by its coasting times: a smooth stand-in for the price.
+
+    Gauss's rule with as many points as suit the times it begins with, so that the price changes
+    smoothly with them. A trim that lasts longer moves all that follows about where it ends; so the
+    gradients of rates add up, backwards over the word, to the derivatives of the price.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Ground, Unicycle
+    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
+    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[1.0])
+    >>> slope = Ground.of_raster([[0.0, 8.0]], resolution=8.0, origin=[-4.0, -4.0, 0.0])
+    >>> price, by_time = TimedPrices((slope,), plan, Unicycle()).at(np.array([3.0]))
+    >>> round(price, 6), by_time.round(6).tolist()
+    (4.5, [3.0])
+    """
+
+    def __init__(self, costs: Sequence[PlaceCost], plan: Plan, model: Model) -> None:
+        self.costs, self.plan, self.model = costs, plan, model
+        longer = replace(plan, durations=np.maximum(LONGER * plan.durations, LEAST_S))
+        self.timed = np.flatnonzero([isinstance(one, Trim) for one in longer.primitives])
+        stretches = _first_stretches(longer, min(map(scale_of, costs)))
+        lasting = longer.primitive_durations[stretches.piece]
+        begin, end = stretches.begin / lasting, stretches.end / lasting
+        self.piece = np.repeat(stretches.piece, len(GAUSS))
+        self.shares = (begin[:, None] + (end - begin)[:, None] * GAUSS).ravel()
+        self.weights = ((end - begin)[:, None] * WEIGHTS).ravel()
+
+    def at(self, durations: Array) -> tuple[float, Array]:
+        """The price, and its derivatives (n,) by the coasting times (n,) [s]."""
+        # Beside maneuvers a plan leaves trims out that last no time.
+        plan = replace(self.plan, durations=np.maximum(durations, MOMENT))
+        lasting = plan.primitive_durations[self.piece]
+        price, slopes = 0.0, np.zeros(len(self.timed))
+        for cost in self.costs:
+            motion = _Motion(cost, plan, self.model)
+            poses, twists, states = motion.steps(self.piece, self.shares * lasting)
+            rates, moved = motion.slopes(poses, twists, states)
+            weights = self.weights * lasting
+            price += float(weights @ rates)
+            x, y = poses[:, 0], poses[:, 1]
+            turned = moved[:, 2] + x * moved[:, 1] - y * moved[:, 0]  # about the origin
+            moved[:, 2] = turned
+            later = np.zeros((len(plan.primitives), moved.shape[1]))
+            np.add.at(later, self.piece, weights[:, None] * moved)
+            later = later[::-1].cumsum(axis=0)[::-1] - later
+            slopes += self._slopes(motion, later[self.timed])
+        return price, slopes
+
+    def _slopes(self, motion: _Motion, later: Array) -> Array:
+        """Derivatives by the coasting times: of what is `later` (n, dof), and where each ends."""
+        ends = motion.plan.switching_poses[self.timed + 1]
+        twists, states = motion.twists[self.timed], motion.states[self.timed]
+        c, s, turn = np.cos(ends[:, 2]), np.sin(ends[:, 2]), twists[:, 2]
+        v_x = c * twists[:, 0] - s * twists[:, 1] + turn * ends[:, 1]  # seen from the origin
+        v_y = s * twists[:, 0] + c * twists[:, 1] - turn * ends[:, 0]
+        spatial = np.column_stack([v_x, v_y, turn, twists[:, 3:]])
+        rates, _ = motion.slopes(ends, twists, states)
+        return np.asarray(rates + (spatial * later).sum(axis=1))
 
 
 class _Motion:
@@ -96,41 +174,53 @@ class _Motion:
         self.cost, self.plan, self.model = cost, plan, model
         self.group = group_of(plan.start.size)
         self.begins = plan.switching_poses
+        self.linked = [k for k, one in enumerate(plan.primitives) if not isinstance(one, Trim)]
+        dof, n_z = plan.start.size, len(model.reduced_names)
+        self.twists, self.states = (np.zeros((len(plan.primitives), n)) for n in (dof, n_z))
+        for k, one in enumerate(plan.primitives):
+            if isinstance(one, Trim):
+                self.twists[k], self.states[k] = one.body_velocity, one.reduced_state
 
     def at(self, piece: IntArray, since: Array) -> tuple[Array, NDArray[np.bool_]]:
         """Rates per second (n, k), and where the vehicle may be, in pieces (n, 1) at times [s]."""
-        dof, pieces = self.plan.start.size, np.broadcast_to(piece, since.shape)
-        steps, twists = np.zeros((*since.shape, dof)), np.zeros((*since.shape, dof))
-        states = np.zeros((*since.shape, len(self.model.reduced_names)))
-        for k in np.unique(piece):
-            here = pieces == k
-            steps[here], twists[here], states[here] = self._within(int(k), since[here])
-        poses = (self.group(self.begins[pieces]) @ self.group(steps)).pose
-        with_states = getattr(self.cost, "rates_along", None)
-        rates = np.asarray(
-            self.cost.rates(poses, twists)
-            if with_states is None
-            else with_states(poses, twists, states),
-            dtype=np.float64,
+        pieces = np.broadcast_to(piece, since.shape)
+        poses, twists, states = (
+            one.reshape(*since.shape, -1) for one in self.steps(pieces.ravel(), since.ravel())
         )
+        rates = np.asarray(rates_along(self.cost, poses, twists, states), dtype=np.float64)
         if rates.shape != since.shape or not (np.isfinite(rates).all() and (rates >= 0.0).all()):
             raise ValueError(
                 f"place cost {type(self.cost).__name__}: rates of shape {rates.shape} "
                 f"from {rates.min(initial=0.0):g}, need finite ones of at least 0 "
                 f"of shape {since.shape}"
             )
-        if self.cost.per == "metre":
-            way = [0, 1, *range(3, dof)]
-            rates = rates * np.linalg.norm(twists[..., way], axis=-1)
-        return rates, allowed(self.cost, poses, twists)
+        return rates * self._paces(twists), allowed(self.cost, poses, twists)
 
-    def _within(self, k: int, since: Array) -> tuple[Array, Array, Array]:
-        """Motion since a primitive began, twists and reduced states, at times (n,) [s]."""
+    def slopes(self, poses: Array, twists: Array, states: Array) -> tuple[Array, Array]:
+        """Rates per second (n,) at poses (n, dof), and their derivatives (n, dof) by the pose."""
+        paces = self._paces(twists)
+        rates = np.asarray(rates_along(self.cost, poses, twists, states)) * paces
+        return rates, gradient_of(self.cost, poses, twists, states) * paces[:, None]
+
+    def _paces(self, twists: Array) -> Array:
+        """Factors (...,) of rates to be rates per second."""
+        if self.cost.per == "second":
+            return np.ones(twists.shape[:-1])
+        return np.asarray(np.sqrt((np.delete(twists, 2, axis=-1) ** 2).sum(axis=-1)))
+
+    def steps(self, piece: IntArray, since: Array) -> tuple[Array, Array, Array]:
+        """Poses, twists and reduced states (n, ...) in pieces (n,) at times (n,) [s] in each."""
+        twists, states = self.twists[piece], self.states[piece]
+        steps = np.array(self.group.exp(since[:, None] * twists).pose)
+        for k in self.linked:
+            here = np.flatnonzero(piece == k)
+            if here.size:
+                steps[here], twists[here], states[here] = self._along(k, since[here])
+        return (self.group(self.begins[piece]) @ self.group(steps)).pose, twists, states
+
+    def _along(self, k: int, since: Array) -> tuple[Array, Array, Array]:
+        """Motion since a maneuver began, twists and reduced states, at times (n,) [s]."""
         primitive: Any = self.plan.primitives[k]
-        if isinstance(primitive, Trim):
-            twists = np.tile(primitive.body_velocity, (since.size, 1))
-            states = np.tile(primitive.reduced_state, (since.size, 1))
-            return self.group.exp(since[:, None] * twists).pose, twists, states
         course = primitive.course
         if course is None:
             raise ValueError(f"maneuver {primitive.name!r}: has no course, so no price of places")
@@ -156,28 +246,26 @@ class _Motion:
 
 def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     """Stretches of a plan that are not longer than a scale [m], and do not turn far."""
-    pieces, begins, ends = list[Any](), list[Array](), list[Array]()
-    for k, (primitive, lasting) in enumerate(
-        zip(plan.primitives, plan.primitive_durations.tolist(), strict=True)
-    ):
-        if lasting <= 0.0:
-            continue
-        if isinstance(primitive, Trim):
-            edges = np.array([0.0, lasting])
-            steps = np.abs(lasting * primitive.body_velocity[None])
-        else:
-            edges, steps = _between_controls(primitive)
-        way = np.linalg.norm(steps[:, [0, 1, *range(3, steps.shape[1])]], axis=1)
-        parts = np.maximum(np.ceil(np.maximum(way / scale, steps[:, 2] / TURN)), 1.0).astype(int)
-        row = np.repeat(np.arange(len(parts)), parts)
-        share = (np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[row]
-        times = np.append(edges[row] + share * np.diff(edges)[row], edges[-1])
-        pieces.append(np.full(len(times) - 1, k))
-        begins.append(times[:-1])
-        ends.append(times[1:])
-    if not pieces:
-        return _Intervals(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0))
-    return _Intervals(np.concatenate(pieces), np.concatenate(begins), np.concatenate(ends))
+    count, lasting = len(plan.primitives), plan.primitive_durations
+    steps = np.zeros((count, plan.start.size))
+    linked = list[tuple[int, Array, Array]]()
+    for k, one in enumerate(plan.primitives):
+        if isinstance(one, Trim):
+            steps[k] = one.body_velocity * lasting[k]
+        elif lasting[k] > 0.0:
+            linked.append((k, *_between_controls(one)))
+    coasts = np.flatnonzero([isinstance(one, Trim) for one in plan.primitives] & (lasting > 0.0))
+    piece = np.concatenate([coasts, *(np.full(len(ways), k) for k, _, ways in linked)])
+    begin = np.concatenate([np.zeros(len(coasts)), *(edges[:-1] for _, edges, _ in linked)])
+    end = np.concatenate([lasting[coasts], *(edges[1:] for _, edges, _ in linked)])
+    ways = np.abs(np.concatenate([steps[coasts], *(ways for _, _, ways in linked)]))
+    way = np.sqrt((np.delete(ways, 2, axis=1) ** 2).sum(axis=1))
+    parts = np.maximum(np.ceil(np.maximum(way / scale, ways[:, 2] / TURN)), 1.0).astype(np.int64)
+    row = np.repeat(np.arange(len(parts)), parts)
+    number = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
+    length = ((end - begin) / parts)[row]
+    first = begin[row] + number * length
+    return _Intervals(piece[row].astype(np.int64), first, first + length)
 
 
 def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
@@ -189,13 +277,3 @@ def _between_controls(maneuver: Maneuver) -> tuple[Array, Array]:
     rows = np.concatenate([[0], 1 + np.flatnonzero(changes), [len(course.time) - 1]])
     steps = np.add.reduceat(np.abs(np.diff(course.pose, axis=0)), rows[:-1])
     return course.time[rows], steps
-
-
-def _halved(todo: _Intervals, split: NDArray[np.bool_]) -> _Intervals:
-    piece, begin, end = todo.piece[split], todo.begin[split], todo.end[split]
-    middle = 0.5 * (begin + end)
-    return _Intervals(
-        np.repeat(piece, 2),
-        np.column_stack([begin, middle]).ravel(),
-        np.column_stack([middle, end]).ravel(),
-    )

@@ -22,25 +22,21 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import (
     AnyObstacle,
     AnyShape,
-    Obstacle,
     OccupancyMap,
     Shape,
     as_shapes,
 )
+from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP
+from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.motion import planar
-from maneuver_automaton.collision.surroundings import (
-    ObstacleDistances,
-    ShapePart,
-    parts_of,
-    surroundings_around,
-)
+from maneuver_automaton.collision.surroundings import parts_of
+from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2, LieGroup
 
 PER = ("metre", "second")
 SCALE = 0.1  # [m] nothing that is priced is finer, unless a cost says its own `scale`
-SHARE = 2e-4  # of a plan's whole cost: by how much the price of its places may be off, estimated
-ROUNDS = 24  # in which intervals are halved
 STEP = 1e-4  # [m, rad] of central differences
+EXACT = 1.1 / (NEAR * SHARP)  # of a reach to a distance, below which clearances are exact
 
 
 class PlaceCost(Protocol):
@@ -49,8 +45,8 @@ class PlaceCost(Protocol):
     Rates and `per` are all that it takes. It may also have ``gradient(poses, velocities)``, its
     derivatives (..., dof) by the pose; ``least(low, high)``, a number that no rate is below while
     x and y [m] are in a box; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the cost once
-    it knows obstacles and body; ``scale`` [m], the size of its finest feature; and
-    ``allows(poses, velocities)``, where the vehicle may be at all. What is missing is found by
+    it knows obstacles and body; ``scale`` [m], the size of its finest feature;
+    and ``allows(poses, velocities)``, where the vehicle may be at all. What is missing is found by
     differences, is 0, or is the cost at poses moved back.
 
     Examples
@@ -133,18 +129,26 @@ class Clearance:
 
     def on(self, problem: _Surrounded) -> PlaceCost:
         """The cost among the obstacles of a problem, for its body."""
-        names = {} if not problem.parts else {n: k for k, n in enumerate(_part_names(problem))}
-        bodies = [(None, parts_of(problem.footprint))]
-        carried = [(names[name], parts_of(shapes)) for name, shapes in problem.parts.items()]
+        names: tuple[str, ...] = problem.automaton.model.part_names
+        bodies: list[tuple[int | None, tuple[Shape, ...]]] = [(None, problem.footprint)]
+        bodies += [(names.index(name), shapes) for name, shapes in problem.parts.items()]
+        frame = own_frame(problem.obstacles, np.zeros(3))
         kinds: dict[tuple[float, float] | None, list[AnyObstacle]] = {}
         for one in problem.obstacles:
-            height = one.height if isinstance(one, Obstacle) else None
-            if not (isinstance(one, Obstacle) and one.motion is not None):
-                kinds.setdefault(height, []).append(one)
+            if isinstance(one, OccupancyMap):
+                kinds.setdefault(None, []).append(one)
+            elif one.motion is None:
+                kinds.setdefault(one.height, []).append(one)
+        around: list[tuple[int | None, tuple[float, float] | None, World]] = []
+        for height, standing in kinds.items():
+            for part, shapes in bodies:
+                world = world_of(tuple(standing), shapes, frame, keep=float(self.within))
+                # Clearances are exact below a share of the reach of a body.
+                body = world.body._replace(reach=max(world.body.reach, EXACT * self.within))
+                around.append((part, height, replace(world, body=body)))
         return _Near(
             clearance=self,
-            bodies=(*bodies, *carried),
-            around=tuple((h, surroundings_around(tuple(k), (0.0, 0.0))) for h, k in kinds.items()),
+            around=tuple(around),
             body_height=problem.body_height,
             automaton=problem.automaton,
         )
@@ -155,8 +159,8 @@ class _Near:
     """A clearance among obstacles."""
 
     clearance: Clearance
-    bodies: tuple[tuple[int | None, list[ShapePart]], ...]  # number of the part, None: the own one
-    around: tuple[tuple[tuple[float, float] | None, ObstacleDistances], ...]  # by heights
+    # number of a part or None for the body, the heights of obstacles [m], and how it is among them
+    around: tuple[tuple[int | None, tuple[float, float] | None, World], ...]
     body_height: tuple[float, float]  # [m]
     automaton: Automaton
 
@@ -172,14 +176,14 @@ class _Near:
         return self.rates_along(poses, velocities, None)
 
     def rates_along(self, poses: Array, velocities: Array, states: Array | None) -> Array:
-        near = np.maximum(1.0 - self.distances(poses, states) / self.clearance.within, 0.0)
+        near = 1.0 - self.distances(poses, states) / self.clearance.within
         return np.asarray(self.clearance.weight * near * near)
 
     def distances(self, poses: Array, states: Array | None) -> Array:
-        """To the nearest obstacle (...,) [m]; what is carried counts where states are known."""
+        """To the nearest obstacle (...,), at most `within` [m]; carried parts need states."""
         flat = poses.reshape(-1, poses.shape[-1])
-        best = np.full(len(flat), math.inf)
-        for part, body in self.bodies:
+        best = np.full(len(flat), self.clearance.within)
+        for part, height, world in self.around:
             frames = flat[:, :3]
             if part is not None:
                 if states is None:
@@ -187,33 +191,18 @@ class _Near:
                 model: Any = self.automaton.model
                 seen = np.asarray(model.part_poses(states.reshape(len(flat), -1)))[:, part, :3]
                 frames = (SE2(frames) @ SE2(seen)).pose
-            for height, around in self.around:
-                rows = self._level_with(height, flat)
-                if rows.any():
-                    found = self._to_obstacles(around, body, frames[rows])
-                    best[rows] = np.minimum(best[rows], found)
-        return np.asarray(best.reshape(poses.shape[:-1]))
+            rows = self._level_with(height, flat)
+            found = np.maximum(clearances(world, world.into(frames[rows])), 0.0)
+            best[rows] = np.minimum(best[rows], found)
+        return best.reshape(poses.shape[:-1])
 
-    def _to_obstacles(
-        self, around: ObstacleDistances, body: list[ShapePart], frames: Array
-    ) -> Array:
-        """Distances (n,) [m] of a body, exact where they are less than `within`."""
-        middle, reach = (
-            body[0].middle,
-            max(math.dist(body[0].middle, one.middle) + one.reach for one in body),
-        )
-        centers = np.column_stack([SE2(frames).act(middle), np.zeros(len(frames))])
-        found = around.nearest(parts_of(()), centers, np.zeros(len(frames))).distance - reach
-        near = np.flatnonzero(found < self.clearance.within)
-        times, within = np.zeros(near.size), self.clearance.within
-        found[near] = around.nearest(body, frames[near], times, within=within).distance
-        return found
-
-    def _level_with(self, height: tuple[float, float] | None, poses: Array) -> NDArray[np.bool_]:
-        """Whether the body is neither above nor below obstacles of a height."""
+    def _level_with(
+        self, height: tuple[float, float] | None, poses: Array
+    ) -> NDArray[np.bool_] | slice:
+        """Where the body is neither above nor below obstacles of a height."""
         low, high = self.body_height
         if height is None or (poses.shape[1] == 3 and low == high == 0.0):
-            return np.ones(len(poses), dtype=np.bool_)
+            return slice(None)
         altitude = poses[:, 3:].sum(axis=1)
         return np.asarray((altitude + low <= height[1]) & (altitude + high >= height[0]))
 
@@ -586,16 +575,28 @@ def allowed(cost: PlaceCost, poses: Array, velocities: Array) -> NDArray[np.bool
     return np.ones(poses.shape[:-1], dtype=np.bool_) if own is None else own(poses, velocities)
 
 
-def gradient_of(cost: PlaceCost, poses: Array, velocities: Array) -> Array:
+def rates_along(cost: PlaceCost, poses: Array, velocities: Array, states: Array | None) -> Array:
+    """Rates (...,) where reduced states (..., n_z) are known, which place what is carried."""
+    with_states: Callable[..., Array] | None = getattr(cost, "rates_along", None)
+    if with_states is None:
+        return cost.rates(poses, velocities)
+    return with_states(poses, velocities, states)
+
+
+def gradient_of(
+    cost: PlaceCost, poses: Array, velocities: Array, states: Array | None = None
+) -> Array:
     """Derivatives (..., dof) of the rates by the pose: its own, or central differences."""
     own: Callable[[Array, Array], Array] | None = getattr(cost, "gradient", None)
     if own is not None:
-        return own(poses, velocities)
+        return np.array(own(poses, velocities))
     slopes = np.empty(poses.shape)
     for k in range(poses.shape[-1]):
         step = np.zeros(poses.shape[-1])
         step[k] = STEP
-        ahead, behind = (cost.rates(poses + sign * step, velocities) for sign in (1.0, -1.0))
+        ahead, behind = (
+            rates_along(cost, poses + sign * step, velocities, states) for sign in (1.0, -1.0)
+        )
         slopes[..., k] = (ahead - behind) / (2.0 * STEP)
     return slopes
 
@@ -605,11 +606,6 @@ def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:
     middle = np.clip(at - 0.5, 0.0, count - 1.0)
     cell = np.minimum(middle.astype(np.int64), count - 1)
     return cell, middle - cell
-
-
-def _part_names(problem: _Surrounded) -> tuple[str, ...]:
-    names: tuple[str, ...] = problem.automaton.model.part_names
-    return names
 
 
 def _check_number(what: str, value: float) -> None:

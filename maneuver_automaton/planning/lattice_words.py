@@ -70,6 +70,7 @@ class Lattice(Step):
 
     polish: Polish | None = None  # of what it finds; it then gets a share of the time alone
     words: list[Word] = field(default_factory=list)  # found so far, the cheapest last
+    passed: Word | None = None  # the last that was offered, and passed the checks
     spent: int = 0  # expansions of first plans and improvements
     found: Incumbents = field(init=False)
     query: LatticeQuery = field(init=False)
@@ -191,7 +192,8 @@ class Lattice(Step):
     @property
     def candidates(self) -> list[Candidate]:
         """Words that are to be checked, the cheapest first."""
-        return [_candidate(self.query, word) for word in self.words[::-1] if self.finds_plans]
+        words = [word for word in self.words[::-1] if word is not self.passed]
+        return [_candidate(self.query, word) for word in words if self.finds_plans]
 
     def gained(self, word: Word) -> None:
         """A better word was found."""
@@ -203,7 +205,8 @@ class Lattice(Step):
                 return
         if not self.found.may_check:
             return
-        self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal])
+        if self.found.offer(plan_of_word(self.query, word), self.query.goal_index[word.goal]):
+            self.passed = word
         # Polishing finds better times, and takes what time there is.
         if not self.finds_plans and self.polish is None and self.found.wants_more:
             self.offer_best_times()
@@ -296,6 +299,8 @@ class Lattice(Step):
         if self.polish:
             return left.stage(ALONE_BEFORE_POLISHING if self.alone else BEFORE_POLISHING)
         share = FOR_THE_BEST if self.finds_plans and self.found.alternatives else 1.0
+        if self.query.problem.place_costs:  # whose best times are found after that
+            left = left.part(1.0 - TIMES_SHARE)
         most = None if left.expansions is None else int(share * left.expansions)
         return replace(left.part(share), expansions=most)
 

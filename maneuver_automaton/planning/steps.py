@@ -39,10 +39,13 @@ from maneuver_automaton.planning.polishing import Polish, why_not_polished
 from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
 from maneuver_automaton.planning.within_tolerance import WithinTolerance
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.refinement.stop_and_steer import follows_paths
 from maneuver_automaton.search.beginning import begin, end
 from maneuver_automaton.search.limits import why_impossible
 from maneuver_automaton.words.maneuver_words import only_maneuvers_turn
+
+SAVING = 1e-3  # share of a cost that better times have to save for others to be looked for
 
 
 class Steps(NamedTuple):
@@ -138,11 +141,11 @@ def search_steps(problem: Problem) -> Steps:
     invariant = not problem.place_costs  # then reduced costs are those of the whole
     if not problem.has_inertia:
         if not uses_lattice(problem):
-            return Steps([NearlyMet(), AllWords()], certified=invariant)
+            return Steps([NearlyMet(), AllWords(), BestTimes()], certified=invariant)
         climbs = problem.start.size > 3
         first: list[Step] = [Checks(), FreeWords()] if climbs else []
         lattice = [Lattice()] if method in ("auto", "lattice") else []
-        return Steps([NearlyMet(), *first, *lattice], UNFINISHED)
+        return Steps([NearlyMet(), *first, *lattice, BestTimes()], UNFINISHED)
     searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
     stops = follows_paths(automaton.model) and steers_at_rest(automaton.model)
     along = searched and stops and problem.rests_at_both_ends
@@ -159,6 +162,7 @@ def search_steps(problem: Problem) -> Steps:
         steps.append(Lattice(polish))
     if polish:
         steps.append(polish)
+    steps.append(BestTimes())
     return Steps(steps, POLISHED, certified=invariant)
 
 
@@ -239,6 +243,25 @@ class NearlyMet(Step):
     def offer(self, found: Incumbents) -> None:
         """Offer the first that passes the checks."""
         found.offer_nearly_met()
+
+
+class BestTimes(Step):
+    """The cheapest plan with the best of its coasting times, by what its places cost."""
+
+    def is_due(self, found: Incumbents) -> bool:
+        """Whether places cost something, and there is time to make a plan better."""
+        placed, better = found.problem.place_costs, found.problem.search.improve
+        return bool(placed and better and found.plans) and not found.budget.is_over
+
+    def offer(self, found: Incumbents) -> None:
+        """Offer such plans as long as they save enough; they are checked as others are."""
+        before = math.inf
+        while found.cost < before * (1.0 - SAVING) and found.may_check:
+            before, best = found.cost, found.plans[0]
+            goal = found.problem.goals[best.goal_index]
+            better = with_relaxed_end(found.problem, best.plan, goal, budget=found.for_better)
+            if better is not None and found.may_check:
+                found.offer(better, best.goal_index, proven=False)
 
 
 class Checks(Step):

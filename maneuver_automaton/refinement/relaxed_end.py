@@ -1,4 +1,4 @@
-"""Let a plan end anywhere within the tolerance of its goal where that is cheaper."""
+"""The best coasting times of a word, by its whole cost; within a tolerance it may end anywhere."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.place_prices import TimedPrices
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
 from maneuver_automaton.words.closing import EndConditions, conjugated
@@ -21,6 +22,7 @@ from maneuver_automaton.words.closing import EndConditions, conjugated
 INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100
 ACCURACY = 1e-12  # of the cost, relative to itself
+ROUGHLY = 1e-8  # the same where places cost something, whose price is not that smooth
 CLOSING_STEPS = 4
 RANK = 1e-9  # singular values below this, relative, count as none
 
@@ -201,16 +203,23 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
         if budget.is_over:
             raise _OutOfTime
 
+    costs = task.problem.bound_place_costs
+    places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
+
+    def cost(times: Array) -> tuple[float, Array]:
+        price, slopes = places.at(times) if places else (0.0, 0.0)
+        return (float(rates @ times) + price) / scale, (rates + slopes) / scale
+
     try:
         solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
-            lambda t: float(rates @ t) / scale,
+            cost,
             begin,
-            jac=lambda t: rates / scale,
+            jac=True,
             method="SLSQP",
             bounds=Bounds(least, longest),
             constraints=conditions,
             callback=ask,
-            options={"maxiter": ITERATIONS, "ftol": ACCURACY},
+            options={"maxiter": ITERATIONS, "ftol": ROUGHLY if costs else ACCURACY},
         )
     except _OutOfTime:
         return None
