@@ -10,7 +10,7 @@ nothing touches; and the distance of the skins is that in the plane.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -122,7 +122,10 @@ def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list
     """
     shapes = [None if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
     boxes = [one for one in shapes if isinstance(one, Box)]
-    fans = iter(box_corners(boxes)[:, [[[0, 1, 2], [0, 2, 3]]]] if boxes else ())
+    fans: Iterator[Cover] = iter(())
+    if boxes:
+        both = _region(box_corners(boxes)[:, [[0, 1, 2], [0, 2, 3]]])
+        fans = map(Cover, both.cover.reshape(-1, 2, 3, 2), both.posts.reshape(-1, 2, 2, 2))
     regions = []
     for one, shape in zip(obstacles, shapes, strict=True):
         if isinstance(one, OccupancyMap):
@@ -133,7 +136,7 @@ def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list
             parts = [_region(_triangles(part)[None]) for part in outlines(shape)]
             regions.append(Cover(*map(np.concatenate, zip(*parts, strict=True))))
         else:
-            regions.append(_region(next(fans)))
+            regions.append(next(fans))
     return regions
 
 
