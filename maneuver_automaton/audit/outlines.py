@@ -98,10 +98,7 @@ def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)
     if not shapes:
         point = np.zeros(1, dtype=np.complex128)
         return Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
-    return _outline(shapes, np.tile(origin, (len(shapes), 1)))
-
-
-_NOTHING = Outline(*np.zeros((2, 0), dtype=np.complex128), np.zeros(0), np.zeros(0, dtype=np.int64))
+    return _outlined(shapes, np.tile(origin, (len(shapes), 1)))[0]
 
 
 @functools.lru_cache(maxsize=32)
@@ -161,33 +158,49 @@ def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
     return whole[0], whole[1], whole[2], whole[3]
 
 
-def _outline(shapes: Sequence[Shape], origins: Array) -> Outline:
-    """The outline of shapes, each a solid, counted from an origin of its own (n, 2) [m]."""
-    rings: list[list[Array]] = [[] for _ in shapes]
-    boxes = [(k, one) for k, one in enumerate(shapes) if isinstance(one, Box)]
+def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[Outline, IntArray]:
+    """The outline of solids, counted from origins of their own (n, 2) [m], and whose each edge is.
+
+    A map without a blocked cell has no edge, and is no solid.
+    """
+    nothing = np.zeros(0, dtype=np.complex128)
+    found = [(np.zeros(0, dtype=np.int64), nothing, nothing, np.zeros(0))]
+    boxes = [(k, one) for k, one in enumerate(solids) if isinstance(one, Box)]
+    discs = [(k, one) for k, one in enumerate(solids) if isinstance(one, Disc)]
+    polygons = [(k, one) for k, one in enumerate(solids) if isinstance(one, Polygon)]
+    maps = [(k, one) for k, one in enumerate(solids) if isinstance(one, OccupancyMap)]
     if boxes:
-        numbers = [k for k, _ in boxes]
-        corners = np.zeros((len(boxes), 4, 3))
-        corners[..., :2] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
-        corners[..., :2] *= np.array([one.size for _, one in boxes])[:, None]
-        centers = np.array([one.center for _, one in boxes]) - origins[numbers]
-        headings = np.array([[one.heading] for _, one in boxes])
-        places = placed(np.concatenate([centers, headings], axis=1)[:, None], corners)
-        for k, ring in zip(numbers, places[..., :2], strict=True):
-            rings[k] = [ring]
-    polygons, given = [], []
-    for k, (one, origin) in enumerate(zip(shapes, origins, strict=True)):
-        if isinstance(one, Disc):
-            rings[k] = [one.center[None] - origin]
-        elif isinstance(one, Polygon):
-            polygons.append(k)
-            given.append((one.corners - origin, [hole - origin for hole in one.holes]))
-    for k, found in zip(polygons, _solid_rings(given) if given else (), strict=True):
-        rings[k] = found
-    solid = np.repeat(np.arange(len(shapes)), [sum(map(len, some)) for some in rings])
-    radius = np.array([one.radius if isinstance(one, Disc) else 0.0 for one in shapes])[solid]
-    begins, ends = _edges([ring for some in rings for ring in some])
-    return Outline(begins, ends, radius, solid)
+        numbers = np.array([k for k, _ in boxes])
+        seen = np.zeros((numbers.size, 4, 3))
+        seen[..., :2] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+        seen[..., :2] *= np.array([one.size for _, one in boxes])[:, None]
+        frames = np.array([[*one.center, one.heading] for _, one in boxes])
+        frames[:, :2] -= origins[numbers]
+        corners = points_of(placed(frames[:, None], seen))
+        following = np.roll(corners, -1, axis=1)
+        found.append(
+            (numbers.repeat(4), corners.ravel(), following.ravel(), np.zeros(corners.size))
+        )
+    if discs:
+        numbers = np.array([k for k, _ in discs])
+        centers = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
+        found.append((numbers, centers, centers, np.array([one.radius for _, one in discs])))
+    if polygons:
+        given = [
+            (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
+            for k, one in polygons
+        ]
+        rings = [*zip([k for k, _ in polygons], _solid_rings(given), strict=True)]
+        numbers = np.repeat([k for k, _ in rings], [sum(map(len, some)) for _, some in rings])
+        both = _edges([ring for _, some in rings for ring in some])
+        found.append((numbers, *both, np.zeros(numbers.size)))
+    for k, one in maps:
+        begins, ends, radius, _ = map_outline(one, (float(origins[k, 0]), float(origins[k, 1])))
+        found.append((np.full(radius.size, k), begins, ends, radius))
+    owner, begins, ends, radius = (np.concatenate(column) for column in zip(*found, strict=True))
+    order = np.argsort(owner, kind="stable")
+    solid = np.unique(owner[order], return_inverse=True)[1]
+    return Outline(begins[order], ends[order], radius[order], solid), owner[order]
 
 
 def _edges(rings: Sequence[Array]) -> tuple[Points, Points]:
@@ -426,7 +439,8 @@ def surroundings_around(
             motion = one.motion
             motions.append(Motion(motion.time, motion.pose - [*origin, 0.0], motion.twist))
             present.append(one.presence)
-    whole, owners = _outlines(obstacles, origin)
+    solids = [one if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
+    whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
     index, heights_of = number[owners], heights[owners]
     still, moving = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
     knots = Knots.of(motions)
@@ -455,27 +469,6 @@ def surroundings_around(
         rounds=bool(whole.radius.any()),
         right=float((whole.begins.real + whole.radius).max(initial=0.0)),
     )
-
-
-def _outlines(
-    obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float]
-) -> tuple[Outline, IntArray]:
-    """The outlines of obstacles as one, each a solid, and which one each edge is of (n,)."""
-    shapes = [(k, one) for k, one in enumerate(obstacles) if isinstance(one, Obstacle)]
-    found, owners = [_NOTHING], [_NOTHING.solid]
-    if shapes:
-        from_where = [(0.0, 0.0) if one.motion is not None else origin for _, one in shapes]
-        found.append(_outline([one.shape for _, one in shapes], np.array(from_where)))
-        owners.append(np.array([k for k, _ in shapes])[found[-1].solid])
-    for k, one in enumerate(obstacles):
-        if isinstance(one, OccupancyMap):
-            found.append(map_outline(one, origin))
-            owners.append(np.full(found[-1].radius.size, k))
-    begins, ends, radius, _ = (np.concatenate(column) for column in zip(*found, strict=True))
-    owner = np.concatenate(owners)
-    order = np.argsort(owner, kind="stable")
-    solid = np.unique(owner[order], return_inverse=True)[1]
-    return Outline(begins[order], ends[order], radius[order], solid), owner[order]
 
 
 def _geometries(outline: Outline, still: IntArray, heights: Array) -> Any:
