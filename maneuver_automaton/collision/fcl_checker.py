@@ -323,8 +323,8 @@ class _Ground:
         if not waiting.size:
             return laid
         low, high = own[waiting, None, :2], own[waiting, None, 2:]
-        apart = (low > boxes[:, 2:]).any(axis=-1) | (high < boxes[:, :2]).any(axis=-1)
-        near = waiting[~apart.all(axis=1)]
+        meets = np.all((low <= boxes[:, 2:]) & (high >= boxes[:, :2]), axis=-1)
+        near = waiting[np.any(meets, axis=1)]
         if not near.size:
             return laid
         rows = laid.rows.copy()
@@ -333,8 +333,9 @@ class _Ground:
         found = [self.obstacles[k] for k in which.tolist()]
         skin, of = obstacle_skin(obstacle_regions(found, excess=self.excess))
         static = _object(skin) if of.size else None
-        self.laid = _Laid(rows, static, self.numbers[which][of])  # at once, as others may ask
-        return self.laid
+        # Other threads may lay out others meanwhile: this call goes on with its own.
+        self.laid = laid = _Laid(rows, static, self.numbers[which][of])
+        return laid
 
 
 class _Sliced(NamedTuple):
@@ -407,9 +408,9 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
         )
         parts = shapely.polygons(rings)
         plain = shapely.is_valid(parts) & (shapely.area(parts) > 0.0)
-        for one, whole in zip(polygons, plain.tolist(), strict=True):
-            if one.holes or not whole:
-                outlines(one)  # refuses one without area
+        for polygon, whole in zip(polygons, plain.tolist(), strict=True):
+            if polygon.holes or not whole:
+                outlines(polygon)  # refuses one without area
     return boxes
 
 

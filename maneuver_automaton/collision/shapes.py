@@ -138,7 +138,7 @@ class Box:
     @property
     def corners(self) -> Array:
         """Corners (4, 2) counter-clockwise, the first behind on the right [m]."""
-        return box_corners((self,))[0]
+        return np.asarray(box_corners((self,))[0])
 
     def moved(self, by: LieGroup) -> Box:
         """The shape moved by a planar pose."""
