@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
@@ -18,7 +18,9 @@ from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
     Disc,
+    Obstacle,
     OccupancyMap,
+    Polygon,
     Shape,
 )
 
@@ -96,7 +98,7 @@ def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)
     if not shapes:
         point = np.zeros(1, dtype=np.complex128)
         return Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
-    return joined([_outline(shape, np.array(origin)) for shape in shapes])
+    return _outlined(shapes, np.tile(origin, (len(shapes), 1)))[0]
 
 
 @functools.lru_cache(maxsize=32)
@@ -121,20 +123,6 @@ def body_outline(shapes: tuple[Shape, ...]) -> BodyOutline:
         radius=float(edges.radius.max()),
         middle=middle,
         size=float((np.abs(corners - middle) + edges.radius).max()),
-    )
-
-
-def joined(outlines: Sequence[Outline]) -> Outline:
-    """Several outlines as one."""
-    if not outlines:
-        nothing = np.zeros(0, dtype=np.complex128)
-        return Outline(nothing, nothing, np.zeros(0), np.zeros(0, dtype=np.int64))
-    counts = [0, *np.cumsum([int(one.solid.max(initial=-1)) + 1 for one in outlines])[:-1].tolist()]
-    return Outline(
-        np.concatenate([one.begins for one in outlines]),
-        np.concatenate([one.ends for one in outlines]),
-        np.concatenate([one.radius for one in outlines]),
-        np.concatenate([one.solid + n for one, n in zip(outlines, counts, strict=True)]),
     )
 
 
@@ -170,35 +158,81 @@ def _borders(changes: Array) -> tuple[Array, Array, Array, Array]:
     return whole[0], whole[1], whole[2], whole[3]
 
 
-def _outline(shape: Shape, origin: Array) -> Outline:
-    if isinstance(shape, Disc):
-        center = points_of(shape.center[None] - origin)
-        return Outline(center, center, np.array([shape.radius]), np.zeros(1, dtype=np.int64))
-    if isinstance(shape, Box):
-        corners = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]) * shape.size
-        frame = np.append(shape.center - origin, shape.heading)
-        return _rings([placed(frame, np.column_stack([corners, np.zeros(4)]))[:, :2]])
-    holes = [hole - origin for hole in shape.holes]
-    return _rings(_solid_rings(shape.corners - origin, holes))
+def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[Outline, IntArray]:
+    """The outline of solids, counted from origins of their own (n, 2) [m], and whose each edge is.
+
+    A map without a blocked cell has no edge, and is no solid.
+    """
+    nothing = np.zeros(0, dtype=np.complex128)
+    found = [(np.zeros(0, dtype=np.int64), nothing, nothing, np.zeros(0))]
+    boxes = [(k, one) for k, one in enumerate(solids) if isinstance(one, Box)]
+    discs = [(k, one) for k, one in enumerate(solids) if isinstance(one, Disc)]
+    polygons = [(k, one) for k, one in enumerate(solids) if isinstance(one, Polygon)]
+    maps = [(k, one) for k, one in enumerate(solids) if isinstance(one, OccupancyMap)]
+    if boxes:
+        numbers = np.array([k for k, _ in boxes])
+        seen = np.zeros((numbers.size, 4, 3))
+        seen[..., :2] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
+        seen[..., :2] *= np.array([one.size for _, one in boxes])[:, None]
+        frames = np.array([[*one.center, one.heading] for _, one in boxes])
+        frames[:, :2] -= origins[numbers]
+        corners = points_of(placed(frames[:, None], seen))
+        following = np.roll(corners, -1, axis=1)
+        found.append(
+            (numbers.repeat(4), corners.ravel(), following.ravel(), np.zeros(corners.size))
+        )
+    if discs:
+        numbers = np.array([k for k, _ in discs])
+        centers = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
+        found.append((numbers, centers, centers, np.array([one.radius for _, one in discs])))
+    if polygons:
+        given = [
+            (one.corners - origins[k], [hole - origins[k] for hole in one.holes])
+            for k, one in polygons
+        ]
+        rings = [*zip([k for k, _ in polygons], _solid_rings(given), strict=True)]
+        numbers = np.repeat([k for k, _ in rings], [sum(map(len, some)) for _, some in rings])
+        both = _edges([ring for _, some in rings for ring in some])
+        found.append((numbers, *both, np.zeros(numbers.size)))
+    for k, one in maps:
+        begins, ends, radius, _ = map_outline(one, (float(origins[k, 0]), float(origins[k, 1])))
+        found.append((np.full(radius.size, k), begins, ends, radius))
+    owner, begins, ends, radius = (np.concatenate(column) for column in zip(*found, strict=True))
+    order = np.argsort(owner, kind="stable")
+    solid = np.unique(owner[order], return_inverse=True)[1]
+    return Outline(begins[order], ends[order], radius[order], solid), owner[order]
 
 
-def _rings(rings: Sequence[Array]) -> Outline:
+def _edges(rings: Sequence[Array]) -> tuple[Points, Points]:
+    """Where the edges of rings begin and end."""
+    lasts = np.cumsum([len(ring) for ring in rings]) - 1
+    following = np.arange(1, lasts[-1] + 2)
+    following[lasts] = np.append(0, lasts[:-1] + 1)
     begins = points_of(np.concatenate(rings))
-    ends = points_of(np.concatenate([np.roll(ring, -1, axis=0) for ring in rings]))
-    n = len(begins)
-    return Outline(begins, ends, np.zeros(n), np.zeros(n, dtype=np.int64))
+    return begins, begins[following]
 
 
-def _solid_rings(corners: Array, holes: Sequence[Array]) -> list[Array]:
-    """Rings of a polygon, the holes the other way around than what they are in.
+def _solid_rings(polygons: Sequence[tuple[Array, Sequence[Array]]]) -> Iterator[list[Array]]:
+    """Rings of polygons, corners and holes, the holes the other way around than what they are in.
 
     Rings that cross or touch themselves are cut into faces; those that they run around are solid.
     """
     import shapely
 
+    corners = [ring for ring, _ in polygons]
+    numbers = np.repeat(np.arange(len(corners)), [len(ring) for ring in corners])
+    rings = shapely.linearrings(np.concatenate(corners), indices=numbers)
+    every = shapely.polygons(rings)
+    plain = shapely.is_valid(every) & (shapely.area(every) > 0.0)
+    for (ring, holes), one in zip(polygons, plain.tolist(), strict=True):
+        yield [ring] if one and not holes else _cut_rings(ring, holes)
+
+
+def _cut_rings(corners: Array, holes: Sequence[Array]) -> list[Array]:
+    """Rings of one polygon that has holes, or whose ring crosses or touches itself."""
+    import shapely
+
     whole = shapely.Polygon(corners, holes)
-    if whole.is_valid and not holes and whole.area > 0.0:
-        return [corners]
     if not whole.is_valid:
         whole = _faces(corners)
         for hole in holes:
@@ -223,7 +257,9 @@ def _faces(ring: Array) -> Any:
     lines = shapely.get_parts(shapely.node(shapely.LineString(np.vstack([ring, ring[:1]]))))
     faces = shapely.get_parts(shapely.polygonize(lines))
     inner = [[face.representative_point().x, face.representative_point().y] for face in faces]
-    around = _rings([ring]).holds(points_of(np.array(inner).reshape(-1, 2)))[0]
+    n = len(ring)
+    own = Outline(*_edges([ring]), np.zeros(n), np.zeros(n, dtype=np.int64))
+    around = own.holds(points_of(np.array(inner).reshape(-1, 2)))[0]
     whole = shapely.union_all(faces[around])
     area = float(shapely.area(faces[around]).sum())
     if abs(whole.area - area) > LOST * area:  # uniting all at once has lost a face
@@ -391,29 +427,25 @@ def surroundings_around(
     """
     import shapely
 
-    outlines, heights, indices = [], [], []
     motions: list[Motion] = []
     present: list[tuple[float, float]] = []
-    for one in obstacles:
-        if isinstance(one, OccupancyMap):
-            outline, height, motion, there = map_outline(one, origin), None, None, None
-        else:
-            height, motion, there = one.height, one.motion, one.presence
-            outline = outline_of((one.shape,), origin if motion is None else (0.0, 0.0))
-        if motion is not None and there is not None:
+    heights = np.tile([-math.inf, math.inf], (len(obstacles), 1))
+    number = np.full(len(obstacles), -1)
+    for k, one in enumerate(obstacles):
+        if isinstance(one, Obstacle) and one.height is not None:
+            heights[k] = one.height
+        if isinstance(one, Obstacle) and one.motion is not None:
+            number[k] = len(motions)
+            motion = one.motion
             motions.append(Motion(motion.time, motion.pose - [*origin, 0.0], motion.twist))
-            present.append(there)
-        outlines.append(outline)
-        heights.append(height or (-math.inf, math.inf))
-        indices.append(-1 if motion is None else len(motions) - 1)
-    counts = [outline.radius.size for outline in outlines]
-    whole = joined(outlines)
-    index = np.repeat(np.array(indices, dtype=np.int64), counts)
+            present.append(one.presence)
+    solids = [one if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
+    whole, owners = _outlined(solids, np.where(number[:, None] < 0, origin, 0.0))
+    index, heights_of = number[owners], heights[owners]
     still, moving = np.flatnonzero(index < 0), np.flatnonzero(index >= 0)
-    heights_of = np.repeat(np.array(heights).reshape(-1, 2), counts, axis=0)
     knots = Knots.of(motions)
     fastest = np.array([float(one.speeds.max(initial=0.0)) for one in motions])
-    groups = tuple(whole.of(index == number) for number in range(len(motions)))
+    groups = tuple(whole.of(index == k) for k in range(len(motions)))
     movers = MovingEdges(
         motions=tuple(motions),
         knots=knots,
@@ -428,7 +460,7 @@ def surroundings_around(
     )
     return Surroundings(
         outline=whole,
-        owners=np.repeat(np.arange(len(counts)), counts),
+        owners=owners,
         heights=heights_of,
         motion_of_edge=index,
         movers=movers,

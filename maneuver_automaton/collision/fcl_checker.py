@@ -15,20 +15,23 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.motion import point_speeds
+from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
-    Obstacle,
+    Box,
+    Disc,
+    OccupancyMap,
     Shape,
+    box_corners,
 )
 from maneuver_automaton.collision.solids import (
-    Cover,
     Skin,
     body_skin,
-    obstacle_region,
+    obstacle_regions,
     obstacle_skin,
 )
 from maneuver_automaton.collision.swept import (
@@ -79,7 +82,7 @@ class FclChecker:
 
     Examples
     --------
-    >>> from maneuver_automaton.collision import Box
+    >>> from maneuver_automaton.collision import Box, Obstacle
     >>> wall = Obstacle(Box([0.1, 8.0], center=[5.0, 0.0]))
     >>> checker = FclChecker((Box([4.0, 2.0]),), (wall,))
     >>> checker.pose_hit([2.0, 0.0, 0.0]), checker.pose_hit([4.0, 0.0, 0.0])
@@ -110,10 +113,15 @@ class FclChecker:
         object.__setattr__(self, "_body", grown_body(self.footprint, self.margin, excess))
         object.__setattr__(self, "_ground", _ground_of(self.obstacles, (x, y), excess))
 
+    def lay_all(self) -> None:
+        """Have all obstacles ready, which otherwise are laid out as motions come near them."""
+        self._ground.near(np.array([[-math.inf, -math.inf, math.inf, math.inf]]))
+
     def pose_hit(self, pose: ArrayLike) -> int | None:
         """Which obstacle the body touches at a pose (3,); None if it is free."""
-        here = self._seen("pose", pose)
-        hit = self._first_pose_hit(here[None], np.zeros(1, dtype=np.int64))
+        here = self._seen("pose", pose)[None]
+        laid = self._laid_near(here, here)
+        hit = self._first_pose_hit(here, np.zeros(1, dtype=np.int64), laid)
         return None if hit is None else hit[1]
 
     def motions_hit(
@@ -139,7 +147,11 @@ class FclChecker:
         lasting = as_array("durations", durations)
         if lasting.size and not lasting.min() >= 0.0:
             raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
-        return self._first_hit(here, twists, lasting, ask)
+        with np.errstate(divide="ignore", over="ignore"):
+            across = np.minimum(lasting, 2.0 / np.abs(twists[:, 2]))  # of a circle
+        far = (np.hypot(twists[:, 0], twists[:, 1]) * across)[:, None]
+        laid = self._laid_near(here[:, :2] - far, here[:, :2] + far)
+        return self._first_hit(here, twists, lasting, laid, ask)
 
     def courses_hit(
         self, courses: Sequence[Course], *, ask: Callable[[], None] = lambda: None
@@ -156,9 +168,15 @@ class FclChecker:
         every = as_array("poses", np.concatenate([one.poses for one in courses]), last=3)
         seen = (SE2(starts[number]) @ SE2(every)).pose
         rows = np.flatnonzero(number[1:] == number[:-1])
+        if not rows.size:
+            return None
         poses = np.stack([seen[rows], seen[rows + 1]])
         steps = (SE2(poses[0]).inverse() @ SE2(poses[1])).log()
-        hit = self._first_step_hit(poses, steps, number[rows], ask)
+        far = np.hypot(steps[:, 0], steps[:, 1])[:, None]
+        begins = np.flatnonzero(np.diff(number[rows], prepend=-1))
+        low = np.minimum.reduceat(poses[0, :, :2] - far, begins)
+        high = np.maximum.reduceat(poses[0, :, :2] + far, begins)
+        hit = self._first_step_hit(poses, steps, number[rows], self._laid_near(low, high), ask)
         return None if hit is None else (int(number[rows[hit[0]]]), hit[1])
 
     def _seen(self, name: str, poses: ArrayLike) -> Array:
@@ -167,11 +185,21 @@ class FclChecker:
         near[..., :2] -= self.origin
         return near
 
+    def _laid_near(self, low: Array, high: Array) -> _Laid:
+        """Obstacles near the body while its place stays between corners (n, 2 or more) [m]."""
+        reach = float(np.hypot(*self._body.middle)) + self._body.reach + self.proven
+        return self._ground.near(np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1))
+
     def _first_step_hit(
-        self, poses: Array, steps: Array, courses: IntArray, ask: Callable[[], None]
+        self,
+        poses: Array,
+        steps: Array,
+        courses: IntArray,
+        laid: _Laid,
+        ask: Callable[[], None],
     ) -> tuple[int, int] | None:
         """The first of some steps of courses that touches a static obstacle, and which."""
-        if self._ground.static is None or not len(steps):
+        if laid.static is None:
             return None
         begins = np.append(True, courses[1:] != courses[:-1])
         first, last = chunks(steps, begins)
@@ -180,7 +208,7 @@ class FclChecker:
             ask()
             rings = course_boxes(self._body, poses, steps, first, last)
             boxes = [_object(_box_skin(ring)) for ring in rings]
-            hits = _touching(boxes, np.zeros((first.size, 3)), self._ground.static)
+            hits = _touching(boxes, np.zeros((first.size, 3)), laid.static)
             rows = np.fromiter(hits, dtype=np.int64, count=len(hits))
             first, last = first[rows], last[rows]
             short = last - first <= CLOSE
@@ -193,31 +221,36 @@ class FclChecker:
             begin, end = close.pop()
             if end - begin == 1:
                 one = slice(begin, end)
-                hit = self._first_hit(poses[0, one], steps[one], np.ones(1), ask)
+                hit = self._first_hit(poses[0, one], steps[one], np.ones(1), laid, ask)
                 if hit is not None:
                     return begin, hit[1]
-            elif self._sweep_hits(poses[:, begin:end], steps[begin:end]):
+            elif self._sweep_hits(poses[:, begin:end], steps[begin:end], laid):
                 middle = (begin + end) // 2
                 close += [(middle, end), (begin, middle)]
         return None
 
-    def _sweep_hits(self, poses: Array, steps: Array) -> bool:
+    def _sweep_hits(self, poses: Array, steps: Array, laid: _Laid) -> bool:
         """Whether one solid around the body along a few steps touches a static obstacle."""
         x, y, turn = steps.sum(axis=0).tolist()
         pieces = cut_where_it_pivots(self._body, (x, y, turn))
         whole = np.concatenate([poses[0], poses[1, -1:]])
         skin = body_skin(swept_hulls(pieces, whole, steps))
-        return bool(_touching([_object(skin)], np.zeros((1, 3)), self._ground.static))
+        return bool(_touching([_object(skin)], np.zeros((1, 3)), laid.static))
 
     def _first_hit(
-        self, starts: Array, twists: Array, durations: Array, ask: Callable[[], None]
+        self,
+        starts: Array,
+        twists: Array,
+        durations: Array,
+        laid: _Laid,
+        ask: Callable[[], None],
     ) -> tuple[int, int] | None:
         """The first of some coasts that touches a static obstacle, and which."""
-        if self._ground.static is None:
+        if laid.static is None:
             return None
         speeds = point_speeds(twists, np.concatenate(self._body.pieces)).max(axis=1)
         moving = speeds * durations > STANDING
-        first = self._first_pose_hit(starts, np.flatnonzero(~moving))
+        first = self._first_pose_hit(starts, np.flatnonzero(~moving), laid)
         turning = np.abs(twists[:, 2])
         with np.errstate(divide="ignore", over="ignore"):
             once = 2.0 * math.pi / turning  # then it is where it began
@@ -235,29 +268,27 @@ class FclChecker:
             times = np.stack([parts.begins, parts.begins + 0.5 * parts.lengths])
             begins, middles = (SE2(starts[of]) @ SE2.exp(times[..., None] * twists[of])).pose
             objects = [solid.object for solid in solids]
-            hits = _touching(objects, begins, self._ground.static)
+            hits = _touching(objects, begins, laid.static)
             if not hits:
                 break
             for row, triangle in hits.items():  # in order: the first is the first coast's
                 if solids[row].excess <= 0.5 * self.proven and _is_sooner(of[row], first):
-                    first = int(of[row]), int(self._ground.owners[triangle])
+                    first = int(of[row]), int(laid.owners[triangle])
             rows = np.array([row for row in hits if _is_sooner(of[row], first)], dtype=np.int64)
-            hit = self._first_pose_hit(middles, rows)
+            hit = self._first_pose_hit(middles, rows, laid)
             if hit is not None:
                 first = int(of[hit[0]]), hit[1]
                 rows = rows[of[rows] < first[0]]
             parts = halves(parts.of(rows))
         return first
 
-    def _first_pose_hit(self, poses: Array, rows: IntArray) -> tuple[int, int] | None:
+    def _first_pose_hit(self, poses: Array, rows: IntArray, laid: _Laid) -> tuple[int, int] | None:
         """The first of some rows of poses (n, 3) that touches a static obstacle, and which."""
-        if self._ground.static is None:
+        if laid.static is None:
             return None
         body = [_standing(self._body)] * rows.size
-        hits = _touching(body, poses[rows], self._ground.static, most=1)
-        return next(
-            ((int(rows[row]), int(self._ground.owners[at])) for row, at in hits.items()), None
-        )
+        hits = _touching(body, poses[rows], laid.static, most=1)
+        return next(((int(rows[row]), int(laid.owners[at])) for row, at in hits.items()), None)
 
 
 class Course(NamedTuple):
@@ -267,11 +298,44 @@ class Course(NamedTuple):
     poses: Array  # (n, 3)
 
 
-class _Ground(NamedTuple):
-    """Static obstacles as FCL sees them."""
+class _Laid(NamedTuple):
+    """Some static obstacles as FCL sees them."""
 
+    rows: NDArray[np.bool_]  # (n,) which of all
     static: Any  # one object for all of them, None without
     owners: IntArray  # which obstacle each of its triangles belongs to
+
+
+@dataclass(slots=True, eq=False)
+class _Ground:
+    """Static obstacles, of which FCL is shown those that something came near to."""
+
+    obstacles: tuple[AnyObstacle, ...]
+    numbers: IntArray  # (n,) of these in the scene
+    boxes: Array  # (n, 4) [low x, low y, high x, high y] around them
+    excess: float  # [m]
+    laid: _Laid
+
+    def near(self, boxes: Array) -> _Laid:
+        """All obstacles that meet one of some boxes (m, 4), and others."""
+        laid, own = self.laid, self.boxes
+        waiting = np.flatnonzero(~laid.rows)
+        if not waiting.size:
+            return laid
+        low, high = own[waiting, None, :2], own[waiting, None, 2:]
+        meets = np.all((low <= boxes[:, 2:]) & (high >= boxes[:, :2]), axis=-1)
+        near = waiting[np.any(meets, axis=1)]
+        if not near.size:
+            return laid
+        rows = laid.rows.copy()
+        rows[near] = True
+        which = np.flatnonzero(rows)
+        found = [self.obstacles[k] for k in which.tolist()]
+        skin, of = obstacle_skin(obstacle_regions(found, excess=self.excess))
+        static = _object(skin) if of.size else None
+        # Other threads may lay out others meanwhile: this call goes on with its own.
+        self.laid = laid = _Laid(rows, static, self.numbers[which][of])
+        return laid
 
 
 class _Sliced(NamedTuple):
@@ -289,19 +353,65 @@ def _ground_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
 ) -> _Ground:
     to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
-    regions: list[Cover] = []
-    owners: list[int] = []
-    for index, far in enumerate(obstacles):
-        if isinstance(far, Obstacle) and far.motion is not None:
-            continue
-        region = obstacle_region(far.moved(to_origin) if any(origin) else far, excess=excess)
-        if len(region.cover):
-            regions.append(region)
-            owners.append(index)
-    if not regions:
-        return _Ground(None, np.zeros(0, dtype=np.int64))
-    skin, which = obstacle_skin(regions)
-    return _Ground(_object(skin), np.array(owners)[which])
+    static = [
+        (k, one)
+        for k, one in enumerate(obstacles)
+        if isinstance(one, OccupancyMap) or one.motion is None
+    ]
+    seen = tuple(one.moved(to_origin) if any(origin) else one for _, one in static)
+    nothing = np.zeros(0, dtype=np.int64)
+    return _Ground(
+        obstacles=seen,
+        numbers=np.array([k for k, _ in static], dtype=np.int64),
+        boxes=_boxes_around(seen),
+        excess=excess,
+        laid=_Laid(np.zeros(len(seen), dtype=np.bool_), None, nothing),
+    )
+
+
+def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
+    """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles.
+
+    Raises
+    ------
+    ValueError
+        If a polygon has no area.
+    """
+    import shapely
+
+    boxes = np.zeros((len(obstacles), 4))
+    rectangles, polygons = [], []
+    for k, one in enumerate(obstacles):
+        if isinstance(one, OccupancyMap):  # wherever it is turned
+            boxes[k] = (
+                *(one.origin[:2] - np.hypot(*one.extent)),
+                *(one.origin[:2] + np.hypot(*one.extent)),
+            )
+        elif isinstance(one.shape, Disc):
+            boxes[k] = (
+                *(one.shape.center - one.shape.radius),
+                *(one.shape.center + one.shape.radius),
+            )
+        elif isinstance(one.shape, Box):
+            rectangles.append((k, one.shape))
+        else:
+            boxes[k] = *one.shape.corners.min(axis=0), *one.shape.corners.max(axis=0)
+            polygons.append(one.shape)
+    if rectangles:
+        corners = box_corners([one for _, one in rectangles])
+        ends = [corners.min(axis=1), corners.max(axis=1)]
+        boxes[[k for k, _ in rectangles]] = np.concatenate(ends, axis=1)
+    if polygons:
+        which = np.repeat(np.arange(len(polygons)), [len(one.corners) for one in polygons])
+        rings = shapely.linearrings(
+            np.concatenate([one.corners for one in polygons]), indices=which
+        )
+        parts = shapely.polygons(rings)
+        plain = shapely.is_valid(parts) & (shapely.area(parts) > 0.0)
+        for polygon, whole in zip(polygons, plain.tolist(), strict=True):
+            if polygon.holes or not whole:
+                outlines(polygon)  # refuses one without area
+    return boxes
 
 
 @functools.lru_cache(maxsize=32)

@@ -138,12 +138,18 @@ class Box:
     @property
     def corners(self) -> Array:
         """Corners (4, 2) counter-clockwise, the first behind on the right [m]."""
-        signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-        return _acted(SE2(np.append(self.center, self.heading)), signs * self.size)
+        return np.asarray(box_corners((self,))[0])
 
     def moved(self, by: LieGroup) -> Box:
         """The shape moved by a planar pose."""
         return Box(self.size, _acted(by, self.center), self.heading + float(planar(by).pose[2]))
+
+
+def box_corners(boxes: Sequence[Box]) -> Array:
+    """Corners (n, 4, 2) of boxes [m], as of each."""
+    signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    frames = np.array([[*one.center, one.heading] for one in boxes])[:, None]
+    return SE2(frames).act(signs * np.array([one.size for one in boxes])[:, None])
 
 
 Shape: TypeAlias = Polygon | Disc | Box

@@ -10,7 +10,7 @@ nothing touches; and the distance of the skins is that in the plane.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,7 +23,9 @@ from maneuver_automaton.collision.shapes import (
     Box,
     Disc,
     OccupancyMap,
+    Polygon,
     Shape,
+    box_corners,
 )
 from maneuver_automaton.groups import SE2
 
@@ -103,8 +105,8 @@ def convex_hull(points: Array) -> Array:
     return np.asarray(shapely.get_coordinates(hull)[:-1])
 
 
-def obstacle_region(obstacle: AnyObstacle, *, excess: float) -> Cover:
-    """The region of an obstacle in its own frame; a disc stands out by at most `excess` [m].
+def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list[Cover]:
+    """The region of each obstacle in its own frame; a disc stands out by at most `excess` [m].
 
     Raises
     ------
@@ -114,19 +116,28 @@ def obstacle_region(obstacle: AnyObstacle, *, excess: float) -> Cover:
     Examples
     --------
     >>> room = OccupancyMap([[1, 1, 1], [1, 0, 1], [1, 1, 1]], resolution=0.5)
-    >>> region = obstacle_region(room, excess=1e-3)
+    >>> (region,) = obstacle_regions([room], excess=1e-3)
     >>> len(region.cover), len(region.posts)
     (8, 8)
     """
-    if isinstance(obstacle, OccupancyMap):
-        return _region(_map_triangles(obstacle))
-    if isinstance(obstacle.shape, Disc):
-        disc = obstacle.shape
-        return _region(_fan(circumscribed(disc.center, disc.radius, excess))[None])
-    if isinstance(obstacle.shape, Box):
-        return _region(_fan(obstacle.shape.corners)[None])
-    parts = [_region(_triangles(part)[None]) for part in outlines(obstacle.shape)]
-    return Cover(*map(np.concatenate, zip(*parts, strict=True)))
+    shapes = [None if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
+    boxes = [one for one in shapes if isinstance(one, Box)]
+    fans: Iterator[Cover] = iter(())
+    if boxes:
+        both = _region(box_corners(boxes)[:, [[0, 1, 2], [0, 2, 3]]])
+        fans = map(Cover, both.cover.reshape(-1, 2, 3, 2), both.posts.reshape(-1, 2, 2, 2))
+    regions = []
+    for one, shape in zip(obstacles, shapes, strict=True):
+        if isinstance(one, OccupancyMap):
+            regions.append(_region(_map_triangles(one)))
+        elif isinstance(shape, Disc):
+            regions.append(_region(_fan(circumscribed(shape.center, shape.radius, excess))[None]))
+        elif isinstance(shape, Polygon):
+            parts = [_region(_triangles(part)[None]) for part in outlines(shape)]
+            regions.append(Cover(*map(np.concatenate, zip(*parts, strict=True))))
+        else:
+            regions.append(next(fans))
+    return regions
 
 
 def body_skin(pieces: Sequence[Array]) -> Skin:
@@ -157,7 +168,7 @@ def obstacle_skin(regions: Sequence[Cover]) -> tuple[Skin, IntArray]:
     Examples
     --------
     >>> from maneuver_automaton.collision.shapes import Obstacle
-    >>> square = obstacle_region(Obstacle(Box([1.0, 1.0])), excess=1e-3)
+    >>> square = obstacle_regions([Obstacle(Box([1.0, 1.0]))], excess=1e-3)[0]
     >>> obstacle_skin([square, square])[1].tolist()
     [0, 0, 1, 1, 0, 0, 1, 1]
     """

@@ -184,9 +184,10 @@ def load_checks(problem: Problem, workspace: Workspace) -> None:
     """Prepare what FCL and the audit compare with."""
     origin = _origin(problem.goals[0])
     for layer in layers_of(problem.obstacles, in_space=problem.start.size > 3):
-        workspace.checker(
+        checker = workspace.checker(
             problem.footprint, layer.obstacles, problem.margin, origin, proven=PROVEN[0]
         )
+        checker.lay_all()
     if problem.obstacles:
         workspace.surroundings(problem.obstacles, origin_of(problem.goals[0].pose))
 

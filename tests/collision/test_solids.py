@@ -11,7 +11,7 @@ from maneuver_automaton.collision.solids import (
     body_pieces,
     body_skin,
     circumscribed,
-    obstacle_region,
+    obstacle_regions,
     obstacle_skin,
 )
 from tests.collision.scenes import ANGLE, CAR, FRAME, random_shape
@@ -39,7 +39,7 @@ def test_regions_of_polygons_have_their_area():
         if isinstance(shape, Disc):
             continue
         whole = shapely.Polygon(shape.corners, getattr(shape, "holes", ()))
-        region = obstacle_region(Obstacle(shape), excess=1e-3)
+        (region,) = obstacle_regions([Obstacle(shape)], excess=1e-3)
         assert shapely.area(shapely.polygons(region.cover)).sum() == pytest.approx(whole.area)
         if whole.area > 1e-3:
             assert union_of(region.cover).symmetric_difference(whole).area < 1e-9
@@ -50,7 +50,7 @@ def test_a_map_is_the_area_of_its_blocked_cells():
     for density in (0.0, 0.1, 0.5, 0.9, 1.0):
         cells = rng.random((17, 23)) < density
         one = OccupancyMap(cells, resolution=0.5, origin=[3.0, -2.0, 0.7])
-        region = obstacle_region(one, excess=1e-3)
+        (region,) = obstacle_regions([one], excess=1e-3)
         covered = shapely.area(shapely.polygons(region.cover)).sum()
         assert covered == pytest.approx(0.25 * cells.sum())
         assert union_of(region.cover).area == pytest.approx(covered)
@@ -59,7 +59,7 @@ def test_a_map_is_the_area_of_its_blocked_cells():
 def test_every_part_has_two_posts_inside_it():
     holes = [Obstacle(FRAME), Obstacle(ANGLE), Obstacle(Disc(0.3)), Obstacle(Box([1.0, 2.0]))]
     for obstacle in (*holes, OccupancyMap([[1, 0, 1], [1, 0, 0]], resolution=1.0)):
-        region = obstacle_region(obstacle, excess=1e-3)
+        (region,) = obstacle_regions([obstacle], excess=1e-3)
         solid = union_of(region.cover)
         posts = shapely.linestrings(region.posts)
         assert (shapely.length(posts) > 0.0).all()
@@ -106,7 +106,7 @@ def test_skins_by_hand():
     heights = body.vertices[body.triangles][..., 2]
     assert (heights == 1.0).all(axis=1).sum() == 2 + 1  # the lid
     assert not (heights == 0.0).all(axis=1).any()  # no bottom
-    boxes = [obstacle_region(Obstacle(Box([1.0, 1.0])), excess=1.0) for _ in range(3)]
+    boxes = obstacle_regions([Obstacle(Box([1.0, 1.0]))] * 3, excess=1.0)
     skin, owners = obstacle_skin(boxes)
     heights = skin.vertices[skin.triangles][..., 2]
     assert heights[:6].tolist() == [[0.5, 0.5, 0.5]] * 6
