@@ -19,15 +19,7 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is com
 
 
 class CompiledLater:
-    """A function that numba takes over when it is called, or compiled into another one.
-
-    Parameters
-    ----------
-    function : callable
-        As Python has it.
-    make : callable
-        Hands it to numba.
-    """
+    """A function that numba takes over when it is called, or compiled into another one."""
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)

@@ -37,17 +37,7 @@ Report = Callable[[Sequence[str], Sequence[str]], None]
 def compile_kernels(
     *, jobs: int | None = None, report: Report | None = None, settings: dict[str, str] | None = None
 ) -> list[str]:
-    """Compile what is not compiled yet, in several processes; what failed, and why.
-
-    Parameters
-    ----------
-    jobs : int, optional
-        Processes at a time; by default one a core, as far as memory reaches.
-    report : callable, optional
-        Called as kernels are done.
-    settings : dict, optional
-        More environment variables for them.
-    """
+    """Compile what is not compiled yet, in several processes; what failed, and why."""
     from maneuver_automaton._kernel_list import listed
 
     names = sorted(listed(), key=lambda name: (not any(one in name for one in FIRST), name))

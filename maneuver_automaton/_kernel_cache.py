@@ -35,13 +35,7 @@ class KernelCache:
     """The cache of one kernel, as numba's dispatcher asks for it."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        """`function` as Python has it.
-
-        Raises
-        ------
-        OSError
-            If its source is not in a file.
-        """
+        """`function` as Python has it."""
         code = function.__code__
         self.folder, self.function = folder, function
         self.name = f"{function.__module__}.{function.__qualname__}".replace("<locals>.", "")

@@ -212,10 +212,7 @@ class SharedCompiler(LinkedCompiler):
 
 @functools.cache
 def _fits() -> bool:
-    """Whether two functions of a line, one calling the other, are compiled and kept as they should.
-
-    It is asked before the first function is compiled, and not where compiled code is loaded.
-    """
+    """Whether two functions of a line, one calling the other, are compiled and kept right."""
 
     class Linked(LinkingCompiler):
         lowering = LinkedLowering

@@ -415,10 +415,7 @@ class Problem:
             self._check_rests()
 
     def _give_headings(self, model: OnlyTranslated) -> None:
-        """Start and goals of a vehicle that translations alone move get headings of its trims.
-
-        A goal of any heading, or of none, becomes one goal for each heading.
-        """
+        """Start and goals of a vehicle that translations alone move get headings of its trims."""
         start = as_array("start", self.start)
         if self.start_trim is None or start.shape != (model.group.dof,):
             ((pose, trim),) = posed(self.automaton, start, "start", trim=self.start_trim)

@@ -143,11 +143,6 @@ def driven_courses(
     """Courses from reduced states under inputs (until (n,) [s], control (n, n_u)), all at once.
 
     Rides of about as many inputs go together. The times are those of the inputs to the last bit.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the inputs lead nowhere.
     """
     groups: defaultdict[int, list[int]] = defaultdict(list)
     for k, (until, _) in enumerate(inputs):

@@ -33,13 +33,7 @@ def trim_headings(automaton: Automaton) -> Array | None:
 
 
 def trim_facing(automaton: Automaton, heading: float, what: str) -> Trim:
-    """The first trim of a heading; `what` has it, in the words of a message.
-
-    Raises
-    ------
-    ValueError
-        If no trim has the heading: the nearest is named.
-    """
+    """The first trim of a heading; `what` has it, in the words of a message."""
     headings = trim_headings(automaton)
     assert headings is not None
     off = [abs(math.remainder(one - heading, 2.0 * math.pi)) for one in headings.tolist()]

@@ -156,11 +156,7 @@ def step_times(start: float, duration: float, step: float) -> Array:
 
 
 def _at_times(plan: Sampled, samples: Trajectory, times: Array, model: Model | None) -> Trajectory:
-    """The plan at other times: poses exact, reduced states cubic between samples.
-
-    The cubic has the rates that the model's equations give at both samples; without a model it is
-    a straight line.
-    """
+    """The plan at other times: poses exact, reduced states cubic between samples."""
     last = samples.time.size - 1
     k = np.clip(np.searchsorted(samples.time, times, side="right") - 1, 0, max(last - 1, 0))
     ahead = np.minimum(k + 1, last)

@@ -80,10 +80,7 @@ def is_new(plan: Plan, known: Iterable[Plan], likeness: Likeness = CONVERGED) ->
 
 
 def _apart(one: Plan, other: Plan, times: Array) -> tuple[float, float, Array, Array]:
-    """Largest distance [m] and turn [rad] between two plans at times of the clock; their poses.
-
-    A plan stands before and after it.
-    """
+    """Largest distance [m] and turn [rad] between two plans at times of the clock; their poses."""
     here, there = one.pose_at(times), other.pose_at(times)
     places = [0, 1, *range(3, here.shape[-1])]
     off = np.linalg.norm((here - there)[:, places], axis=1).max()

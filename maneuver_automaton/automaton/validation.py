@@ -47,10 +47,7 @@ def part_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Auto
 
 @kept_by_first
 def _graphs(automaton: Automaton) -> tuple[Any, Any]:
-    """Which classes of trims maneuvers link, along them and against them.
-
-    Trims of one class switch at will.
-    """
+    """Which classes of trims maneuvers link, along them and against them."""
     from scipy.sparse import csr_array
 
     classes = automaton.trim_classes
@@ -236,10 +233,7 @@ def _what_is_missing(automaton: Automaton, trims: IntArray, maneuvers: Sequence[
 
 
 def _has_one_center(automaton: Automaton, trims: IntArray, maneuvers: Sequence[Maneuver]) -> bool:
-    """Whether all trims turn about, and all maneuvers keep, one and the same point.
-
-    The trims reach each other, so one turning trim tells where the point is for all the others.
-    """
+    """Whether all trims turn about, and all maneuvers keep, one and the same point."""
     classes = automaton.trim_classes
     twists = automaton.body_velocities[trims]
     turning = int(np.argmax(np.abs(twists[:, 2])))

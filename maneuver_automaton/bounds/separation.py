@@ -154,11 +154,7 @@ def _room(most: int) -> Cells:
 
 
 def _grid(scene: PoseScene, poses: Array, bounds: Bounds, price: float) -> Grid:
-    """Roots that are about as large as the vehicle, and cover all that is in the way.
-
-    Beyond them nothing is in the way that is not beside them too. A box is about as large in
-    heading as in the plane, by how far the body's farthest corner moves.
-    """
+    """Roots that are about as large as the vehicle, and cover all that is in the way."""
     arrays = scene.arrays
     arm = float(np.hypot(arrays.body[:, 0], arrays.body[:, 1]).max())
     around = arm + arrays.margin
@@ -415,10 +411,7 @@ def _narrowest(
     goals: Array,
     deadline: float,
 ) -> Narrowest | None:
-    """The narrowest place: where obstacles must draw back so that there is a way.
-
-    The least length is bisected; a length at which nothing is proven counts as too small.
-    """
+    """The narrowest place: where obstacles must draw back so that there is a way."""
     low, high, path = 0.0, math.inf, np.zeros((0, 3))
     for _ in range(TRIES):
         if time.monotonic() > deadline or high - low <= max(CLOSE, AGREE * low):

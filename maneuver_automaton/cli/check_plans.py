@@ -55,11 +55,6 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
 
     What one vehicle did needs the file of --with, and its plan may `leave` a start in contact;
     files of several vehicles name theirs.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file is damaged or holds statistics, or the scenario of `parts` is not its own.
     """
     if path.suffix.lower() != ENDING or not kind_of(parsed(path)):
         return None

@@ -17,13 +17,7 @@ from maneuver_automaton.formats.yaml_source import parse
 
 
 def scenario_folder() -> Path:
-    """Folder of the scenarios: within an installed package, or beside that of a clone.
-
-    Raises
-    ------
-    InvalidScenario
-        If neither is there.
-    """
+    """Folder of the scenarios: within an installed package, or beside that of a clone."""
     package = Path(maneuver_automaton.__file__).parent
     for folder in (package / "scenarios", package.parent / "scenarios"):
         if folder.is_dir():

@@ -187,11 +187,6 @@ def problems_in(folder: Path, parts: Parts) -> list[tuple[Path, Parts]]:
     Left out is what belongs to another file: images, maps that a scenario or a list of queries
     names, models, outlines of robots, the scenario of --with. A scenario states all of its
     problem, and only formats with several problems need to know which one.
-
-    Raises
-    ------
-    InvalidScenario
-        If there is none, or two have one name.
     """
     documents = {path: _document(path) for path in _files(folder) if _ending(path) in YAML_ENDINGS}
     used = set(_used(folder, documents))

@@ -149,12 +149,6 @@ def user_model(text: str) -> Model:
     """The model OBJECT of the module MODULE, which is looked for in the current folder first.
 
     A class or a function that needs no parameters is called.
-
-    Raises
-    ------
-    InvalidScenario
-        If there is no such module or object, it is no model, needs parameters, or has the name of
-        a model of the package.
     """
     module_name, _, name = text.partition(":")
     if not (module_name and name):

@@ -218,10 +218,7 @@ def _has_loop(path: Path, parts: Parts) -> bool:
 def _row(
     problem: tuple[Path, Parts], *, command: str, out: Path, options: Options, folder: Path
 ) -> tuple[Path, Row]:
-    """Do the job of one file of a folder; what goes wrong is told in its row.
-
-    Paths are relative to `folder`: a process that works for others may have begun elsewhere.
-    """
+    """Do the job of one file of a folder; what goes wrong is told in its row."""
     path, parts = problem
     out = out / path.stem
     if stopped():

@@ -221,10 +221,7 @@ def _merged(pieces: list[Array]) -> list[Array]:
 def _first_to_join(
     numbered: dict[int, _Ring], apart: set[tuple[int, int, _Corner]]
 ) -> tuple[int, int, _Ring] | None:
-    """The first two neighbours that are convex together, and their ring.
-
-    Those that are not are noted in `apart`, and not tried again for every union.
-    """
+    """The first two neighbours that are convex together, and their ring."""
     edges = {edge: k for k, ring in numbered.items() for edge in _edges(ring)}
     for (a, b), k in edges.items():
         other = edges.get((b, a), k)

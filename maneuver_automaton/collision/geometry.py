@@ -36,11 +36,6 @@ def rings_of_geometry(what: str, geometry: Any) -> Iterator[Rings]:
 
     Heights (z) of its points are left out.
 
-    Raises
-    ------
-    ValueError
-        If it is empty, is invalid, or holds anything without an area.
-
     Examples
     --------
     >>> import shapely
@@ -72,13 +67,7 @@ def rings_of_geometry(what: str, geometry: Any) -> Iterator[Rings]:
 
 
 def one_ring(what: str, geometry: Any) -> Rings:
-    """The rings of a geometry that is one polygon.
-
-    Raises
-    ------
-    ValueError
-        As `rings_of_geometry`, or if there are several polygons.
-    """
+    """The rings of a geometry that is one polygon."""
     first, *others = rings_of_geometry(what, geometry)
     if others:
         raise ValueError(

@@ -189,13 +189,7 @@ def as_shapes(what: str, value: Any, *, or_else: str = "") -> tuple[Shape, ...]:
 
 
 def as_shape(what: str, value: Any) -> Shape:
-    """The one shape that a shape, geometry of shapely or list of corners is.
-
-    Raises
-    ------
-    ValueError
-        As `as_shapes`, or if it is none or several.
-    """
+    """The one shape that a shape, geometry of shapely or list of corners is."""
     shapes = as_shapes(what, value)
     if len(shapes) != 1:
         raise ValueError(f"{what}: got {len(shapes)} shapes, need one; give each by itself")

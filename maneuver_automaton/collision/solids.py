@@ -49,15 +49,6 @@ class Skin(NamedTuple):
 def body_pieces(footprint: tuple[Shape, ...], *, margin: float, excess: float) -> tuple[Array, ...]:
     """Convex polygons (n, 2) that cover a footprint grown by `margin` [m], and little more.
 
-    Parameters
-    ----------
-    footprint : tuple of Shape
-        Parts of the body; empty for a point.
-    margin : float
-        How far to grow [m].
-    excess : float
-        How far round corners may stand out at most [m].
-
     Examples
     --------
     >>> (square,) = body_pieces((Box([2.0, 2.0]),), margin=0.5, excess=1e-3)
@@ -107,11 +98,6 @@ def convex_hull(points: Array) -> Array:
 
 def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list[Cover]:
     """The region of each obstacle in its own frame; a disc stands out by at most `excess` [m].
-
-    Raises
-    ------
-    ValueError
-        If a polygon has no area.
 
     Examples
     --------

@@ -129,10 +129,7 @@ def _angles(points: Array) -> Array:
 
 
 def _best_chains(lost: Array, most: int) -> Iterator[IntArray]:
-    """Of the ways (k,) from the first to the last of n places, by rising k, the least worst step.
-
-    `lost` (n, n) is what a step loses; ways of which no longer one loses less come last.
-    """
+    """Of ways (k,) from the first to the last of n places, by rising k, the least worst step."""
     n = len(lost)
     if n == 1:
         yield np.zeros(1, dtype=np.int64)
@@ -154,10 +151,7 @@ def _best_chains(lost: Array, most: int) -> Iterator[IntArray]:
 
 
 def _losses(points: Array, chain: IntArray, forced: BoolArray) -> Array:
-    """Factor (n, n) of those between two places of a chain of rising angles; inf backwards.
-
-    Nothing may step over what is forced.
-    """
+    """Factor (n, n) of those between two places of a chain of rising angles; inf backwards."""
     n = len(chain)
     lost = np.full((n, n), np.inf)
     for i in range(n - 1):

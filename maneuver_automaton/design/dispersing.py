@@ -165,10 +165,7 @@ def _one_each(sources: IntArray) -> IntArray:
 
 
 def _farthest_first(apart: Array, first: IntArray, most: int) -> tuple[IntArray, Array]:
-    """At most `most` rows of distances (n, n), `first` and then the farthest; and what is left.
-
-    The second are the largest distances that are left, with the first ones and after each more.
-    """
+    """At most `most` rows of distances (n, n), `first` and then the farthest; and what is left."""
     chosen = [int(k) for k in first]
     nearest = apart[:, chosen].min(axis=1, initial=np.inf)
     left = [float(nearest.max())]

@@ -261,10 +261,6 @@ def _short_words(disc: _Disc, max_trims: int, *, tolerance: float, most_boxes: i
 def _circle(points: Array, choice: Choice) -> tuple[float, bool] | None:
     """Radius of the circles of shortest paths [m], and whether some go in reverse; None if others.
 
-    `points` (m, d) are twists per unit of cost. With reverse, those of all candidates must lie in
-    the rectangle whose corners are full lock in both gears; without it, in the triangle of the
-    start and full lock to both sides; and the library must have its corners and its straights.
-
     Source: Sussmann, Tang (1991), *Shortest paths for the Reeds-Shepp car*, for the rectangle,
     which is what six trims mix to.
     """

@@ -83,17 +83,6 @@ def proven_factor(
     `tolerance`. Over a box the ratio is at most 1, or that of an upper bound of the short words to
     a lower bound of the paths with more trims: where short words are shortest, nothing is lost.
     Mirror images and reversed paths make a quarter of the goals enough.
-
-    Parameters
-    ----------
-    turning_radius, radius, least : float
-        Of the circles, of the disc of goals, and of the shortest paths that count [m].
-    goals : (n, 3) array
-        Goals that are looked at first [m, m, rad].
-    tolerance : float
-        By which the proven factor may exceed the sampled one.
-    most_boxes : int
-        With no more boxes than that, but for the first ones, what is proven is handed over.
     """
     scale = np.array([turning_radius, turning_radius, 1.0])
     reach, shortest = radius / turning_radius, least / turning_radius
@@ -176,12 +165,7 @@ def _box_ratios(low: Array, size: Array, max_trims: int, least: float) -> Array:
 
 
 def _near(low: Array, high: Array) -> Array:
-    """No shortest path to the goals of boxes (n, 3) around the start is longer (n,); it is simple.
-
-    Turn by half the heading ahead, and by the other half in reverse: that shifts the pose by four
-    times the squared sine of a quarter of it. Then drive straight, and shift sideways by two equal
-    turns ahead and a straight back.
-    """
+    """A length (n,) that no shortest path to the goals of boxes (n, 3) exceeds."""
     away = np.maximum(np.abs(low), np.abs(high))
     left = np.hypot(away[:, 0], away[:, 1]) + 4.0 * np.sin(0.25 * away[:, 2]) ** 2
     turn = 2.0 * np.arcsin(0.5 * np.sqrt(np.minimum(left, 4.0)))

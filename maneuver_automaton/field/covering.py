@@ -346,10 +346,7 @@ def _united(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
 
 
 class _Turns:
-    """Turns from the end of each swath to the begin of each other, as far as they are planned.
-
-    State 2 i + d is swath i in direction d. Where no turn is known, a cost is that of the distance.
-    """
+    """Turns from the end of each swath to the begin of each other, as far as they are planned."""
 
     def __init__(
         self, problem: FieldProblem, swaths: Array, *, time_limit: float, jobs: int

@@ -64,10 +64,7 @@ class Knowledge(Protocol):
 
 @dataclass(slots=True, eq=False)
 class _Lossless:
-    """No message is lost: everybody knows what all hold. Messages are counted, but not stored.
-
-    `near` says who may come near a vehicle with a plan: it speaks to nobody else.
-    """
+    """No message is lost: everybody knows what all hold. Messages are counted, but not stored."""
 
     near: Callable[[int, OwnPlan], int]
     held: Mapping[int, OwnPlan] = field(default_factory=dict)

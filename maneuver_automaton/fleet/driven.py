@@ -152,10 +152,7 @@ def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
 def _stretches(
     way: Mapping[int, Plan], edges: Array, gone: float, body_height: Heights
 ) -> Iterator[tuple[Plan, Heights]]:
-    """What was driven without a jump, as plans of something that moves at will.
-
-    And how far the body reaches about the altitude of it.
-    """
+    """What was driven without a jump, as plans of something that moves at will."""
     run: list[Plan] = []
     low, high = body_height
     for step, piece in way.items():
@@ -201,11 +198,7 @@ def _clearance(
 
 
 def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
-    """Why what was driven is none of the model's motions; trims of others are not looked at.
-
-    Each piece is one. With inertia it begins with the speed, or whatever else is no pose, with
-    which the one before it ended.
-    """
+    """Why what was driven is none of the model's motions; trims of others are not looked at."""
     before: Plan | None = None
     for piece in pieces:
         if piece.trims and _is_nominal(piece, problem.automaton):
@@ -334,10 +327,7 @@ def _least(one: _DrivenBody, other: _DrivenBody, edges: Array, most: float) -> C
 def _apart(
     one: _DrivenBody, other: _DrivenBody, times: Array, steps: Array, enough: float
 ) -> Array:
-    """Distance (n,) of two bodies at times (n,) [s]; where it is more than enough, a lower bound.
-
-    Overlapping discs have a distance below 0.
-    """
+    """Distance (n,) of two bodies at times (n,) [s]; a lower bound where it is enough."""
     import shapely
 
     first, second = one.poses_at(times, steps), other.poses_at(times, steps)

@@ -88,11 +88,7 @@ def _around(now: Moment) -> Around:
 
 
 def _may_gain(now: Moment, k: int) -> bool:
-    """Whether something changed since a vehicle looked in vain.
-
-    Later no more is to be had past the same plans: what is left of them is less. But who has
-    none looks again, as as many expansions then lead farther.
-    """
+    """Whether something changed since a vehicle looked in vain."""
     again = not now.held[k].leads and (now.number + k) % AGAIN == 0
     return again or now.state.efforts[k].in_vain != _around(now)
 
@@ -122,10 +118,7 @@ def _look_for_better(now: Moment, batch: Sequence[int]) -> None:
 
 
 def _exchanges(now: Moment, k: int, base: OwnPlan, answer: Proposal) -> bool:
-    """A vehicle exchanges its plan for one that arrives no later; else a group looks for one.
-
-    Whether there is one, also if not all agreed to it.
-    """
+    """A vehicle exchanges its plan for one that arrives no later; else a group looks for one."""
     settings, (found, alone) = now.state.settings, answer
     if alone is None:
         if base.leads and not now.searches.is_over:
@@ -173,11 +166,7 @@ def _exchange_in_order(now: Moment, group: Sequence[int]) -> bool:
 
 
 def _swap(now: Moment, found: dict[int, OwnPlan]) -> bool:
-    """Exchange plans if these pay and are proven past all that is held now, and each other.
-
-    An answer that comes late may be for a plan that was rejoined with other times since: one
-    that has another speed than the vehicle by now is not taken.
-    """
+    """Exchange plans if these pay and are proven past all that is held now, and each other."""
     vehicles, time = now.vehicles, now.time
     if not all(goes_on(vehicles[k], now.held[k], one, time) for k, one in found.items()):
         return False

@@ -218,10 +218,7 @@ def onward(
 
 
 def _from_where_it_stands(own: Problem, rest: Plan, time: float) -> Problem | None:
-    """The problem from where a plan is over, in a trim like the one that it ends in; None if none.
-
-    A vehicle that switches at will may begin in any.
-    """
+    """The problem from where a plan is over, in a trim like its last; None if there is none."""
     here = own.starting_at(rest.end, time=time)
     if switches_at_will(own) or not rest.trims:
         return here
@@ -316,10 +313,7 @@ def stopping(vehicle: FleetMember, found: OwnPlan, time: float, pose: Array) -> 
 
 
 def _without_coasts(vehicle: FleetMember, rest: Plan) -> Plan | None:
-    """What is left of a plan, by its maneuvers alone, until it can rest; None if it never can.
-
-    A trim may be left at any moment: its motion is steady.
-    """
+    """What is left of a plan, by its maneuvers alone, until it can rest; None if it never can."""
     rests = [one for one in vehicle.problem.automaton.trims if one.is_rest]
     between = rest.maneuvers or (None,) * (len(rest.trims) - 1)
     begun = int(committed(rest, 0.0) > NOTHING)

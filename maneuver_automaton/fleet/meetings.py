@@ -96,10 +96,7 @@ class Encounters:
         return sorted(rows, key=lambda row: (row.time, row.one, row.other))
 
     def _first_meetings(self, number: int, keep: float) -> Array:
-        """When a vehicle first comes within a distance [m] of each body (M,).
-
-        What stands between heights is met at those alone.
-        """
+        """When a vehicle first comes within a distance [m] of each body (M,)."""
         heights = self._heights
         least = np.full(len(heights), math.inf)
         for body, band, rows in self._drives(number):

@@ -347,10 +347,7 @@ def request_of(
 
 
 def _seen(now: Moment, k: int, base: OwnPlan, others: Collection[Other]) -> Collection[Other]:
-    """Of many others those that may come nearest to where a vehicle is, drives and wants to go.
-
-    A plan that is found past these alone is proven past all.
-    """
+    """Of many others those that may come nearest to where a vehicle is, drives and wants to go."""
     if len(others) <= MANY:
         return others
     courses = [one.course for _, one in others]

@@ -220,10 +220,7 @@ class _FleetSearch:
     def _in_orders(
         self, drawn: Sequence[list[int]], until: Budget, best: HeldPlans | None = None
     ) -> HeldPlans:
-        """The best plans of some orders past those that are held: the first that are complete.
-
-        As many at a time as there are processes.
-        """
+        """The best plans of some orders past those that are held: the first that are complete."""
         for begin in range(0, len(drawn), self.pool.jobs):
             if until.is_over and best is not None:
                 break
@@ -260,11 +257,7 @@ class _FleetSearch:
         return math.fsum(one.cost for one in held.values())
 
     def _improve(self, able: Sequence[int], max_rounds: int | None) -> None:
-        """Plan groups anew, those with the most to gain first, as long as there is time.
-
-        Some rounds at a time, all from the same plans; theirs are taken one after another, if they
-        keep apart from those taken before. What was asked of the same plans is not asked again.
-        """
+        """Plan groups anew, those with the most to gain first, as long as there is time."""
         rng = np.random.default_rng([self.seed, 1])
         unseen = sorted(able, key=lambda k: -self._excess(k))
         whole = [row for row in self.whole if set(row[0]) <= self.held.keys()]

@@ -128,10 +128,7 @@ def _note_pressed(now: Moment) -> None:
 
 
 def _note_crossing(now: Moment) -> None:
-    """Plans that lead too near to others since the last step are void, if that is known.
-
-    Who had not received another one's emergency drove on.
-    """
+    """Plans that lead too near to others since the last step are void, if that is known."""
     for one, other in sorted(now.state.proofs.crossing):
         if one not in now.held or other not in now.held:
             continue
@@ -173,10 +170,7 @@ def _rejoin_within(now: Moment, k: int, found: OwnPlan) -> None:
 
 
 def _tracks(now: Moment, k: int, found: OwnPlan, share: float = 1.0) -> bool:
-    """Whether a vehicle drives back onto the plan that it holds, without another one.
-
-    It stays nearer to it than a share of its tube, and than obstacles are.
-    """
+    """Whether a vehicle drives back onto the plan that it holds, without another one."""
     vehicle, step = now.vehicles[k], now.state.settings.step
     tube = share * now.state.settings.tube_m
     if vehicle.problem.obstacles:
@@ -190,10 +184,7 @@ def _tracks(now: Moment, k: int, found: OwnPlan, share: float = 1.0) -> bool:
 
 
 def _drives_beside(now: Moment, k: int, found: OwnPlan, choices: Sequence[OwnPlan]) -> bool:
-    """Of the ways back to a plan that is still held, drive the one that is nearest to it.
-
-    Whether there is one: it must not touch what is not of the fleet.
-    """
+    """Of the ways back to a plan that is still held, drive the one that is nearest to it."""
     vehicle, step = now.vehicles[k], now.state.settings.step
 
     def farthest(plan: Plan) -> float:
@@ -262,10 +253,7 @@ def back_onto(
 def _pairs(
     twists: Array, here: SE2, wanted: SE2, step: float, reach: float
 ) -> list[tuple[int, int, float]]:
-    """Pairs of trims, and when the second follows the first [s]: the best first.
-
-    The place counts after the step and a step later, the heading by how far it moves a body.
-    """
+    """Pairs of trims, and when the second follows the first [s]: the best first."""
     count = len(twists)
     first, second = (one.ravel() for one in np.indices((count, count)))
     middle, near = np.full(first.size, 0.5), 0.5
@@ -368,11 +356,7 @@ def plan_anew(now: Moment) -> None:
 
 
 def _another(now: Moment, k: int, waiting: Sequence[int]) -> OwnPlan | None:
-    """A plan for a vehicle whose plan is void; None if none is found.
-
-    Past all that others may drive, or else past those whose plans are not void and past where
-    the others stop.
-    """
+    """A plan for a vehicle whose plan is void; None if none is found."""
     pose, everyone = now.begin_of(k), now.expected_by(k)
     for one in now.rejoined(k, now.held[k], pose):
         if now.is_proven(k, one, everyone):
@@ -388,10 +372,7 @@ def _another(now: Moment, k: int, waiting: Sequence[int]) -> OwnPlan | None:
 
 
 def _stopped(now: Moment, k: int, stop: OwnPlan, stopped: Collection[int]) -> OwnPlan:
-    """The plan of a vehicle that comes to rest, past those that do so already.
-
-    Whoever would hit it is planned anew after it: this ends, at the latest, with all at rest.
-    """
+    """The plan of a vehicle that comes to rest, past those that do so already."""
     last = [(j, one) for j, one in now.held.items() if j in stopped and j != k]
     for share in EASED:
         keep = max(share * now.keep, LEAST)

@@ -453,10 +453,7 @@ class FleetMember:
         return self.problem if goals == self.problem.goals else replace(self.problem, goals=goals)
 
     def _aims(self, past: Problem) -> tuple[tuple[int, Goal], ...]:
-        """Where it may end among those that stay, as `aims`; empty if nowhere.
-
-        Who leaves may be there before.
-        """
+        """Where it may end among those that stay, as `aims`; empty if nowhere."""
         if self.leaves or not all(why_goal_blocked(past, goal) for goal in self.aimed.goals):
             return self.aims
         return self._within_tolerances(past)

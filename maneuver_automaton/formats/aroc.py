@@ -90,13 +90,7 @@ class ArocDeviation:
 
 
 def export_at(path: Path) -> Path | zipfile.Path | None:
-    """The folder of an export: that of its list, one in an archive or folder, or itself, or None.
-
-    Raises
-    ------
-    InvalidScenario
-        If an archive is broken.
-    """
+    """The folder of an export: that of its list, one in an archive or folder, itself, or None."""
     base: Path | zipfile.Path = path.parent if path.name == LIST else path
     if path.suffix.lower() == ".zip" and path.is_file():
         try:
@@ -112,13 +106,7 @@ def export_at(path: Path) -> Path | zipfile.Path | None:
 
 
 def read_aroc(path: Path) -> tuple[ArocPrimitive, ...]:
-    """The primitives of a folder or an archive, in the order of its list.
-
-    Raises
-    ------
-    InvalidScenario
-        If a file or element is missing, or holds what it may not.
-    """
+    """The primitives of a folder or an archive, in the order of its list."""
     folder = export_at(path)
     if folder is None:
         raise InvalidScenario(f"{path}: is no export of AROC, need {LIST} and {FOLDER}/")
@@ -129,13 +117,7 @@ def read_aroc(path: Path) -> tuple[ArocPrimitive, ...]:
 
 
 def wheelbase_of(primitives: tuple[ArocPrimitive, ...]) -> float:
-    """The wheelbase that fits the changes of the heading best [m].
-
-    Raises
-    ------
-    InvalidLibrary
-        If no primitive turns.
-    """
+    """The wheelbase that fits the changes of the heading best [m]."""
     crossed, turned = [], []
     for one in primitives:
         control, spans = _controls(one), np.diff(one.time)
@@ -151,14 +133,7 @@ def wheelbase_of(primitives: tuple[ArocPrimitive, ...]) -> float:
 def automaton_of_aroc(
     primitives: tuple[ArocPrimitive, ...], *, model: AcceleratingCar | None = None, name: str = ""
 ) -> Automaton:
-    """The automaton of an export, for another `model` than the one fitted to it if it is given.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the wheelbase is not known, a primitive exceeds a limit of the model, or is to follow
-        one that ends at another speed.
-    """
+    """The automaton of an export, for another `model` than the one fitted to it if it is given."""
     speeds = np.concatenate([one.states[:, 3] for one in primitives])
     inputs = np.concatenate([one.inputs for one in primitives])
     if model is None:

@@ -47,14 +47,7 @@ class Query:
 
 
 def read_benchmr(path: Path) -> tuple[Statement, ...]:
-    """The problems on a world, one for every query; without any, its obstacles alone.
-
-    Raises
-    ------
-    InvalidScenario
-        If the drawing has no path, or one of another kind than polygons; if the table of queries
-        or the robot's outline is malformed.
-    """
+    """The problems on a world, one for every query; without any, its obstacles alone."""
     world = _world(path)
     table = _queries_beside(path)
     queries = [] if table is None else [q for q in read_queries(table) if q.world == path.stem]
@@ -64,13 +57,7 @@ def read_benchmr(path: Path) -> tuple[Statement, ...]:
 
 
 def read_benchmr_queries(path: Path) -> tuple[Statement, ...]:
-    """One problem for every row of a table of queries; the worlds are beside it or a folder below.
-
-    Raises
-    ------
-    InvalidScenario
-        If a world is not there; as `read_benchmr`.
-    """
+    """One problem for every row of a table of queries; worlds are beside it or a folder below."""
     statements, worlds = [], {}
     for case, query in enumerate(read_queries(path)):
         name = f"{query.world}.svg"
@@ -107,13 +94,7 @@ def _asked(world: Statement, query: Query, path: Path, *, case: int | None = Non
 
 
 def n_queries(path: Path) -> int:
-    """How often a table of queries names this drawing as a world; robots and pictures: never.
-
-    Raises
-    ------
-    InvalidScenario
-        If the table cannot be used.
-    """
+    """How often a table of queries names this drawing as a world; robots and pictures: never."""
     table = _queries_beside(path)
     return 0 if table is None else sum(q.world == path.stem for q in read_queries(table))
 
@@ -154,13 +135,7 @@ def _queries_beside(path: Path) -> Path | None:
 
 
 def read_queries(path: Path) -> tuple[Query, ...]:
-    """The rows of a table of queries.
-
-    Raises
-    ------
-    InvalidScenario
-        If a column is missing, or holds what it may not.
-    """
+    """The rows of a table of queries."""
     queries = []
     for at, row in table_of(path, COLUMNS, what="a table of queries"):
         numbers = np.array([finite(row[name], at=f"{at}: {name}") for name in COLUMNS[2:]])
@@ -187,13 +162,7 @@ DARK = 0.5
 
 
 def read_benchmr_image(path: Path) -> tuple[Statement, ...]:
-    """A world with one map, and bounds around it; the rest is left to others.
-
-    Raises
-    ------
-    InvalidScenario
-        If the picture cannot be read.
-    """
+    """A world with one map, and bounds around it; the rest is left to others."""
     dark = read_grey_image(path).shade < DARK
     cells = OccupancyMap(dark[::-1], resolution=1.0, name=path.name)
     return (world_of(cells, path, "Bench-MR image"),)
@@ -213,13 +182,7 @@ class DrawnPath:
 
 
 def read_svg_paths(path: Path) -> tuple[DrawnPath, ...]:
-    """The paths of a drawing, in their order.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is no XML, holds no path, or one that is not made of straight lines.
-    """
+    """The paths of a drawing, in their order."""
     drawn: list[DrawnPath] = []
     left = [(read_xml(path, what="a drawing", most=MAX_BYTES), np.zeros(2))]
     while left:

@@ -39,13 +39,7 @@ def check_size(columns: int, rows: int, *, at: str) -> None:
 
 
 def check_cell(size: float, *, at: str) -> None:
-    """Refuse a size of cells [m] that no map has.
-
-    Raises
-    ------
-    InvalidScenario
-        With `at`, the place of the size, in front.
-    """
+    """Refuse a size of cells [m] that no map has."""
     if not SMALLEST <= size <= LARGEST:
         raise InvalidScenario(f"{at}: got {size:g} m, need a size of {SMALLEST:g} to {LARGEST:g} m")
 

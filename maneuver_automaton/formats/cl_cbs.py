@@ -36,13 +36,7 @@ NO_OBSTACLE = (-1.0, -1.0)
 
 
 def read_cl_cbs(path: Path, document: Document) -> tuple[Statement, ...]:
-    """The fleet of a file.
-
-    Raises
-    ------
-    InvalidScenario
-        If a key is missing or holds what it may not.
-    """
+    """The fleet of a file."""
     agents = value_at(document, ("agents",), list, "a list of agents")
     if not agents:
         raise document.error(("agents",), "got no agent, need at least one")

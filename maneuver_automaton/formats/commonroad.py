@@ -292,11 +292,7 @@ def _convex(points: Array, grown: float = 0.0) -> Polygon:
 
 
 def _occupancies(predicted: Element, step: float, name: str) -> Iterator[Obstacle]:
-    """Predicted occupancies of a road user, set by set, as obstacles.
-
-    A set of an interval holds there. A set of one instant holds from the instant before to the one
-    after, so that a road user between two instants is in one of their sets.
-    """
+    """Predicted occupancies of a road user, set by set, as obstacles."""
     for element in predicted.all("occupancy"):
         time = element.need("time")
         begin, end = _interval(time)
@@ -363,10 +359,7 @@ def _start(state: Element, step: float) -> RoadStart:
 
 
 def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> Iterator[GoalRegion]:
-    """The goals of a problem, one of which is to be reached.
-
-    Versions differ: goalState is a goal itself; goalRegion holds one or more states.
-    """
+    """The goals of a problem, one of which is to be reached."""
     states = [
         one
         for element in problem.all("goalRegion")

@@ -118,14 +118,7 @@ def is_commonroad_primitives(path: Path) -> bool:
 
 
 def read_commonroad_primitives(path: Path) -> RoadPrimitives:
-    """The primitives of a file, as they stand there.
-
-    Raises
-    ------
-    InvalidScenario
-        If an element is missing or holds what it may not, a primitive does not begin at the
-        origin, or its steps do not follow each other.
-    """
+    """The primitives of a file, as they stand there."""
     root = read_xml(path, what="a file of primitives", most=MOST_BYTES)
     if root.tag not in (ROOT, OLDER_ROOT):
         raise root.error(f"need {ROOT} or {OLDER_ROOT}, the root of {KIND}")
@@ -140,13 +133,7 @@ def read_commonroad_primitives(path: Path) -> RoadPrimitives:
 
 
 def save_commonroad_primitives(file: RoadPrimitives, path: Path) -> None:
-    """Write primitives, in one step; every number reads back to the last bit.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write primitives, in one step; every number reads back to the last bit."""
     write_text_atomically(path, commonroad_primitives_text(file))
 
 
@@ -170,11 +157,6 @@ def vehicle_of(file: RoadPrimitives) -> SecondOrderCar:
     """The vehicle of a file: one that is known by its name, or the one that its motions show.
 
     Then the wheelbase is fitted to the changes of the heading, and limits are the largest values.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the vehicle is not known and no primitive turns.
     """
     if (known := VEHICLES.get(file.vehicle or "")) is not None:
         return known
@@ -261,12 +243,6 @@ def commonroad_primitives_of_automaton(automaton: Automaton) -> RoadPrimitives:
 
     The vehicle is named if it is one that CommonRoad knows; else the file is of the older kind,
     which names none, and the wheelbase can be told from its motions only.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the vehicle is another, there are no maneuvers, or one has no course or does not last
-        whole tenths of a second.
     """
     car, label = automaton.model, automaton.name or "automaton"
     if not isinstance(car, SecondOrderCar):

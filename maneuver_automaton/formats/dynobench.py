@@ -110,24 +110,12 @@ class StatedModel:
     document: Document
 
     def vehicle(self, states: Sequence[Array]) -> StatedVehicle:
-        """The vehicle, with trims at reduced `states`, those of start and goal; or InvalidScenario.
-
-        Raises
-        ------
-        InvalidScenario
-            If the model's file misses something, or holds what it may not.
-        """
+        """The vehicle, with trims at the reduced `states` of start and goal; or InvalidScenario."""
         return _MAKERS[self.dynamics](self.name, self.document, states)
 
 
 def dynobench_model(path: Path, document: Document, *, robot: int = 0) -> StatedModel:
-    """The model of a robot of a problem, by its number.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is none that is read.
-    """
+    """The model of a robot of a problem, by its number."""
     where: Where = ("robots", robot, "type")
     name = value_at(document, where, str, "the name of a model")
     file = _model_file(path, name)
@@ -276,13 +264,7 @@ def _body(model: Document, size: str, shape: str) -> Box | Disc:
 
 
 def read_dynobench(path: Path, document: Document) -> tuple[Statement, ...]:
-    """The problem of a file, its vehicle included; or its fleet, if it has several robots.
-
-    Raises
-    ------
-    InvalidScenario
-        If a key is missing or holds what it may not, or a model is none that is read.
-    """
+    """The problem of a file, its vehicle included; or its fleet, if it has several robots."""
     robots = value_at(document, ("robots",), list, "a list of robots")
     if not robots:
         raise document.error(("robots",), "got no robot, need at least one")

@@ -164,14 +164,6 @@ def fleet_loop_to_dict(
 ) -> FleetLoopDocument:
     """The content of closed_loop.json for several vehicles, as plain values.
 
-    Parameters
-    ----------
-    log : FleetLog
-    driven : DrivenVerdict
-        What `verify_driven` says of it.
-    name : str
-        Of the scenario.
-
     Examples
     --------
     >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle

@@ -328,11 +328,7 @@ def _directions() -> IntArray:
 
 
 def _shortest(first: float, last: float, radius: float) -> _LatticeTurn:
-    """The shortest motion to a cell, of all whose arc has at least a radius [cells].
-
-    Straights cut at a corner, d1 from the start and d2 from the end. The arc that touches both
-    begins and ends min(d1, d2) from there, and its radius is that over tan(turn / 2).
-    """
+    """The shortest motion to a cell, of all whose arc has at least a radius [cells]."""
     turn = float(wrapped(last - first))
     bend = math.tan(0.5 * abs(turn))
     reach = math.ceil(2.0 * (radius * bend + math.sqrt(5.0)))

@@ -48,13 +48,7 @@ _OTHER = re.compile(f"[^{FREE}{BLOCKED}]")
 
 
 def load_movingai_map(path: Path) -> OccupancyMap:
-    """The cells of a .map file, 1 m each, the lower left corner at the origin.
-
-    Raises
-    ------
-    InvalidScenario
-        If the header, the number of rows, a row's length or a character is wrong.
-    """
+    """The cells of a .map file, 1 m each, the lower left corner at the origin."""
     lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="a map"))
     sizes: dict[str, int] = {}
     for k, key in enumerate(("type", "height", "width", "map")):
@@ -87,13 +81,7 @@ def load_movingai_map(path: Path) -> OccupancyMap:
 
 
 def save_movingai_map(cells: OccupancyMap, path: Path) -> None:
-    """Write the cells as a .map file, which states neither their size nor where they are.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write the cells as a .map file, which states neither their size nor where they are."""
     rows, columns = cells.blocked.shape
     codes = np.where(cells.blocked[::-1], ord("@"), ord(".")).astype(np.uint8)
     text = "\n".join(row.tobytes().decode("ascii") for row in codes)
@@ -101,25 +89,12 @@ def save_movingai_map(cells: OccupancyMap, path: Path) -> None:
 
 
 def read_movingai_map(path: Path) -> tuple[Statement, ...]:
-    """A world with one map, and bounds around it; the rest is left to others.
-
-    Raises
-    ------
-    InvalidScenario
-        As `load_movingai_map`.
-    """
+    """A world with one map, and bounds around it; the rest is left to others."""
     return (world_of(load_movingai_map(path), path, "MovingAI map"),)
 
 
 def read_movingai_scenario(path: Path) -> tuple[Statement, ...]:
-    """One problem for every query of a .scen file; its map lies beside it.
-
-    Raises
-    ------
-    InvalidScenario
-        If a line does not have its nine columns, names another map than the others, or states a
-        cell outside it; as `load_movingai_map` for the map.
-    """
+    """One problem for every query of a .scen file; its map lies beside it."""
     lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="a list of queries"))
     first = lines[0].split() if lines else []
     if len(first) != 2 or first[0] != "version":
@@ -163,10 +138,7 @@ def map_beside(path: Path) -> Path:
 
 
 def _queries(path: Path) -> Iterator[tuple[str, list[str]]]:
-    """Place and columns of each query.
-
-    Columns are parted by tabs; where names of maps have no spaces, spaces do as well.
-    """
+    """Place and columns of each query."""
     lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="a list of queries"))
     for k, line in enumerate(lines[1:]):
         if columns := line.strip().split("\t") if "\t" in line.strip() else line.split():

@@ -125,14 +125,7 @@ class Nav2Lattice:
 
 
 def read_nav2_lattice(path: Path) -> Nav2Lattice:
-    """The primitives of a file, as they stand there.
-
-    Raises
-    ------
-    InvalidScenario
-        If a key is missing or holds what it may not, an end is beside the grid or its heading, or
-        the primitives are not sorted by their first heading.
-    """
+    """The primitives of a file, as they stand there."""
     text = read_text(path, most=MOST_BYTES, what="lattice primitives")
     try:
         top = json.loads(text)
@@ -169,13 +162,7 @@ def read_nav2_lattice(path: Path) -> Nav2Lattice:
 
 
 def save_nav2_lattice(file: Nav2Lattice, path: Path) -> None:
-    """Write primitives, in one step; every number reads back to the last bit.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write primitives, in one step; every number reads back to the last bit."""
     counts = {
         "num_of_headings": file.headings.size,
         "number_of_trajectories": len(file.primitives),
@@ -207,12 +194,6 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
 
     The motion model is `omni` if a primitive goes aside, else `diff` if one turns on the spot, else
     `ackermann`.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the automaton is not on a grid, has a primitive that drives in reverse or none for a
-        heading, or neither a turning radius nor an arc to tell one from.
     """
     lattice = lattice_of_automaton(automaton, kind=KIND)
     label = automaton.name or "automaton"
@@ -299,10 +280,7 @@ def _primitive(
 
 
 def _usual(steps: Array) -> float:
-    """The middle one of the steps that are not zero, the lower of two.
-
-    A lone one has none to compare with: inf if it is all there is, 0 beside steps of zero.
-    """
+    """The middle one of the steps that are not zero, the lower of two."""
     some = np.sort(steps[steps > 0.0])
     if some.size > 1:
         return float(some[(some.size - 1) // 2])

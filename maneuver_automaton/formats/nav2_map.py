@@ -134,13 +134,7 @@ def load_nav2_mask(path: Path) -> Mask:
 
 
 def read_nav2_map(path: Path, document: Document) -> tuple[Statement, ...]:
-    """A world with one map, and bounds around it; the rest is left to others.
-
-    Raises
-    ------
-    InvalidScenario
-        As `load_nav2_map`.
-    """
+    """A world with one map, and bounds around it; the rest is left to others."""
     cells = map_of_document(document, path)
     return (world_of(cells, path, "Nav2 map", MapFile(map=cells, path=path)),)
 

@@ -322,13 +322,7 @@ def read_plan_document(path: Path | str) -> dict[str, Any]:
 
 
 def read_fleet_document(path: Path | str) -> dict[str, Any] | None:
-    """The content of a plan.json of several vehicles, as plain values; None of any other.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, or misses what plans of several vehicles have.
-    """
+    """The content of a plan.json of several vehicles, as plain values; None of any other."""
     value = parsed(path)
     if not isinstance(value, dict) or value.get("kind") != FLEET:
         return None

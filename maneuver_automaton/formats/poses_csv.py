@@ -31,14 +31,7 @@ def is_poses(path: Path) -> bool:
 
 
 def read_poses(path: Path) -> tuple[Statement, ...]:
-    """The obstacles of a table; the rest of the problem is left to a scenario beside it.
-
-    Raises
-    ------
-    InvalidScenario
-        If a row has a number too few or too many, one is none, times do not rise, or a size changes
-        or is not positive.
-    """
+    """The obstacles of a table; the rest of the problem is left to a scenario beside it."""
     rows: dict[str, list[tuple[list[float], str]]] = {}
     for at, row in table_of(path, NAMES, most=MAX_MAP_BYTES, what="a table of poses"):
         numbers = [finite(row[name], at=f"{at}: {name}") for name in NAMES[1:]]

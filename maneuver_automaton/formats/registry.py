@@ -134,13 +134,7 @@ BELONG: Mapping[str, str] = {  # to a problem that they do not state: files with
 
 @functools.cache
 def from_outside() -> tuple[FileFormat, ...]:
-    """The formats that other packages bring, by the names of their entry points.
-
-    Raises
-    ------
-    InvalidScenario
-        If one cannot be loaded.
-    """
+    """The formats that other packages bring, by the names of their entry points."""
     found = []
     for entry in sorted(metadata.entry_points(group=GROUP), key=lambda one: one.name):
         try:

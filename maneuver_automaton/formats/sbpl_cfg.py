@@ -66,13 +66,7 @@ def is_sbpl(path: Path) -> bool:
 
 
 def read_sbpl(path: Path) -> tuple[Statement, ...]:
-    """The problem of an environment; the vehicle is left to others.
-
-    Raises
-    ------
-    InvalidScenario
-        If a key is unknown, missing or stands twice, a number is none, or cells are missing.
-    """
+    """The problem of an environment; the vehicle is left to others."""
     lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="an environment"))
     header, begin = _header(path, lines)
     suffix = METRES if CELL in header else CELLS

@@ -127,14 +127,7 @@ class _Words:
 
 
 def read_mprim(path: Path) -> MprimFile:
-    """The primitives of a file, as they stand there.
-
-    Raises
-    ------
-    InvalidScenario
-        If a word is missing or another, a number is none, a primitive ends in another cell or at
-        another heading than it says, or two of a heading have the same number.
-    """
+    """The primitives of a file, as they stand there."""
     words = _Words(path)
     resolution = words.key(RESOLUTION).positive(RESOLUTION)
     radius = None
@@ -168,13 +161,7 @@ def read_mprim(path: Path) -> MprimFile:
 
 
 def save_mprim(file: MprimFile, path: Path) -> None:
-    """Write primitives, in one step; every number reads back to the last bit.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write primitives, in one step; every number reads back to the last bit."""
     lines = [f"{RESOLUTION} {file.resolution!r}"]
     if file.min_turning_radius is not None:
         lines.append(f"{RADIUS} {file.min_turning_radius!r}")
@@ -215,15 +202,7 @@ def automaton_of_mprim(
 
 
 def mprim_of_automaton(automaton: Automaton) -> MprimFile:
-    """An automaton of lattice primitives as a file.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the automaton is not on a grid, or its headings are neither evenly spaced nor has it a
-        turning radius, they do not all have the same number of primitives, or a cost multiplier is
-        no whole number.
-    """
+    """An automaton of lattice primitives as a file."""
     lattice = lattice_of_automaton(automaton, kind=KIND)
     n = lattice.headings.size
     counts = Counter(move.start for move in lattice.moves)
@@ -372,10 +351,7 @@ def _narrowest(headings: Array) -> float:
 
 
 def _meant(file: MprimFile, one: MprimPrimitive) -> Move:
-    """A primitive whose first and last poses are what their cells and headings say.
-
-    A first pose in another cell, or at another heading, than that of the origin is the second.
-    """
+    """A primitive whose first and last poses are what their cells and headings say."""
     column, row, last = one.end
     last %= file.headings.size
     begin, end = float(file.headings[one.start]), float(file.headings[last])

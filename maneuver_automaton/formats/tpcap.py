@@ -45,13 +45,7 @@ def is_tpcap(path: Path) -> bool:
 
 
 def read_tpcap(path: Path) -> tuple[Statement, ...]:
-    """The problem of a case; the vehicle is left to others.
-
-    Raises
-    ------
-    InvalidScenario
-        If a number is missing, one too many, or none, or a polygon is not simple.
-    """
+    """The problem of a case; the vehicle is left to others."""
     values = _values(path)
     if len(values) < len(HEAD):
         raise InvalidScenario(

@@ -79,13 +79,7 @@ class Element:
 
 
 def read_xml(path: Path | zipfile.Path, *, what: str, most: int) -> Element:
-    """The root element of a file of at most `most` bytes; `what` is what it should hold.
-
-    Raises
-    ------
-    InvalidScenario
-        If it cannot be read, or is no XML.
-    """
+    """The root element of a file of at most `most` bytes; `what` is what it should hold."""
     parser, begun = expat.ParserCreate(), [Element("", {}, path, 0)]
     parser.buffer_text = True
 

@@ -77,11 +77,7 @@ def _path(found: Incumbents, problem: Problem, budget: Budget, **more: Any) -> T
 
 
 def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
-    """Stop and steer along a path, once moving obstacles let it pass.
-
-    The path was free at the pace of the simpler vehicle. This one is slower, so that it meets
-    moving obstacles elsewhere: it waits before it starts, as long as it takes, or does not go.
-    """
+    """Stop and steer along a path, once moving obstacles let it pass."""
     problem, goal = found.problem, found.problem.goals[goal_index]
     if found.for_checks.left_to_check < STOPPING_S:
         return

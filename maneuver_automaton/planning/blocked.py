@@ -58,10 +58,7 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
 
 
 def _surely_free(problem: Problem) -> list[bool]:
-    """Whether the kernels prove the start and every goal (1 + n,) free, all in one call.
-
-    Not asked for where heights matter, where something moves, or for what a vehicle carries.
-    """
+    """Whether the kernels prove the start and every goal (1 + n,) free, all in one call."""
     if not problem.obstacles or problem.parts or problem.start.size > 3 or problem.moves:
         return [False] * (1 + len(problem.goals))
     return [one > problem.margin + CLEARLY for one in ends_of(problem).clearances.tolist()]
@@ -93,10 +90,7 @@ def why_goal_blocked(problem: Problem, goal: Goal, *, free: bool = False) -> str
 
 
 def _why_blocked_all_round(problem: Problem, goal: Goal) -> str:
-    """Why no plan can end at a goal of any heading; empty if that is not proven.
-
-    The disc inside the body touches something, or the body does at every heading.
-    """
+    """Why no plan can end at a goal of any heading; empty if that is not proven."""
     inside = body_of(problem.footprint).inscribed
     if inside > 0.0:
         disc = replace(problem, footprint=(Disc(inside),))
@@ -206,9 +200,8 @@ def why_off_lattice(problem: Problem, goal: Goal) -> str:
     >>> library = Automaton(LatticeBody(resolution=0.5), (east,), (ahead,))
     >>> problem = Problem(library, [0, 0, 0], [1.1, 0, 0])
     >>> why_off_lattice(problem, problem.goals[0])
-    'the goal is beside the lattice of 0.5 m that begins at the start: the nearest node, (1, 0) m \
-at 0 rad, is 0.1 m and 0 rad off'
-    """
+    'the goal is beside the lattice of 0.5 m that begins at the start: the nearest node, (1, 0) m at 0 rad, is 0.1 m and 0 rad off'
+    """  # noqa: E501, as it is said
     near = nearest_on_lattice(problem, goal)
     if near is None or near.is_near(goal):
         return ""

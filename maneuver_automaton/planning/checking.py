@@ -373,10 +373,7 @@ def _rows_within_reach(
 
 
 def _end_states(problem: Problem, plan: Plan, goal: Goal) -> tuple[Array, Array] | None:
-    """Reduced states in which a vehicle with inertia begins and ends.
-
-    On a lattice the last one is the heading at which the plan ends, within the goal's tolerance.
-    """
+    """Reduced states in which a vehicle with inertia begins and ends."""
     if problem.automaton.is_kinematic:
         return None
     last = problem.last_trim(replace(goal, pose=plan.end))

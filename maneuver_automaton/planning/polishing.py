@@ -217,11 +217,7 @@ def _guesses(
 def _other_turns(
     problem: Problem, known: Sequence[tuple[Plan, int]], budget: Budget
 ) -> Iterator[Aimed]:
-    """Guesses along words that switch at will, and turn in other ways than the plans known.
-
-    A solver keeps the ways in which its guess turns, and maneuvers between few trims are too long
-    for some: those ways are in no word of the library.
-    """
+    """Guesses along words that switch at will, and turn in other ways than the plans known."""
     seen, index = {_turns(plan) for plan, _ in known}, known[0][1]
     at_will = replace(problem, cost=BY_TIME, horizon=Horizon())
     setup = sub_library(search_setup(at_will, problem.goals[index]))
@@ -409,10 +405,7 @@ def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:
 
 
 def _end_state(automaton: Automaton, last: Trim) -> tuple[float | None, ...]:
-    """The reduced state of a last trim; None for what follows from the last pose.
-
-    To ask for both would be to ask for one thing twice, which is more than a solver can keep.
-    """
+    """The reduced state of a last trim; None for what follows from the last pose."""
     follows = () if automaton.translated is None else automaton.translated.follows_pose
     values = last.reduced_state.tolist()
     return tuple(None if k in follows else value for k, value in enumerate(values))

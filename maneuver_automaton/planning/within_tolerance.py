@@ -87,12 +87,7 @@ class WithinTolerance(Step):
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:
-    """The goals themselves where a plan may end there, the poses nearest to the start, all others.
-
-    Each has its share of the time and of the expansions: many aims at once would take from the
-    searches that improve one plan what they need, and cost more than the exact goal alone. On a
-    lattice plans end at its nodes alone: those nearest to each goal are asked for.
-    """
+    """The goals where a plan may end there, then the poses nearest to the start, all others."""
     if problem.automaton.lattice is not None:
         nodes = tuple(node for goal in problem.goals for node in aims_within(problem, goal))
         yield replace(problem, goals=nodes or problem.goals)

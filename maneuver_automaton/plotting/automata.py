@@ -289,10 +289,7 @@ def _disc() -> Array:
 
 
 def _trim_pictures(automaton: Automaton, radius: float) -> tuple[list[Array], list[Array]]:
-    """Paths (n, 2) of all trims to one scale, about the centre of their node, and arrow heads.
-
-    Seen with the vehicle heading up. A turn on the spot is an arc, rest a dot.
-    """
+    """Paths (n, 2) of all trims to one scale, about the centre of their node, and arrow heads."""
     poses = [_motion(trim) for trim in automaton.trims]
     lines = [np.stack([-pose[:, 1], pose[:, 0]], axis=-1) for pose in poses]
     widest = max(float(np.linalg.norm(np.ptp(line, axis=0))) for line in lines)
@@ -347,11 +344,7 @@ def _tip(centre: Array, along: Array, radius: float) -> Array:
 def _draw_maneuver_arrows(
     ax: Axes, automaton: Automaton, centres: Array, radius: float
 ) -> tuple[FancyArrowPatch, ...]:
-    """One curved arrow for each ordered pair of trims that a maneuver joins.
-
-    Where they are many they are thin and pale, and one line with two heads joins trims that are
-    joined both ways.
-    """
+    """One curved arrow for each ordered pair of trims that a maneuver joins."""
     arrows = []
     pairs = dict.fromkeys((maneuver.source, maneuver.target) for maneuver in automaton.maneuvers)
     many = len(pairs) > MOST_HEADED

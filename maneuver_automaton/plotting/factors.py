@@ -127,11 +127,7 @@ def save_factor_figure(proof: FactorsOfWords, path: str | Path) -> None:
 
 
 def _worst_factors(proof: FactorsOfWords, half: Array) -> Array:
-    """Greatest factor (2 n - 1, 2 n - 1) over all headings at each place; NaN where none counts.
-
-    A quarter of the places is looked at: `half` (n,) are its sides, from zero on. Mirrored, or
-    driven in the other gear, paths are as long.
-    """
+    """Greatest factor (2 n - 1, 2 n - 1) over all headings at each place; NaN where none counts."""
     x, y = np.meshgrid(half, half)
     inside = np.hypot(x, y) <= proof.radius
     most = np.full(int(inside.sum()), np.nan)

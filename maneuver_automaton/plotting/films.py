@@ -67,13 +67,7 @@ def picture_times(begin: float, end: float) -> Array:
 
 
 def check_film_path(path: str | Path) -> Path:
-    """The path, if a film can be written to it: by its ending, .gif or .mp4.
-
-    Raises
-    ------
-    ValueError
-        If the ending is another one, or .mp4 and Matplotlib finds no ffmpeg.
-    """
+    """The path, if a film can be written to it: by its ending, .gif or .mp4."""
     target = Path(path)
     ending = target.suffix.lower()
     if ending not in ENDINGS:
@@ -92,15 +86,7 @@ def check_film_path(path: str | Path) -> Path:
 
 
 def write_film(film: Film, path: str | Path) -> None:
-    """Write a `film` to `path`, by its ending; the file is replaced in one step.
-
-    Raises
-    ------
-    ValueError
-        As `check_film_path`.
-    OSError
-        If the file cannot be written; an old one stays as it was.
-    """
+    """Write a `film` to `path`, by its ending; the file is replaced in one step."""
     target = check_film_path(path)
     writers = {".gif": _gif, ".mp4": _video}
     write_bytes_atomically(target, writers[target.suffix.lower()](film))

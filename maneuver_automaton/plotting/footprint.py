@@ -156,10 +156,7 @@ def merged(parts: Sequence[Any]) -> list[Any]:
 
 
 def _samples(piece: TrackPiece) -> Array:
-    """Poses (n, dof) of a piece, no more than it takes.
-
-    That it turns by nothing in all is not enough: a lane change goes left and right again.
-    """
+    """Poses (n, dof) of a piece, no more than it takes."""
     pose = piece.pose
     chord = pose[-1, :2] - pose[0, :2]
     steps = np.diff(pose[:, :2], axis=0)

@@ -55,10 +55,7 @@ def hide_times(column: Sequence[Axes]) -> None:
 
 
 def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
-    """Lines of (text, size [pt], weight): the title, then `others`, the first bold without one.
-
-    All are wrapped to a `width` [in]. In a paper the title stands alone.
-    """
+    """Lines of (text, size [pt], weight): the title, then `others`, the first bold without one."""
     said = [look.title, *([] if look.is_paper else others)]
     shown = [(text, k) for k, text in enumerate(said) if text]
     lines = []

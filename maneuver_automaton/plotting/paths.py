@@ -200,10 +200,7 @@ def swept_area(track: Track, scene: Scenery) -> PathCollection:
 
 
 def _darts(track: Track, scene: Scenery, *, size: float) -> PolyCollection:
-    """Where the body is not known: darts along a path, and white ones where trims begin.
-
-    The white ones leave the path between them free.
-    """
+    """Where the body is not known: darts along a path, and white ones where trims begin."""
     if scene.body:
         return PolyCollection([])
     dart = [DART_SIZE * size * DART]
@@ -230,10 +227,7 @@ def _apart(poses: Array, apart: float) -> list[int]:
 
 
 def _switch_bodies(track: Track, scene: Scenery) -> PolyCollection:
-    """Outlines where trims begin and at the end, which is clear; many others are fainter.
-
-    Those of what it carries stand beside them; a motion by optimal control has a few within.
-    """
+    """Outlines where trims begin and at the end, which is clear; many others are fainter."""
     times = _shown_times(track, apart=BODIES_APART * scene.reach)
     poses = track.at(times) if len(times) > len(track.switching_times) else track.switching_poses
     outlines = placed(scene.body, poses)

@@ -25,25 +25,6 @@ TICK_IN = 0.05  # [in] length of a tick
 def draw_nodes(ax: Axes, nodes: ArrayLike, *, cost: ArrayLike | None = None) -> Quiver:
     """Draw expanded `nodes` on `ax`, which keeps its limits: ticks that point where each heads.
 
-    Parameters
-    ----------
-    ax : Axes
-        Where to draw.
-    nodes : (n, 3) array_like
-        Poses [m, m, rad].
-    cost : (n,) array_like, optional
-        What their colours show, such as the cost to come; all are grey if left out.
-
-    Returns
-    -------
-    Quiver
-        The ticks; a colour bar can be made from them.
-
-    Raises
-    ------
-    ValueError
-        If the nodes are no poses, or the costs are not as many.
-
     Examples
     --------
     >>> from matplotlib.figure import Figure

@@ -50,13 +50,7 @@ def flies_among_heights(result: Any) -> bool:
 
 
 def space_figure(cast: Cast, lines: Sequence[str], look: Look) -> Figure:
-    """The picture of a flight: in space, from above, and from the side, all to scale.
-
-    Raises
-    ------
-    ValueError
-        If a vehicle is one of the plane.
-    """
+    """The picture of a flight: in space, from above, and from the side, all to scale."""
     for one in cast.actors:
         if one.track.start.size < 4:
             name = "vehicle" if one.mover.model is None else one.mover.model.name
@@ -209,11 +203,7 @@ def _ribbon(places: Array, width: float) -> Array:
 
 
 def _as_long_as_the_longest(faces: list[Array]) -> list[Array]:
-    """Faces (k, 3) with as many corners each; a shorter one stays in its last corner.
-
-    Matplotlib fills shorter ones up with what its memory held, and takes that for corners when it
-    looks for the limits of the axes.
-    """
+    """Faces (k, 3) with as many corners each; a shorter one stays in its last corner."""
     longest = max((len(face) for face in faces), default=0)
     return [np.pad(face, ((0, longest - len(face)), (0, 0)), mode="edge") for face in faces]
 

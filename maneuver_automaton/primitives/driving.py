@@ -132,10 +132,7 @@ def _integrated(
 def _reduced_states(
     model: Model, z: Array, control: Array, step: Array
 ) -> tuple[Array, Array, Array, BoolArray]:
-    """Reduced states at the begins (m, k + 1, n_z) and points (m, k, n, n_z), rates there.
-
-    The last value tells the elements (m, k) that no iteration solves.
-    """
+    """Reduced states at the begins (m, k + 1, n_z) and points (m, k, n, n_z), rates there."""
     m, k = step.shape
     begin = np.empty((m, k + 1, z.shape[1]))
     at_nodes = np.empty((m, k, NODES.size, z.shape[1]))

@@ -377,10 +377,7 @@ def _accumulated(now: Situation) -> float:
 
 
 def _is_taken(violation: Violation, now: Situation) -> bool:
-    """Whether a disturbance took a guarantee away, as it may any but that of the time budget.
-
-    What was taken once, say the horizon by a push, is not given back by the next step.
-    """
+    """Whether a disturbance took a guarantee away, as it may any but that of the time budget."""
     if now.last is None or violation.guarantee is Guarantee.BUDGET:
         return False
     before = {one.guarantee for one in now.last.disturbed}

@@ -128,10 +128,7 @@ def _soonest(problem: Problem, plan: Plan) -> Plan:
 
 
 def _to_rest(problem: Problem) -> Problem:
-    """The problem with a rest to be reached, where maneuvers lead to one; its pose does not matter.
-
-    Otherwise trims that lead to none of the goals would be left out, the rest among them.
-    """
+    """The problem with a rest to be reached, anywhere, where maneuvers lead to one."""
     automaton = problem.automaton
     if automaton.is_kinematic or automaton.rest is None:
         return problem

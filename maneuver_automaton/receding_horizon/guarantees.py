@@ -111,10 +111,7 @@ def promises(problem: Problem, *, step: float) -> Promises:
 
 
 def _least_effort(problem: Problem, cost: Cost) -> float:
-    """c1 lambda_min(R), the paper's constant for the unicycle, whose controls are its speeds.
-
-    For other vehicles at most the effort of a trim of the library per (m/s)^2 + (rad/s)^2.
-    """
+    """c1 lambda_min(R), the paper's constant for the unicycle, whose controls are its speeds."""
     weight = cost.effort_matrix
     smallest = 1.0 if weight is None else float(np.linalg.eigvalsh(weight)[0])
     squares = (problem.automaton.body_velocities**2).sum(axis=1)
@@ -261,10 +258,6 @@ class LoopBounds:
         return best
 
     def _note(self, here: Problem, least: float, accumulated: float) -> None:
-        """Keep a bound of plans from here, for steps on the way.
-
-        Not where a switch or a change of direction between two steps has a price, which neither
-        step counts, nor for a fixed time, which every step begins anew.
-        """
+        """Keep a bound of plans from here, for steps on the way."""
         if not prices_switches(here.cost) and here.horizon.time is None:
             self.least, self.at = least, accumulated

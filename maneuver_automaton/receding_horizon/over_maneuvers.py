@@ -63,10 +63,7 @@ class OverManeuvers(StepSearch):
         return not what_is_hit(self.here, plan, self.here.goals[0])
 
     def _hit(self, plan: Plan, *, until: float = -math.inf) -> str:
-        """The obstacle that a plan hits, or that comes to its end at rest; empty if there is none.
-
-        It must be free to stand there for a while, and until a time [s] of the world's clock.
-        """
+        """The obstacle that a plan hits, or that comes to its rest; empty if there is none."""
         last = self._last_trim(plan)
         if self.here.moves and last.is_rest:
             arrival = plan.start_time + plan.duration
@@ -254,10 +251,7 @@ class OverManeuvers(StepSearch):
         return None if found is None else found.plan
 
     def _evasions(self) -> Iterator[tuple[Plan, Decision]]:
-        """Motions from the end of the committed part that stay free, or from that of the last plan.
-
-        One that does not stay free for long enough may be the one that is hit last.
-        """
+        """Free motions from the end of the committed part, or from that of the last plan."""
         for begun in (self._standing(0.0), self.now.rest):
             if begun is None or not begun.trims:
                 continue

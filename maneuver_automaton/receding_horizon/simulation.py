@@ -381,10 +381,7 @@ def _closed_loop(
 
 
 def _arrives(step: Step, *, stops: bool) -> bool:
-    """Whether a vehicle that is at the goal after a step stays there, and does not drive past it.
-
-    If it `stops` where it likes, it does so on a plan to the goal; otherwise at the end of a plan.
-    """
+    """Whether a vehicle that is at the goal after a step stays there, not driving past."""
     if stops:
         return step.decision.leads
     left = tail_of(step.plan, step.applied)

@@ -149,10 +149,7 @@ class StepSearch:
         return False
 
     def _known_free(self, chosen: StepPlan) -> StepPlan:
-        """What is applied, with the time until which it is known to be free [s].
-
-        A plan that ends in motion was looked at to its end alone.
-        """
+        """What is applied, with the time until which it is known to be free [s]."""
         until, plan = self.free_until, chosen.plan
         if until is not None and plan.trims and not plan.trims[-1].is_rest:
             until = min(until, plan.start_time + plan.duration)
@@ -179,11 +176,7 @@ class StepSearch:
         return there if self.is_safe(there.plan) else None
 
     def _kept(self) -> StepPlan | None:
-        """The first safe rest of the last plan that is no detour; else the cheapest that is safe.
-
-        As it is, it may end within the goal's tolerance: that will do where no other is safe, and
-        with inertia before a detour.
-        """
+        """The first safe rest of the last plan that is no detour; else the cheapest safe one."""
         now, last, rest = self.now, self.now.last, self.now.rest
         if last is None or rest is None or (now.here.moves and not last.decision.leads):
             return None

@@ -125,10 +125,7 @@ def whole_of(query: LatticeQuery) -> Whole | None:
 
 
 def _saves_trims(query: LatticeQuery) -> bool:
-    """Whether one trim between two is worth more than both, as it saves a switch.
-
-    Where time is limited there are two paces already, and the paces matter more.
-    """
+    """Whether one trim between two is worth more than both, as it saves a switch."""
     prices = query.library.arrays.library
     priced = prices.switch > 0.0 or prices.direction_change > 0.0
     limited = query.most_trims > 0 or query.least_coast > 0.0

@@ -341,11 +341,7 @@ def without_nothing(plan: Plan) -> Plan:
 
 
 def _coasting_limits(problem: Problem, plan: Plan) -> Iterator[tuple[Array, Array]]:
-    """Least and greatest coasting times (n,) [s] to try.
-
-    Every trim lasts as long as it must at least, or is left out. As many are left out as the plan
-    leaves out, but for a few.
-    """
+    """Least and greatest coasting times (n,) [s] to try."""
     least_coast = problem.horizon.min_coast
     longest = np.array([trim.max_duration for trim in plan.trims])
     still = np.array([trim.is_rest for trim in plan.trims])

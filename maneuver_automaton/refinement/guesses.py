@@ -213,11 +213,7 @@ def trailer_guess(
 def _hitched(
     model: CarWithTrailer, control: Array, step: float, hitches: tuple[float, float]
 ) -> Array:
-    """Angles (n + 1,) at the hitch [rad], which may jump where the gear changes.
-
-    A trailer that is pulled comes round behind its car, and one that is pushed jackknifes: so they
-    follow from the angle before it where the car goes ahead, and from the one after it in reverse.
-    """
+    """Angles (n + 1,) at the hitch [rad], which may jump where the gear changes."""
     low, high = model.reduced_limits[0].tolist()
     angle = np.zeros(len(control) + 1)
     angle[0], angle[-1] = hitches

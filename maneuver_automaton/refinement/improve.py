@@ -324,10 +324,7 @@ class Improvement:
         yield from self._considered(candidate)
 
     def _shortened(self, word: Word, restart: Restart, attempts: int) -> Word:
-        """The word after rounds of the dynamic program and some attempts.
-
-        Every round looks at other points; first with words of few trims, then with all.
-        """
+        """The word after rounds of the dynamic program and some attempts."""
         arrays = self.query.library.arrays.library
         restarts = self.restarts
         rounds = restarts.moving_rounds if self.query.moves else restarts.rounds

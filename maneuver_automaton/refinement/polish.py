@@ -459,11 +459,7 @@ class _Polishing:
         return found
 
     def _consider(self, found: Polished, *, number: int = -1, again: bool = True) -> bool:
-        """Close the motion found, and keep it if it is accepted and better.
-
-        Where it shuffles a little, one that does not is tried first. Where closing leads beyond a
-        limit, it is solved once more with more room.
-        """
+        """Close the motion found, and keep it if it is accepted and better."""
         gears = None
         if not self.task.movers:  # whose places follow from an even pace
             gears = without_shuffles(self.task.model, found, SHUFFLED * self._reach)

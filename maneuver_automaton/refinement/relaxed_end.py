@@ -118,10 +118,7 @@ class _Relaxation:
 
     @cached_property
     def _ending(self) -> EndConditions:
-        """Conditions of the times to end at the goal, seen from its place.
-
-        The twists are seen from after all displacements, so that the last pose is the plan's own.
-        """
+        """Conditions of the times to end at the goal, seen from its place."""
         plan, group = self.plan, group_of(self.plan.start.size)
         goal, start = np.array(self.goal.pose), np.array(plan.start)
         places = [0, 1, *range(3, start.size)]

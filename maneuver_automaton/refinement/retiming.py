@@ -252,20 +252,6 @@ def shared_time(lengths: Array, *, least: Array, total: float) -> Array:
 
     Source: Boyd, Vandenberghe (2004), *Convex Optimization*, Sec. 5.5.3.
 
-    Parameters
-    ----------
-    lengths : (n,) array
-        Positive: time times effort of each piece.
-    least : (n,) array
-        Least times [s].
-    total : float
-        Their sum [s].
-
-    Raises
-    ------
-    ValueError
-        If the least times add up to more than the total.
-
     Examples
     --------
     >>> shared_time(np.array([3.0, 1.0]), least=np.array([0.0, 0.0]), total=8.0).tolist()

@@ -280,10 +280,7 @@ def plan_road(
 
 
 def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPlanResult:
-    """A plan within limits of speed, looked for in half of the time [s]; else one beyond them.
-
-    Without `loop` nothing is driven in closed loop within limits: that is what comes next anyway.
-    """
+    """A plan within limits of speed, looked for in half of the time [s]; else one beyond them."""
     begin = time.perf_counter()
     if (why := planner.hopeless()) is not None:
         return _without(planner, why[1])
@@ -301,10 +298,7 @@ def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPl
 def _wider(
     planner: RoadPlanner, give_up: float, deadline: float, widths: Sequence[int], *, loop: bool
 ) -> RoadPlanResult:
-    """The better one of the first search that finds a plan, and of the next wider one.
-
-    No search begins after the deadline, nor, as long as there is no plan, after `give_up`.
-    """
+    """The better one of the first search that finds a plan, and of the next wider one."""
     best, driven = _without(planner, ""), ""
     for width in widths:
         over = give_up if best.plan is None else deadline

@@ -199,15 +199,6 @@ def polished_controls(
 
     It is free, at the goal at the same tick, and followed by the same stop, as it was. Where a
     pass begins depends on the plan's tick, so that step after step of a drive tries other moves.
-
-    Parameters
-    ----------
-    horizon : RoadArrays
-    plan : RoadDecision
-    passes : int
-        Each tries one pattern in one size.
-    rounds : int
-        How often at most, as long as moves are found.
     """
     controls, state = np.array(plan.controls), np.array(plan.states[0])
     for k in range(rounds):

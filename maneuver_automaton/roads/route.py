@@ -194,10 +194,7 @@ def _spaced(line: Array, limits: Array) -> tuple[Array, Array, Array]:
 
 
 def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, own: Array) -> Array:
-    """`Route.limit`: of lanelets that overlap the greatest holds.
-
-    Beside all lanelets it is that of the route's `own` one (n,).
-    """
+    """`Route.limit`: of lanelets that overlap the greatest holds."""
     import shapely
 
     offsets = ASIDE * np.arange(-COLUMNS, COLUMNS + 1)
@@ -223,10 +220,7 @@ def _limits_around(lanelets: Sequence[Lanelet], points: Array, heading: Array, o
 
 
 def _extent_of(goal: GoalRegion, points: Array, heading: Array, here: int) -> Array:
-    """Stations and offsets between which a goal lies; all of them if it is no place.
-
-    It is looked for from the point `here` on, where the vehicle starts.
-    """
+    """Stations and offsets between which a goal lies; all of them if it is no place."""
     if goal.places is None:
         return np.array([-np.inf, np.inf, -np.inf, np.inf])
     extent = _extent(outlines_of(goal.places), points[here:], heading[here:])

@@ -107,10 +107,7 @@ def _side_by_side(lanelets: dict[int, Lanelet], numbers: Sequence[int]) -> set[i
 
 
 def _across(stop_line: StopLine, lanelets: dict[int, Lanelet], ours: set[int]) -> Polygon:
-    """A thin strip before a line, across its lane and the lanes against it, but no other of `ours`.
-
-    It is not to be passed on the wrong side of the road either.
-    """
+    """A thin strip before a line, across its lane and those against it, no other of `ours`."""
     import shapely
 
     own = lanelets[stop_line.lanelet]
@@ -310,15 +307,6 @@ def nearest_miss(
     goals: Sequence[GoalRegion], vehicle: RoadVehicle, times: Array, states: Array
 ) -> str:
     """Where and how a motion came nearest to a goal, in words without a full stop.
-
-    Parameters
-    ----------
-    goals : sequence of GoalRegion
-    vehicle : RoadVehicle
-    times : (n,) array
-        [s], those at which goals are looked at.
-    states : (n, 5) array
-        x, y, heading of the rear axle, speed, steering at these times, seen as the goals are.
 
     Examples
     --------

@@ -193,18 +193,7 @@ def clearing_of(
     off_edge: float,
     off_traffic: float,
 ) -> Clearing:
-    """Land, traffic and body for the kernels.
-
-    Parameters
-    ----------
-    scene, vehicle
-    tick : float
-        [s]; tick 0 is the start of the scene.
-    last_tick : int
-        Until it the vehicle may drive.
-    off_edge, off_traffic : float
-        Distances kept from the edge of the road and from all other road users [m].
-    """
+    """Land, traffic and body for the kernels."""
     # Where the vehicle can be until the end, and nothing of a map beyond.
     far = vehicle.model.max_speed * tick * last_tick + vehicle.length
     # A world keeps one distance to all, so static obstacles are grown by what they need besides.

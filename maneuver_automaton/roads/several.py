@@ -157,10 +157,7 @@ def _in_order(
 
 
 def _seen_by_others(vehicle: RoadVehicle, times: Array, poses: Array, name: str) -> Obstacle:
-    """What a vehicle is going to do as a road user for others, a little larger than it is.
-
-    It is there between the first and the last of the times (n,) [s] of its poses (n, 3).
-    """
+    """What a vehicle is going to do as a road user for others, a little larger than it is."""
     size = [vehicle.length + 2.0 * ROOM, vehicle.width + 2.0 * ROOM]
     body = Box(size, [vehicle.ahead, 0.0])
     return Obstacle(body, motion=Motion(times, poses), name=name)
@@ -373,10 +370,7 @@ def _end_of(driver: Driver) -> float:
 
 
 def _held(name: str, driver: Driver, last: float) -> Obstacle | None:
-    """What a vehicle is going to do, as the others see it; None once it has reached its goal.
-
-    Where its plan does not lead to a goal it stands at the end of its stop.
-    """
+    """What a vehicle is going to do, as the others see it; None once it has reached its goal."""
     decision, planner = driver.tail, driver.planner
     if driver.reached or driver.hopeless or (decision is None and not driver.done):
         return None  # it is gone, does not set off, or has no plan and has not begun

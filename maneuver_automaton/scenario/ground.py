@@ -103,13 +103,7 @@ def _values(path: Path, *, shades: float) -> Array:
 def stated_places(
     costs: Sequence[PlaceCost], files: Sequence[GroundFile], folder: Path
 ) -> dict[str, Any]:
-    """Costs of places in the words of a scenario file in `folder`: keys beside those of the cost.
-
-    Raises
-    ------
-    ValueError
-        If a file cannot state one: a user's own, a second clearance, a raster without a file.
-    """
+    """Costs of places in the words of a scenario file in `folder`, beside the keys of the cost."""
     said: dict[str, Any] = {}
     ground: list[dict[str, Any]] = []
     for cost in costs:

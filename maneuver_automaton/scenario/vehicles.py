@@ -370,11 +370,6 @@ def is_known(model: Model) -> bool:
 def described(model: Model) -> dict[str, Any]:
     """What a scenario file says of a model; limits that it does not have are left out.
 
-    Raises
-    ------
-    ValueError
-        If scenario files do not know the model.
-
     Examples
     --------
     >>> from maneuver_automaton.models import Car

@@ -116,11 +116,7 @@ def _kept(
 
 
 def _to_any_heading(value: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The least of a table over the headings of its goal, from every pose seen from the goal.
-
-    To turn the goal is to turn the pose around it in the opposite direction. So the least depends
-    on the distance and on the heading against the direction to the goal alone.
-    """
+    """The least of a table over the headings of its goal, from every pose seen from the goal."""
     n, size, _ = value.shape
     half = size // 2
     turns = np.arange(n) * (2.0 * np.pi / n)

@@ -30,17 +30,7 @@ UNKNOWN = FreeCosts(np.zeros((0, 0, 0)), 0, 0, 0.0)
 
 
 class FreeTable:
-    """The least costs from the nodes of a lattice to some `sources` (R, 3): column, row, state.
-
-    Parameters
-    ----------
-    lattice : StateLattice
-        Its edges.
-    sources : (R, 3) array
-        Nodes whose cost is 0.
-    per_metre : float
-        Least cost of a displacement [1/m], above 0.
-    """
+    """The least costs from the nodes of a lattice to some `sources` (R, 3): column, row, state."""
 
     def __init__(self, lattice: StateLattice, sources: IntArray, per_metre: float) -> None:
         self._lattice = lattice

@@ -252,11 +252,7 @@ def _grid(query: LatticeQuery, sign: float, *, coarse: bool) -> DistanceGrid:
 
 
 def _enclosed(query: LatticeQuery, grids: Grids) -> str:
-    """Why no plan can exist: the plane around the goals, or the start, is closed.
-
-    By cells that are blocked as `distance_grid` says. Goals that the query left out had to be
-    blocked themselves; of those of any heading it knows that of some headings only.
-    """
+    """Why no plan can exist: the plane around the goals, or the start, is closed."""
     asked = set(query.goal_index)
     goals = enumerate(query.problem.goals)
     if any(goal.free_heading and k not in asked for k, goal in goals):

@@ -71,12 +71,7 @@ def _turn_to(relative: Array, goal: Goal) -> float:
 
 
 def _misses(directions: Array, goal: Array) -> bool:
-    """Whether the one curve that trims of parallel twists (n, 4) follow is proven to miss a goal.
-
-    The goal's turn, or its distance where the curve is straight, or its height where that changes,
-    says how far along the curve it would lie. A circle is closed; trims may follow other
-    curves in one direction only.
-    """
+    """Whether the one curve that trims of parallel twists (n, 4) follow surely misses a goal."""
     along = directions[0]
     turn_rate, climb = float(along[2]), float(along[3])
     if 0.0 < abs(turn_rate) < HARDLY_TURNING:

@@ -220,12 +220,7 @@ class _Climb:
 
 
 class _Prices:
-    """Estimates of what a word costs if a trim is put somewhere in it.
-
-    The multipliers p price a displacement of the word's end, seen from its start: where all times
-    are best, ``rate + <p, Ad(pose) xi>`` is zero for every trim that lasts. A change costs what its
-    parts cost, and p times the displacement of the end that it leads to.
-    """
+    """Estimates of what a word costs if a trim is put somewhere in it."""
 
     def __init__(self, setup: WordSetup, word: TimedWord) -> None:
         self.setup = setup

@@ -237,12 +237,7 @@ def _between(
     *,
     timed: bool,
 ) -> Array:
-    """Bound (n,) [m] of the deviation between each sample and the next.
-
-    A twist that changes linearly is off by an eighth of its change times the spacing; twice that is
-    taken of the greater change to either side. Without time only a change of the path itself
-    counts: the part of the change that is not along the twist, unless it turns back.
-    """
+    """Bound (n,) [m] of the deviation between each sample and the next."""
     lasting = np.zeros(len(poses))
     lasting[:-1] = np.diff(times)
     last = first + sizes - 1

@@ -193,10 +193,7 @@ def _followed(library: LatticeLibrary, cost: Cost) -> LatticeLibrary:
 def _states(
     library: LatticeLibrary, fine: LatticeLibrary, problem: Problem
 ) -> tuple[list[Frame], Array, float, dict[tuple[int, bytes], FreeTable]] | None:
-    """Graph (three states a heading where directions are priced) in its frames, switch price.
-
-    Before the price the least costs of edges, and after it where tables of costs are kept.
-    """
+    """Graph (three states a heading where directions are priced) in its frames, switch price."""
     arrays, automaton, cost = library.arrays, library.priced.automaton, terms_of(problem.cost)
     model = automaton.lattice
     assert model is not None
@@ -254,11 +251,7 @@ def _states(
 
 
 def _frames(lattice: StateLattice, directed: int) -> tuple[list[Frame], Array]:
-    """Frames a quarter turn apart in which the graph is the same, but for what its edges are.
-
-    And what each edge costs at least in one of them. Where the library has no such symmetry there
-    is one frame: each edge needs one of its step and its cost, turned.
-    """
+    """Frames a quarter turn apart in which the graph is the same, but for what its edges are."""
     frames = [(lattice, np.arange(len(lattice.heading)))]
     heading = lattice.heading[::directed]
     off = np.abs(wrapped(np.add.outer(heading + 0.5 * math.pi, -heading)))

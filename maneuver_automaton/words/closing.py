@@ -101,11 +101,7 @@ class EndConditions:
         return aim if self.product is None else goal_before(aim, self.product)
 
     def _follow_the_heading(self, end: Array, gap: Array, columns: Array) -> None:
-        """Let the aim turn with the end, so that no condition is left on the heading.
-
-        What the displacements carry along, d, turns with the heading e: the aim is at
-        ``-R(e) d``, and its derivative by the heading is subtracted from the columns.
-        """
+        """Let the aim turn with the end, so that no condition is left on the heading."""
         if self.product is not None:
             x, y = self.product[:2]
             c, s = math.cos(end[2]), math.sin(end[2])

@@ -125,10 +125,7 @@ def content_of(recording: Recording) -> dict[str, Any]:
 
 
 def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], list[Numbers]]:
-    """Name and colour of all trims, and for each vehicle their numbers.
-
-    Vehicles of two kinds may have trims of one name; each keeps the colours of its own kind.
-    """
+    """Name and colour of all trims, and for each vehicle their numbers."""
     entries: list[dict[str, str]] = []
     of_kind: dict[int, Numbers] = {}
     kinds = [_kind(one.mover) for one in cast.actors]

@@ -264,19 +264,7 @@ def clearance_entry(
     heights: Array | None = None,
     leave: bool = False,
 ) -> dict[str, Any] | None:
-    """Least distance at each of the `times` (n,) [s]; None if there is never an obstacle.
-
-    Parameters
-    ----------
-    times : (n,) array
-    bodies : sequence of (ring, poses)
-        Outlines (m, 2) and where each is at the times (n, 3); an outline of one corner is a point.
-    obstacles : sequence of obstacles
-    heights : (n, 2) array, optional
-        Altitudes of the lower and the upper side of the body [m].
-    leave : bool
-        A moving obstacle is there for the time of its motion only.
-    """
+    """Least distance at each of the `times` (n,) [s]; None if there is never an obstacle."""
     if not obstacles:
         return None
     import shapely
