@@ -205,9 +205,8 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         if found.status is not SolveStatus.SOLVED:
             continue
         raw = Inputs(control=found.control, interval=found.duration / len(found.control))
-        enough = CLOSED / 2.0
-        inputs = closed(model, start, end, inputs=raw, limits=model.control_limits, enough=enough)
-        course = inputs.drive(model, start)
+        limits, enough = model.control_limits, CLOSED / 2.0
+        _, course = closed(model, start, end, inputs=raw, limits=limits, enough=enough, substeps=1)
         missed = float(np.abs(course.reduced_state[-1] - end).max())
         if (
             not missed <= CLOSED
