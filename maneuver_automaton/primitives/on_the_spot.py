@@ -237,7 +237,8 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         if is_too_sharp(model, course.twists(model)).any():
             continue
         name = f"{source.name} to {target.name}"
-        return (Maneuver.along(course, name=name, source=source.name, target=target.name),)
+        made = Maneuver.along(course, name=name, source=source.name, target=target.name)
+        return (made,) if may_drive(model, made) else ()
     return ()
 
 

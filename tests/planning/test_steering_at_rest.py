@@ -35,6 +35,11 @@ cost: {{time: 1.0}}
 """
 
 
+def priced_turns(car: ma.SecondOrderCar, maneuver: ma.Maneuver) -> float:
+    """What steering at rest costs along a maneuver."""
+    return standing_price(car, maneuver.course.reduced_state, maneuver.course.control)
+
+
 def turned(plan: ma.Plan) -> float:
     """How far the wheels turn while the car stands [rad], counted by itself."""
     angle = 0.0
@@ -49,9 +54,9 @@ def test_who_never_does_has_no_such_maneuver() -> None:
     strokes, other = [-0.5, 0.5], replace(CAR, steering_at_rest=math.inf)
     free, never = (ma.Automaton.of_model(one, GRID, strokes=strokes) for one in (CAR, other))
     plain = replace(CAR, steering_at_rest=1.0)
-    assert any(standing_price(plain, one.course.reduced_state) for one in free.maneuvers)
+    assert any(priced_turns(plain, one) for one in free.maneuvers)
     assert never.maneuvers
-    assert not any(standing_price(plain, one.course.reduced_state) for one in never.maneuvers)
+    assert not any(priced_turns(plain, one) for one in never.maneuvers)
 
 
 @pytest.mark.parametrize("polish", [False, True])
