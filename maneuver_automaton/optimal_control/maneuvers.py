@@ -311,7 +311,7 @@ def solve_transfer(
     for solver in program.solvers:
         function = solver()
         inner = RELAXED if function.class_name() == "FatropInterface" else 0.0
-        low, high = _inside(*bounds, inner)
+        low, high = _inside(bounds[0], bounds[1], inner)
         answer = function(
             x0=np.clip(guess, low, high),
             p=np.concatenate([start, end, controls.ravel()]),
