@@ -616,7 +616,7 @@ class Problem:
                 for states in (course.reduced_state[:-1], course.reduced_state[1:])
             ]
             rate = float(np.diff(course.time) @ (ends[0] + ends[1])) / 2.0
-            standing = standing_price(model, course.reduced_state)
+            standing = standing_price(model, course.reduced_state, course.control)
             entry = maneuver, maneuver.cost_multiplier * rate + standing
             if len(known) < MOST_KNOWN or maneuver.name in known:
                 known[maneuver.name] = entry

@@ -12,6 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.models.vehicle import (
     Components,
     Vehicle,
+    check_at_rest,
     check_parameters,
     rows_of_limits,
     speed_limits,
@@ -144,6 +145,9 @@ class ArticulatedVehicle(Vehicle):
         Greatest speed of the front axle [m/s].
     min_speed : float, optional
         Least speed, negative in reverse [m/s]; ``-max_speed`` if None.
+    steering_at_rest : float
+        Price of every radian that it bends while the front axle stands, beside what a plan costs
+        otherwise [1/rad]; inf: it never does.
 
     Examples
     --------
@@ -161,18 +165,24 @@ class ArticulatedVehicle(Vehicle):
     max_articulation_rate: float  # [rad/s]
     max_speed: float  # [m/s]
     min_speed: float | None = None  # [m/s]
+    steering_at_rest: float = 0.0  # [1/rad]
     name: ClassVar[str] = "articulated_vehicle"
     control_names: ClassVar[tuple[str, ...]] = ("speed", "articulation_rate")
     reduced_names: ClassVar[tuple[str, ...]] = ("articulation",)
     part_names: ClassVar[tuple[str, ...]] = ("rear_part",)
 
     def __post_init__(self) -> None:
-        check_parameters(self)
+        check_parameters(self, but=("steering_at_rest",))
+        check_at_rest(self)
         if not self.max_articulation < math.pi / 2:
             raise ValueError(
                 f"{self.name}: max_articulation must be less than pi / 2, "
                 f"got {self.max_articulation} rad"
             )
+
+    def steered(self, states: Array, controls: Array) -> tuple[Array, Array]:
+        """Speeds between samples (n - 1,), which the control holds, and angles at them (n,)."""
+        return np.abs(controls[:-1, 0]), states[:, 0]
 
     @property
     def turning_radius(self) -> float:

@@ -12,13 +12,11 @@ from maneuver_automaton._arrays import Array, as_array, plain_numbers
 from maneuver_automaton.models.vehicle import (
     Components,
     Vehicle,
+    check_at_rest,
     check_parameters,
     rows_of_limits,
     speed_limits,
 )
-
-STANDING = 1e-3  # [m/s] slower is to stand
-TURNED = 1e-9  # [rad] between two samples, that is no rounding
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,26 +199,12 @@ class SecondOrderCar(Vehicle):
 
     def __post_init__(self) -> None:
         check_parameters(self, but=("steering_at_rest",))
-        if not self.steering_at_rest >= 0.0:
-            raise ValueError(
-                f"{self.name}: steering_at_rest must be at least 0, or inf, got "
-                f"{self.steering_at_rest} 1/rad"
-            )
+        check_at_rest(self)
 
-    def standing_price(self, states: Array) -> float:
-        """Price of how far the wheels turn while it stands, along samples (n, 2) of its state.
-
-        Examples
-        --------
-        >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
-        ...                      max_acceleration=1.0, max_steering_rate=0.5, steering_at_rest=3.0)
-        >>> car.standing_price(np.array([[0.0, 0.0], [0.0, 0.5], [1.0, 0.7]]))
-        1.5
-        """
-        stands = np.abs(states[:, 0]) <= STANDING
-        turned = np.abs(np.diff(states[:, 1]))[stands[:-1] & stands[1:]]
-        angle = float(turned[turned > TURNED].sum())
-        return self.steering_at_rest * angle if angle else 0.0
+    def steered(self, states: Array, controls: Array) -> tuple[Array, Array]:
+        """Speeds between samples (n - 1,), the greater of both ends, and angles at them (n,)."""
+        speeds = np.abs(states[:, 0])
+        return np.maximum(speeds[:-1], speeds[1:]), states[:, 1]
 
     @property
     def turning_radius(self) -> float:

@@ -11,24 +11,31 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.models.model import Model, OnlyTranslated
 
+STANDING = 1e-3  # [m/s] slower is to stand
+TURNED = 1e-9  # [rad] between two samples, that is no rounding
 EXCEEDED = 1e-9  # relative, by which a limit may be exceeded
 
 
-def standing_price(model: Model, states: Array) -> float:
-    """Price of steering while it stands, along samples (n, n_z) of the reduced state; or inf.
+def standing_price(model: Model, states: Array, controls: Array) -> float:
+    """Price of steering while it stands, along samples of state (n, n_z) and control; or inf.
 
-    Zero for a vehicle that steers at rest at will, or has no wheels to turn.
+    Zero for a vehicle that steers at rest at will, whose wheels turn at once, or that has none.
 
     Examples
     --------
     >>> from maneuver_automaton.models import SecondOrderCar
     >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5, steering_at_rest=np.inf)
-    >>> standing_price(car, np.array([[0.0, 0.0], [0.0, 0.5]]))
-    inf
+    ...                      max_steering_rate=0.5, steering_at_rest=3.0)
+    >>> standing_price(car, np.array([[0.0, 0.0], [0.0, 0.5], [1.0, 0.7]]), np.zeros((3, 2)))
+    1.5
     """
-    price = getattr(model, "standing_price", None)
-    return 0.0 if price is None else float(price(states))
+    price = getattr(model, "steering_at_rest", 0.0)
+    if not price:
+        return 0.0
+    speeds, angles = model.steered(states, controls)  # type: ignore[attr-defined]  # has a price
+    turned = np.abs(np.diff(angles))[speeds <= STANDING]
+    angle = float(turned[turned > TURNED].sum())
+    return float(price * angle) if angle else 0.0
 
 
 def steers_at_rest(model: Model) -> bool:

@@ -94,6 +94,15 @@ def no_parts(reduced_state: ArrayLike) -> Array:
     return np.zeros((*np.shape(reduced_state)[:-1], 0, 3))
 
 
+def check_at_rest(vehicle: Any) -> None:
+    """Refuse a price of steering at rest that is none; raises ValueError."""
+    if not vehicle.steering_at_rest >= 0.0:
+        raise ValueError(
+            f"{vehicle.name}: steering_at_rest must be at least 0, or inf, got "
+            f"{vehicle.steering_at_rest} 1/rad"
+        )
+
+
 def check_parameters(vehicle: Any, *, but: Sequence[str] = ()) -> None:
     """Make the parameters plain numbers, all positive but least speeds and those in `but`.
 

@@ -6,10 +6,12 @@ states of the vehicle alone, and what the ends are is a matter of bounds and par
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +23,7 @@ from maneuver_automaton.optimal_control.ipopt import (
     STATUS,
     SolverSettings,
     SolveStatus,
+    fatrop_options,
     ipopt_options,
     load_casadi,
     numpy_on_symbols,
@@ -31,14 +34,10 @@ from maneuver_automaton.optimal_control.problem import (
     control_scale,
     resampled,
 )
-from maneuver_automaton.optimal_control.transcription import (
-    Transcription,
-    bounds_of,
-    transcribe,
-    unpacked,
-)
+from maneuver_automaton.optimal_control.transcription import transcribe
 
 WITHIN_GRIP = 1e-3  # share of the squared lateral acceleration that is kept between nodes
+RELAXED = 1e-8  # by which fatrop relaxes bounds, as IPOPT does by default
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
 
 
@@ -103,16 +102,24 @@ class TransferSettings:
 class TransferProgram:
     """The nonlinear program of one model and objective; ends and limits are put in when solving.
 
-    Variables are the reduced states, then the controls, both instant by instant, then the
-    duration; the parameters are the controls before and after.
+    Each interval is a stage, whose state is the reduced state, the duration and the input before;
+    its other variables are the reduced states inside it, then its input. So no row knows more than
+    one stage and the state of the next, as fatrop wants it; IPOPT takes the same program where
+    fatrop does not come to an end.
     """
 
     model: Model
     objective: ManeuverObjective
     settings: TransferSettings
-    written: Transcription
-    solver: Any
+    equality: tuple[bool, ...]  # of each row
+    solvers: tuple[Callable[[], Any], ...]  # in turn; each is built when it is first asked for
     build_s: float
+
+    @property
+    def width(self) -> int:
+        """Number of variables of a stage."""
+        n_z, n_u = len(self.model.reduced_names), len(self.model.control_names)
+        return self.settings.steps * n_z + 1 + 2 * n_u
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -162,6 +169,7 @@ def transfer_program(
     n_z, scale = len(model.reduced_names), control_scale(model)
     if not n_z:
         raise ValueError(f"{model.name}: has no reduced state, so its trims need no maneuvers")
+    n_u, n_stages, steps = len(model.control_names), settings.intervals, settings.steps
     problem = OptimalControlProblem(
         state_names=model.reduced_names,
         control_names=model.control_names,
@@ -172,43 +180,64 @@ def transfer_program(
         stage_cost=lambda z, u: (
             objective.effort * sum((u_i / s) ** 2 for u_i, s in zip(u, scale, strict=True))
         ),
-        state_limits=model.reduced_limits,
-        control_limits=model.control_limits,
     )
-    nodes = settings.intervals * settings.steps + 1
-    written = transcribe(problem, Grid(n_nodes=nodes, rule="rk4", held=settings.steps))
-    ends = casadi.SX.sym("p", problem.n_controls, 2)
-    around = casadi.horzcat(ends[:, 0], written.control, ends[:, 1])
-    sizes = casadi.repmat(casadi.DM(scale), 1, settings.intervals + 1)
-    changes = (around[:, 1:] - around[:, :-1]) / sizes
-    cost = (
-        objective.time * written.duration
-        + written.objective
-        + objective.smoothness * casadi.sumsqr(changes)
-    )
+    one = transcribe(problem, Grid(n_nodes=steps + 1, rule="rk4", held=steps))
     beyond = casadi.SX(0, 1)
     if math.isfinite(lateral_limit(model)):
         with numpy_on_symbols(casadi):  # with the control before and after each node
             twists = [
-                model.velocity(casadi.vertsplit(z), casadi.vertsplit(written.inputs))[:3]
-                for z in (written.state[:, :-1], written.state[:, 1:])
+                model.velocity(casadi.vertsplit(z), casadi.vertsplit(one.inputs))[:3]
+                for z in (one.state[:, :-1], one.state[:, 1:])
             ]
         most = lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)
         rows = [(v_x * v_x + v_y * v_y) * turn * turn / most - 1.0 for v_x, v_y, turn in twists]
         beyond = casadi.vertcat(*map(casadi.vec, rows))
-    functions = {
-        "x": written.variables,
-        "f": cost,
-        "g": casadi.vertcat(written.constraints, beyond),
-        "p": casadi.vec(ends),
-    }
-    solver = casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
+    interval = casadi.Function("interval", [one.state, one.control, one.duration],
+                               [one.objective, one.constraints, beyond])  # fmt: skip
+    before, state, own = n_z + 1 + n_u, casadi.SX.sym, (steps - 1) * n_z
+    begins = [state("x", before) for _ in range(n_stages + 1)]
+    others = [state("u", own + n_u) for _ in range(n_stages)]
+    ends = casadi.SX.sym("p", 2 * (n_z + n_u))
+    start, end, first, last = casadi.vertsplit(ends, [0, n_z, 2 * n_z, 2 * n_z + n_u, ends.numel()])
+    cost = objective.time * begins[-1][n_z]
+    g: list[Any] = []
+    equality: list[bool] = []
+    for k, (x, u, following) in enumerate(zip(begins, others, begins[1:], strict=False)):
+        nodes = casadi.horzcat(x[:n_z], casadi.reshape(u[:own], n_z, steps - 1), following[:n_z])
+        added, defects, beyond = interval(nodes, u[own:], x[n_z] / n_stages)
+        changes = (u[own:] - x[n_z + 1 :]) / casadi.DM(scale)
+        cost += added + objective.smoothness * casadi.sumsqr(changes)
+        g += [-defects[own:], following[n_z:] - casadi.vertcat(x[n_z], u[own:]), defects[:own]]
+        if k == 0:
+            g.append(casadi.vertcat(x[:n_z] - start, x[n_z + 1 :] - first))
+        equality += [True] * (sum(row.numel() for row in g) - len(equality))
+        g.append(beyond)
+        equality += [False] * beyond.numel()
+    g.append(begins[-1][:n_z] - end)
+    equality += [True] * n_z
+    cost += objective.smoothness * casadi.sumsqr((last - begins[-1][n_z + 1 :]) / casadi.DM(scale))
+    stages = zip(begins, others, strict=False)
+    x = casadi.vertcat(*(part for stage in stages for part in stage), begins[-1])
+    functions = {"x": x, "f": cost, "g": casadi.vertcat(*g), "p": ends}
+
+    @functools.cache
+    def quick() -> Any:
+        options = fatrop_options(settings.solver, equality)
+        return casadi.nlpsol("transfer", "fatrop", functions, options)
+
+    @functools.cache
+    def sure() -> Any:
+        return casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
+
+    is_quick = settings.solver.max_seconds is None and casadi.has_nlpsol("fatrop")
+    solvers = (quick, sure) if is_quick else (sure,)
+    solvers[0]()
     return TransferProgram(
         model=model,
         objective=objective,
         settings=settings,
-        written=written,
-        solver=solver,
+        equality=tuple(equality),
+        solvers=solvers,
         build_s=time.perf_counter() - began,
     )
 
@@ -245,53 +274,81 @@ def solve_transfer(
         then to the other, and the states are where that leads. Where nothing moves on the straight
         line, the solver does not leave it.
     """
-    model, written = program.model, program.written
+    model, settings = program.model, program.settings
+    n_z, n_u, count = start.size, controls.shape[1], settings.intervals
     limits = model.control_limits if control_limits is None else control_limits
     controls_within = drawn_in(limits, tightening)
     within = drawn_in(model.reduced_limits, tightening)
     within[:, 0] = np.minimum(within[:, 0], np.minimum(start, end))
     within[:, 1] = np.maximum(within[:, 1], np.maximum(start, end))
-    problem = replace(
-        written.problem,
-        start=tuple(start.tolist()),
-        end=tuple(end.tolist()),
-        state_limits=within,
-        control_limits=controls_within,
-    )
-    bounds = bounds_of(problem, written.grid)
     guess_s = duration_guess(model, start, end) if duration is None else duration
-    inputs = resampled(controls, written.grid.n_controls)
-    path = resampled(np.array([start, end]), written.grid.n_nodes)
+    inputs = resampled(controls, count)
+    path = resampled(np.array([start, end]), count * settings.steps + 1)
     if swing:
         room = np.where(np.isfinite(controls_within), controls_within, np.array([-1.0, 1.0]))
         low, high = room.T[:, None] - inputs
         first = np.arange(len(inputs))[:, None] < len(inputs) / 2.0
         inputs = inputs + abs(swing) * np.where(first == (swing > 0.0), high, low)
         path = _led_to(model, path, inputs, guess_s)
-    guess = np.concatenate([path.ravel(), inputs.ravel(), [guess_s]])
+
+    def packed(states: Array, seconds: Any, before: Array, inputs: Array) -> Array:
+        """Values of all variables: states (nodes, n_z), inputs before and in each interval."""
+        nodes = states[:-1].reshape(count, -1)
+        stages = np.hstack(
+            [nodes[:, :n_z], np.full((count, 1), seconds), before[:-1], nodes[:, n_z:], inputs]
+        )
+        return np.concatenate([stages.ravel(), states[-1], [seconds], before[-1]])
+
+    guess = packed(path, guess_s, np.vstack([controls[:1], inputs]), inputs)
+    free = np.full((count + 1, n_u), np.inf)
+    bounds = []
+    for side, sign in ((0, -1.0), (1, 1.0)):
+        states = np.tile(within[:, side], (len(path), 1))
+        states[[0, -1]] = sign * np.inf  # rows of their own hold them
+        held = np.tile(controls_within[:, side], (count, 1))
+        bounds.append(packed(states, settings.duration[side], sign * free, held))
     began = time.perf_counter()
-    answer = program.solver(
-        x0=np.clip(guess, *bounds.T),
-        p=controls.ravel(),
-        lbx=bounds[:, 0],
-        ubx=bounds[:, 1],
-        lbg=np.where(np.arange(program.solver.size1_out("g")) < len(written.limits), 0.0, -np.inf),
-        ubg=0.0,
-    )
+    for solver in program.solvers:
+        function = solver()
+        inner = RELAXED if function.class_name() == "FatropInterface" else 0.0
+        low, high = _inside(bounds[0], bounds[1], inner)
+        answer = function(
+            x0=np.clip(guess, low, high),
+            p=np.concatenate([start, end, controls.ravel()]),
+            lbx=low,
+            ubx=high,
+            lbg=np.where(program.equality, 0.0, -np.inf),
+            ubg=np.where(program.equality, 0.0, -inner),
+        )
+        stats = function.stats()
+        if stats["success"]:
+            break
     solve_s = time.perf_counter() - began
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
-    stats = program.solver.stats()
-    state, control, seconds = unpacked(problem, written.grid, values)
+    stages = values[: count * program.width].reshape(count, -1)
+    begins = stages[:, : n_z + 1 + n_u]
+    nodes = np.hstack([begins[:, :n_z], stages[:, n_z + 1 + n_u : -n_u]]).reshape(-1, n_z)
+    reason = str(stats["return_status"]) if solver is program.solvers[-1] else "Solve_Succeeded"
     return Transfer(
-        status=STATUS.get(str(stats["return_status"]), SolveStatus.FAILED),
-        reason=str(stats["return_status"]),
-        duration=seconds,
-        control=control,
-        reduced_state=state,
+        status=STATUS.get(reason, SolveStatus.FAILED),
+        reason=reason,
+        duration=float(begins[0, n_z]),
+        control=stages[:, -n_u:],
+        reduced_state=np.vstack([nodes, values[count * program.width :][:n_z]]),
         cost=float(answer["f"]),
         iterations=int(stats["iter_count"]),
         solve_s=solve_s,
     )
+
+
+def _inside(low: Array, high: Array, by: float) -> tuple[Array, Array]:
+    """Bounds drawn in by what a solver gives away: `by`, relative where they are above 1."""
+    room = high - low > 1e3 * by
+    size_low, size_high = (
+        np.where(room & np.isfinite(side), np.maximum(1.0, np.abs(side)), 0.0)
+        for side in (low, high)
+    )
+    return low + by * size_low, high - by * size_high
 
 
 def drawn_in(limits: Array, share: float) -> Array:

@@ -26,6 +26,7 @@ from maneuver_automaton.planning.polishing import Polish, why_not_polished
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus, Workspace
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.on_the_spot import (
+    all_maneuvers_between,
     maneuvers_between,
     prepare_maneuvers,
     seconds_between,
@@ -285,10 +286,12 @@ def _legs(problem: Problem, state: Trim, *, ends: bool) -> Iterator[Leg]:
     seconds = seconds_between(automaton.model, state.reduced_state, states)
     order = np.argsort(seconds, kind="stable").tolist()
     rest = [k for k in order if every[k].is_rest][:1]
-    for k in dict.fromkeys([*order[:NEAREST], *rest]):
-        pair = (every[k], state) if ends else (state, every[k])
-        for maneuver in maneuvers_between(automaton.model, *pair):
-            yield Leg(maneuver, state, every[k])
+    near = [every[k] for k in dict.fromkeys([*order[:NEAREST], *rest])]
+    pairs = [(trim, state) if ends else (state, trim) for trim in near]
+    made = all_maneuvers_between(automaton.model, pairs)
+    for trim, maneuvers in zip(near, made, strict=True):
+        for maneuver in maneuvers:
+            yield Leg(maneuver, state, trim)
 
 
 @kept_by_first

@@ -491,4 +491,6 @@ def quickest_maneuvers(
 def may_drive(model: Model, maneuver: Maneuver) -> bool:
     """Whether a maneuver with a course turns no wheel at rest, or the vehicle may do so."""
     course = maneuver.course
-    return course is None or math.isfinite(standing_price(model, course.reduced_state))
+    return course is None or math.isfinite(
+        standing_price(model, course.reduced_state, course.control)
+    )

@@ -222,11 +222,9 @@ def _checked(
     raw = Inputs(control=transfer.control, interval=transfer.duration / count)
     # Of few digits but in the last third, so that files are half as long.
     short = Inputs(control=raw.control.round(DIGITS), interval=round(raw.interval, DIGITS))
-    inputs = closed(model, start, end, inputs=short, limits=limits, last=max(1, count // 3))
-    course = inputs.drive(model, start)
+    inputs, course = closed(model, start, end, inputs=short, limits=limits, last=max(1, count // 3))
     if not np.abs(course.reduced_state[-1] - end).max() <= CLOSED / 100.0:
-        inputs = closed(model, start, end, inputs=raw, limits=limits)
-        course = inputs.drive(model, start)
+        inputs, course = closed(model, start, end, inputs=raw, limits=limits)
     miss = float(np.abs(course.reduced_state[-1] - target.reduced_state).max())
     if not miss <= CLOSED:
         return replace(nothing, reason=f"it could not be closed: {miss:.2g} is left")
@@ -259,7 +257,8 @@ def closed(
     limits: Array,
     last: int | None = None,
     enough: float = 0.0,
-) -> Inputs:
+    substeps: int = RUNGE_KUTTA_STEPS,
+) -> tuple[Inputs, Trajectory]:
     """Correct inputs that nearly lead from one reduced state to another, until they do.
 
     Newton's method on all inputs and a common factor of the time; of all corrections the least,
@@ -279,26 +278,29 @@ def closed(
         Correct the inputs of that many last intervals alone, and no times.
     enough : float
         An end that misses by no more is met.
+    substeps : int
+        Of Runge-Kutta in an interval, for derivatives: one is enough where intervals are short.
 
     Returns
     -------
-    Inputs
-        The best that were found, whether they meet the end or not.
+    Inputs, Trajectory
+        The best that were found, whether they meet the end or not, and where they lead.
     """
     control, interval = np.clip(inputs.control, *limits.T), inputs.interval
     width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 2.0)
     scale = np.maximum(1.0, np.abs(end))
-    best, least = inputs, np.inf
+    best, least = None, np.inf
     for _ in range(NEWTON_STEPS):
         tried = Inputs(control=control, interval=interval)
-        miss = tried.drive(model, start).reduced_state[-1] - end
+        course = tried.drive(model, start)
+        miss = course.reduced_state[-1] - end
         size = float(np.abs(miss / scale).max())
-        if not size < 0.5 * least:
+        if best is not None and not size < 0.5 * least:
             break  # rounding
-        best, least = tried, size
+        best, least = (tried, course), size
         if size <= enough:
             break
-        gradient, by_duration = _sensitivities(model, start, tried)
+        gradient, by_duration = _sensitivities(model, start, tried, substeps)
         room = np.minimum(control - limits[:, 0], limits[:, 1] - control)
         weight = np.where(np.isfinite(room), room, width) + 1e-9 * width
         if last is not None:
@@ -310,10 +312,13 @@ def closed(
         step = -np.linalg.lstsq(columns, miss, rcond=None)[0]
         control = np.clip(control + weight * step[:-1].reshape(control.shape), *limits.T)
         interval *= 1.0 + max(-0.5, float(step[-1]))
+    assert best is not None  # the first is
     return best
 
 
-def _sensitivities(model: Model, start: Array, inputs: Inputs) -> tuple[Array, Array]:
+def _sensitivities(
+    model: Model, start: Array, inputs: Inputs, substeps: int
+) -> tuple[Array, Array]:
     """Derivatives of the last reduced state by inputs (n_z, n, n_u) and a time factor (n_z,)."""
     control = inputs.control
     n, n_u = control.shape
@@ -322,19 +327,21 @@ def _sensitivities(model: Model, start: Array, inputs: Inputs) -> tuple[Array, A
     controls = np.concatenate([control + shifts, control - shifts, control[None], control[None]])
     factors = np.ones(len(controls))
     factors[-2:] = 1.0 + PERTURBATION, 1.0 - PERTURBATION
-    ends = _last_states(model, start, controls, factors * inputs.interval)
+    ends = _last_states(model, start, controls, factors * inputs.interval, substeps)
     plus, minus = ends[: n * n_u], ends[n * n_u : -2]
     gradient = (plus - minus) / (2.0 * by.reshape(-1, 1))
     by_factor = (ends[-2] - ends[-1]) / (2.0 * PERTURBATION)
     return gradient.T.reshape(start.size, n, n_u), by_factor
 
 
-def _last_states(model: Model, start: Array, controls: Array, intervals: Array) -> Array:
+def _last_states(
+    model: Model, start: Array, controls: Array, intervals: Array, substeps: int
+) -> Array:
     """Reduced states (m, n_z) after inputs (m, n, n_u) in intervals (m,) [s], by Runge-Kutta."""
     state = np.broadcast_to(start, (len(controls), start.size))
-    step = (intervals / RUNGE_KUTTA_STEPS)[:, None]
+    step = (intervals / substeps)[:, None]
     for k in range(controls.shape[1]):
-        for _ in range(RUNGE_KUTTA_STEPS):
+        for _ in range(substeps):
             rate_1 = model.reduced_dynamics(state, controls[:, k])
             rate_2 = model.reduced_dynamics(state + step / 2.0 * rate_1, controls[:, k])
             rate_3 = model.reduced_dynamics(state + step / 2.0 * rate_2, controls[:, k])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -142,19 +142,40 @@ def maneuvers_between(model: Model, source: Trim, target: Trim) -> tuple[Maneuve
     >>> [(one.name, round(one.duration, 9)) for one in maneuvers_between(robot, source, target)]
     [('here to there', 1.0)]
     """
+    return next(all_maneuvers_between(model, [(source, target)]))
+
+
+def all_maneuvers_between(
+    model: Model, pairs: Sequence[tuple[Trim, Trim]]
+) -> Iterator[tuple[Maneuver, ...]]:
+    """The maneuvers of each pair, see `maneuvers_between`; in closed form all are made at once."""
     if isinstance(model, CarWithTrailer):
         low, high = model.control_limits[0].tolist()
         speeds = [speed for speed in (high, low) if speed]
-        return hitch_maneuvers(model, [(source, target, speed) for speed in speeds])
-    if _limited(model):
-        try:
-            early = quickest_between(model, [(source, target)])
-            late = quickest_between(model, [(source, target)], late=True)
-            both = (*early, *differing(early, late))
-            return tuple(one for one in both if may_drive(model, one))
-        except ValueError:  # a component cannot change that way at all
-            return ()
-    return _by_optimal_control(model, source, target)
+        for source, target in pairs:
+            yield hitch_maneuvers(model, [(source, target, speed) for speed in speeds])
+    elif _limited(model):
+        yield from _in_closed_form(model, pairs)
+    else:
+        for source, target in pairs:
+            yield _by_optimal_control(model, source, target)
+
+
+def _in_closed_form(
+    model: Model, pairs: Sequence[tuple[Trim, Trim]]
+) -> Iterator[tuple[Maneuver, ...]]:
+    try:
+        early, late = (quickest_between(model, pairs, late=late) for late in (False, True))
+    except ValueError:  # a component cannot change that way at all
+        if len(pairs) == 1:
+            yield ()
+            return
+        for pair in pairs:
+            yield from _in_closed_form(model, [pair])
+        return
+    for one, other in zip(early, late, strict=True):
+        both = (one, *differing([one], [other]))
+        yield tuple(one for one in both if may_drive(model, one))
 
 
 class _Known:
@@ -205,9 +226,8 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         if found.status is not SolveStatus.SOLVED:
             continue
         raw = Inputs(control=found.control, interval=found.duration / len(found.control))
-        enough = CLOSED / 2.0
-        inputs = closed(model, start, end, inputs=raw, limits=model.control_limits, enough=enough)
-        course = inputs.drive(model, start)
+        limits, enough = model.control_limits, CLOSED / 2.0
+        _, course = closed(model, start, end, inputs=raw, limits=limits, enough=enough, substeps=1)
         missed = float(np.abs(course.reduced_state[-1] - end).max())
         if (
             not missed <= CLOSED
@@ -217,7 +237,8 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         if is_too_sharp(model, course.twists(model)).any():
             continue
         name = f"{source.name} to {target.name}"
-        return (Maneuver.along(course, name=name, source=source.name, target=target.name),)
+        made = Maneuver.along(course, name=name, source=source.name, target=target.name)
+        return (made,) if may_drive(model, made) else ()
     return ()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -263,9 +264,16 @@ def _maneuver(source: Trim, target: Trim, speed: float, course: Trajectory) -> M
     )
 
 
+@functools.cache
+def _gauss() -> tuple[Array, Array]:
+    """Nodes and weights of the quadrature, which take longer than all else."""
+    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    return nodes, weights
+
+
 def _time(model: CarWithTrailer, control: Array, begin: float, end: float) -> float:
     """How long the hitch takes at a constant control [s]; inf if it stops on the way."""
-    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    nodes, weights = _gauss()
     edges = np.linspace(begin, end, PARTS + 1)
     half = 0.5 * np.diff(edges)
     hitch = (edges[:-1] + half)[:, None] + half[:, None] * nodes

@@ -11,6 +11,8 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models.speeds import standing_price
+from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives.on_the_spot import maneuvers_between, trim_at
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from maneuver_automaton.scenario.writing import to_yaml
 
@@ -35,6 +37,11 @@ cost: {{time: 1.0}}
 """
 
 
+def priced_turns(car: ma.SecondOrderCar, maneuver: ma.Maneuver) -> float:
+    """What steering at rest costs along a maneuver."""
+    return standing_price(car, maneuver.course.reduced_state, maneuver.course.control)
+
+
 def turned(plan: ma.Plan) -> float:
     """How far the wheels turn while the car stands [rad], counted by itself."""
     angle = 0.0
@@ -49,9 +56,9 @@ def test_who_never_does_has_no_such_maneuver() -> None:
     strokes, other = [-0.5, 0.5], replace(CAR, steering_at_rest=math.inf)
     free, never = (ma.Automaton.of_model(one, GRID, strokes=strokes) for one in (CAR, other))
     plain = replace(CAR, steering_at_rest=1.0)
-    assert any(standing_price(plain, one.course.reduced_state) for one in free.maneuvers)
+    assert any(priced_turns(plain, one) for one in free.maneuvers)
     assert never.maneuvers
-    assert not any(standing_price(plain, one.course.reduced_state) for one in never.maneuvers)
+    assert not any(priced_turns(plain, one) for one in never.maneuvers)
 
 
 @pytest.mark.parametrize("polish", [False, True])
@@ -75,6 +82,67 @@ def test_a_price_counts_what_is_turned() -> None:
     )
     same = next(one for one in problem.automaton.maneuvers if one.name == turn.name)
     assert priced.maneuver_cost(turn) == pytest.approx(problem.maneuver_cost(same) + 2.0 * 0.7)
+
+
+def angles_at_cusps(plan: ma.Plan) -> list[float]:
+    """Where the wheels are when the car begins to go the other way [rad], counted by itself."""
+    states = np.vstack([one.course.reduced_state for one in filter(None, plan.maneuvers)])
+    moving = states[np.abs(states[:, 0]) > 1e-3]
+    turns = np.flatnonzero(np.diff(np.sign(moving[:, 0])))
+    return [float(angle) for angle in moving[turns, 1]]
+
+
+@pytest.mark.slow
+def test_it_changes_how_a_car_parks() -> None:
+    levels = {"speed": [-1.0, 0.0, 1.0], "steering": [-0.7, -0.35, 0.0, 0.35, 0.7]}
+    strokes = [-2.0, -1.0, -0.5, 0.5, 1.0, 2.0]
+    street = [
+        *(ma.Box([4.2, 1.8], [x, 3.2]) for x in (-6.0, 7.4)),
+        *(ma.Box([30.0, 0.3], [0.0, y]) for y in (-3.2, 4.7)),
+    ]
+    found = {}
+    for price in (0.0, 2.0, math.inf):
+        library = ma.Automaton.of_model(
+            replace(CAR, steering_at_rest=price), levels, strokes=strokes
+        )
+        problem = ma.Problem(
+            library,
+            [0, 0, 0],
+            [0.0, 3.2, 0.0],
+            footprint=ma.Box([4.2, 1.8], [1.4, 0.0]),
+            obstacles=street,
+            search=ma.SearchSettings(polish=False, max_expansions=20_000),
+        )
+        found[price] = ma.plan(problem, time_limit=60.0)
+        assert found[price].audit.passed
+    free, priced, never = (found[price] for price in (0.0, 2.0, math.inf))
+    assert free.cost < priced.cost <= never.cost + 1e-9
+    assert turned(free.plan) > 0.3
+    assert turned(priced.plan) <= turned(free.plan)
+    assert turned(never.plan) < 1e-6
+    assert max(map(abs, angles_at_cusps(free.plan))) < 0.1  # straight, and turned while it stands
+    assert max(map(abs, angles_at_cusps(never.plan))) > 0.3  # turned on the way there
+
+
+def test_a_loader_bends_at_rest_at_a_price() -> None:
+    loader = ma.ArticulatedVehicle(
+        front=1.675, rear=1.675, max_articulation=0.7, max_articulation_rate=0.35, max_speed=2.0
+    )
+    bends = drive(loader, [0.0], control=[[0.0, 0.35], [1.0, 0.35]], durations=[1.0, 0.5])
+    prices = [
+        standing_price(replace(loader, steering_at_rest=price), bends.reduced_state, bends.control)
+        for price in (0.0, 2.0, math.inf)
+    ]
+    assert prices == pytest.approx([0.0, 2.0 * 0.35, math.inf])
+    with pytest.raises(ValueError, match="steering_at_rest must be at least 0, or inf"):
+        replace(loader, steering_at_rest=-1.0)
+    never = replace(loader, steering_at_rest=math.inf)
+    stock = ma.load_stock_library("articulated_vehicle")
+    still = trim_at(never, np.array([0.1]), "here"), trim_at(never, np.array([0.3]), "there")
+    for one in maneuvers_between(never, *still):
+        assert standing_price(never, one.course.reduced_state, one.course.control) == 0.0
+    for one in stock.maneuvers:  # they bend while they go, so nobody is refused any
+        assert standing_price(never, one.course.reduced_state, one.course.control) == 0.0
 
 
 def test_files_state_it(tmp_path) -> None:

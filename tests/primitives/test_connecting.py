@@ -62,7 +62,7 @@ def test_closing_moves_little_and_hits():
     inputs = Inputs(control=control, interval=0.1)
     end = inputs.drive(CRAFT, np.zeros(3)).reduced_state[-1] + [1e-4, -1e-4, 1e-4]
     limits = CRAFT.control_limits
-    exact = closed(CRAFT, np.zeros(3), end, inputs=inputs, limits=limits)
+    exact, _ = closed(CRAFT, np.zeros(3), end, inputs=inputs, limits=limits)
     assert np.abs(exact.drive(CRAFT, np.zeros(3)).reduced_state[-1] - end).max() < 1e-13
     assert np.abs(exact.control - control).max() < 0.01
     assert np.abs(exact.control[3] - control[3]).max() < 1e-10
