@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from maneuver_automaton.planning import PlanResult
+from maneuver_automaton.problem import SearchSettings
 from maneuver_automaton.via import Via
 from tests.matrix import outside
 from tests.matrix.measuring import asked, fine, found
@@ -31,7 +32,8 @@ def _aside(vehicle: Vehicle, share: float) -> np.ndarray:
 
 def _passed(vehicle: Vehicle, engine: Engine, vias: list[Via]) -> PlanResult:
     """A plan that passes all, where it says it does, one after the other."""
-    result = asked(vehicle, engine, via=vias)
+    work = (len(vias) + 1) * vehicle.max_expansions  # of which every leg has its share
+    result = asked(vehicle, engine, via=vias, search=SearchSettings(max_expansions=work))
     assert len(result.via) == len(vias), f"{len(result.via)} of {len(vias)} {MISSED}"
     course, times = fine(vehicle, result.plan), [one.time for one in result.via]
     assert times == sorted(times), f"they are passed at {times}"

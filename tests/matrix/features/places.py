@@ -37,7 +37,7 @@ def clearance(vehicle: Vehicle, engine: Engine) -> None:
 
 @feature(without("place_costs"), says="cost: ")
 def ground(vehicle: Vehicle, engine: Engine) -> None:
-    """The same for an area that lies across the way."""
+    """An area that lies across the way is left aside where that pays, and seldom crossed."""
     size = [0.2 * vehicle.reach, 0.5 * vehicle.reach]
     area = Box(size, midway(vehicle)[:2], heading_midway(vehicle))
     dear = Ground(area, 3.0 / vehicle.fastest)
@@ -45,7 +45,7 @@ def ground(vehicle: Vehicle, engine: Engine) -> None:
     result = asked(vehicle, engine, place_costs=dear)
     quick = found(base(vehicle))
     known = cost_of(problem.cost, quick) + price_of_places(vehicle, problem, quick)
-    no_dearer(result, known, "the quickest plan", share=SAMPLED)
+    no_dearer(result, 0.95 * known, "19 of 20 parts of the way across", share=SAMPLED)
 
 
 @feature(without("place_costs"), says="cost of the whole loop")
