@@ -371,9 +371,7 @@ class Problem:
                 if one.pose.size != unstated and not one.free_heading:
                     return one
                 place = one.pose if one.pose.size == unstated else one.place
-                return replace(
-                    one, pose=np.insert(place, 2, self.start[2]), free_heading=True
-                )
+                return replace(one, pose=np.insert(place, 2, self.start[2]), free_heading=True)
 
             object.__setattr__(self, "via", tuple(map(facing, self.via)))
         for k, via in enumerate(self.via, 1):

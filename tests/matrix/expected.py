@@ -64,6 +64,7 @@ SLOW = {
         )
     ),
     *(("dear_switch_among_obstacles", vehicle) for vehicle in ("grid", "omni")),
+    ("loop_clearance", QUICK_VEHICLE),
 }
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
@@ -94,6 +95,8 @@ LONG_ONE_BY_ONE = {  # with -m slow
     ("hovercraft", "max_trims"),
     ("second_order_unicycle", "loop_obstacles"),
     ("second_order_car", "resume"),
+    (QUICK_VEHICLE, "loop_clearance"),
+    ("user", "off_library_start"),
 }
 
 
@@ -121,8 +124,11 @@ SLOW_MUTANTS = frozenset(
     {
         "carried_parts",
         "heights",
+        "loop_clearance",
         "moved_problem_among_obstacles",
         "moving_ends",
+        "no_steering_at_rest",
+        "off_library_start",
         "planner_with_all",
         "polishing",
         "same_plan_twice_among_obstacles",

@@ -8,7 +8,15 @@ import pytest
 from maneuver_automaton import Box, Clearance, Disc, Ground, SearchSettings, plan
 from maneuver_automaton.groups import group_of
 from tests.matrix import outside
-from tests.matrix.measuring import SAMPLED, TIME_LIMIT, close, cost_of, found, obeys, price_of_places
+from tests.matrix.measuring import (
+    SAMPLED,
+    TIME_LIMIT,
+    close,
+    cost_of,
+    found,
+    obeys,
+    price_of_places,
+)
 from tests.matrix.scenes import midway
 from tests.matrix.vehicles import VEHICLES
 from tests.search.cases import compiled_only

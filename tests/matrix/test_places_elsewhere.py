@@ -9,7 +9,15 @@ import pytest
 
 from maneuver_automaton import Box, Clearance, Disc, FleetProblem, Ground, SearchSettings, plan
 from maneuver_automaton.fleet import plan_fleet
-from tests.matrix.measuring import SAMPLED, TIME_LIMIT, close, cost_of, found, obeys, price_of_places
+from tests.matrix.measuring import (
+    SAMPLED,
+    TIME_LIMIT,
+    close,
+    cost_of,
+    found,
+    obeys,
+    price_of_places,
+)
 from tests.matrix.vehicles import VEHICLES, Vehicle
 from tests.planning.test_on_state_lattice import with_reverse
 from tests.search.cases import compiled_only
@@ -68,6 +76,6 @@ def test_each_of_a_fleet_pays_for_its_own_places():
         prices.append(priced(vehicle, problem, answer.plan, answer.cost))
         assert answer.lower_bound <= answer.cost
     alone = plan(replace(one, place_costs=()))
-    assert prices[0] < 0.5 * price_of_places(vehicle, one, found(alone))
+    assert 0.0 < prices[0] <= price_of_places(vehicle, one, found(alone)) * (1.0 + SAMPLED)
     assert prices[1] == 0.0
     assert result.cost == pytest.approx(sum(answer.cost for answer in result.results.values()))

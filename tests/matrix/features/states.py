@@ -11,6 +11,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.models import SecondOrderCar
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from maneuver_automaton.scenario.vehicles import MODELS
 from tests.matrix.measuring import asked
@@ -33,10 +34,13 @@ def off_library_start(vehicle: Vehicle, engine: Engine) -> None:
     """It starts between two trims, past a pillar, and keeps to its dynamics from there."""
     library = vehicle.automaton
     rest = library.trims[library.rest or 0]
-    one, other = (library[name] if name else rest for name in (vehicle.end_trim, vehicle.moving_trim))
+    one, other = (
+        library[name] if name else rest for name in (vehicle.end_trim, vehicle.moving_trim)
+    )
     state = 0.37 * one.reduced_state + 0.63 * other.reduced_state
     state = state if state.size else np.zeros(1)
-    result = asked(vehicle, engine, start_state=state, obstacles=[pillar(vehicle)])
+    block = [pillar(vehicle)]
+    result = asked(vehicle, engine, start_trim=None, start_state=state, obstacles=block)
     first = Course.driven(result.plan, vehicle.automaton.model, step_m=0.1).state[0]
     assert np.abs(first - state).max() <= 1e-9, f"it starts in {first}"
     off = defect(result.plan, vehicle.automaton.model)
@@ -72,8 +76,14 @@ def _takes_its_time_to_steer(vehicle: Vehicle) -> bool:
     return isinstance(vehicle.automaton.model, SecondOrderCar)
 
 
+def _stops_and_steers(problem: Problem) -> Problem:
+    """The same for a car that turns its wheels at rest, as it does along a first path."""
+    search = replace(problem.search, improve=False, polish=False)
+    return replace(problem, automaton=load_stock_library("second_order_car"), search=search)
+
+
 @feature(
-    changed(lambda problem: replace(problem, automaton=load_stock_library("second_order_car"))),
+    changed(_stops_and_steers),
     on="second_order_car",
     applies=lambda vehicle: vehicle.automaton.model.name in MODELS,
     refused=lambda vehicle: "" if _takes_its_time_to_steer(vehicle) else "unknown key",
