@@ -61,9 +61,10 @@ class Feature:
         try:
             self.check(vehicle, engine)
         except ValueError as error:
-            assert reason in str(error), f"refused because {error}"
-        else:
-            raise AssertionError(f"it is not refused, though {reason}")
+            if reason not in str(error):
+                raise AssertionError(f"refused because {error}") from error
+            return
+        raise AssertionError(f"it is not refused, though {reason}")
 
 
 def feature(
