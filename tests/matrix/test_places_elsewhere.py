@@ -22,7 +22,7 @@ from tests.matrix.vehicles import VEHICLES, Vehicle
 from tests.planning.test_on_state_lattice import with_reverse
 from tests.search.cases import compiled_only
 
-pytestmark = compiled_only
+pytestmark = [compiled_only, pytest.mark.slow]
 ON_LATTICE = Vehicle(
     name="on_lattice",
     library=with_reverse,
