@@ -305,7 +305,7 @@ def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
 
     def estimate(plan: Plan) -> float:
         places = sum(one.price for one in simpler.place_prices_of(plan))
-        return timed(plan, along.pace).duration + places / simpler.rates.max()
+        return timed(plan, along.pace).duration + places / float(simpler.rates.max())
 
     for drive in gear_sequences(simpler, along.libraries, estimate, budget=budget):
         if drive.plan.duration > 0.0:
