@@ -364,15 +364,16 @@ class Problem:
                 f"via: got {len(self.via)} in a free order, need at most {MOST_UNORDERED}"
             )
         automaton, dof = self.automaton, self.start.size
-        if (model := automaton.translated) is not None:  # any heading of a trim, if none is stated
+        if (model := automaton.translated) is not None:  # one of its headings stands for any
             unstated = model.stated.group.dof
-            vias = (
-                replace(one, pose=np.insert(one.pose, 2, 0.0), free_heading=True)
-                if one.pose.size == unstated
-                else one
-                for one in self.via
-            )
-            object.__setattr__(self, "via", tuple(vias))
+
+            def facing(one: Via) -> Via:
+                if one.pose.size != unstated and not one.free_heading:
+                    return one
+                place = one.pose if one.pose.size == unstated else one.place
+                return replace(one, pose=np.insert(place, 2, self.start[2]), free_heading=True)
+
+            object.__setattr__(self, "via", tuple(map(facing, self.via)))
         for k, via in enumerate(self.via, 1):
             if via.pose.size != dof:
                 raise ValueError(

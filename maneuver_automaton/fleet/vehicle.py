@@ -269,7 +269,7 @@ class FleetMember:
 
     def look_for_better_ways(self, budget: Budget) -> None:
         """Better ways past past obstacles, and others beside them."""
-        if self.ways and self.problem.obstacles:
+        if self.ways and (self.problem.obstacles or self.problem.place_costs):
             self._keep_ways(self._query(self.aimed), self.ways[0], budget, WITH_TIME)
         elif not self.at_will and self.alone is not None:
             better = self._found(self._planned(self.problem, budget, improve=True))
@@ -296,7 +296,9 @@ class FleetMember:
         self, query: LatticeQuery, word: Word, aims: Sequence[tuple[int, Goal]]
     ) -> OwnPlan:
         goal_index = aims[query.goal_index[word.goal]][0]
-        return self.own(plan_of_word(query, word), goal_index, cost=word.cost + query.padding)
+        # in a search the prices of places are not exact
+        cost = None if self.problem.place_costs else word.cost + query.padding
+        return self.own(plan_of_word(query, word), goal_index, cost=cost)
 
     def _found(self, result: PlanResult) -> OwnPlan | None:
         if result.plan is None or result.cost is None:

@@ -163,9 +163,13 @@ class _Legs:
     last: Problem = field(init=False)  # of the leg to a goal
 
     def __post_init__(self) -> None:
-        stays = replace(self.between.horizon, stay=False)
-        self.last = replace(self.between, start_trim=None, start_state=None)
-        self.middle = replace(self.last, goals=(Goal(self.between.start),), horizon=stays)
+        automaton, stays = self.between.automaton, replace(self.between.horizon, stay=False)
+        # Each leg names its trims; of a vehicle that cannot stand still, one must be named before.
+        moves = automaton.rest is None and not automaton.is_kinematic
+        some = automaton.trim_names[0] if moves else None
+        self.last = replace(self.between, start_trim=some, start_state=None)
+        to = Goal(self.between.start, trim=some)
+        self.middle = replace(self.last, goals=(to,), horizon=stays)
 
     @property
     def is_timed(self) -> bool:
@@ -200,7 +204,7 @@ class _Legs:
             horizon=horizon if self.is_timed else None,
         )
         state = self.between.start_state if here is None else None
-        return leg if state is None else replace(leg, start_state=state)
+        return leg if state is None else replace(leg, start_trim=None, start_state=state)
 
     def planned(
         self, chain: Chain, to: Arrival | None, budget: Budget, *, more: bool = False

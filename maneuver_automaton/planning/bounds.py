@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -116,7 +117,7 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     known = straight_bound(problem, problem.goals)
     if not (follows_paths(model) and problem.rests_at_both_ends and cost):
         return LowerBound(value=known, kind="distance")
-    simpler = kinematic_problem(problem, switch=0.0)
+    simpler = kinematic_problem(replace(problem, place_costs=()), switch=0.0)
     bound = lattice_bound(lattice_query(simpler, tuple(range(len(problem.goals)))))
     least = bound.value
     fastest = float(np.abs(model.reduced_limits[0]).max())

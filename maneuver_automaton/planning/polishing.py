@@ -297,12 +297,13 @@ def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
     along = path_guesses(problem.automaton.model)
     if along is None:
         return
-    for drive in gear_sequences(
-        simpler_problem(problem, along.libraries[0], cost=BY_TIME),
-        along.libraries,
-        lambda plan: timed(plan, along.pace).duration,
-        budget=budget,
-    ):
+    simpler = simpler_problem(problem, along.libraries[0], cost=BY_TIME)
+
+    def estimate(plan: Plan) -> float:
+        places = sum(one.price for one in simpler.place_prices_of(plan))
+        return timed(plan, along.pace).duration + places / float(simpler.rates.max())
+
+    for drive in gear_sequences(simpler, along.libraries, estimate, budget=budget):
         if drive.plan.duration > 0.0:
             yield guess_along(problem, along, drive.plan)
 

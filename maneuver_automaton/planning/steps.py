@@ -156,7 +156,8 @@ def search_steps(problem: Problem) -> Steps:
         steps.append(AlongPaths(polish))
     if linked and (not searched or (method == "auto" and _suits_words(problem))):
         steps.append(FreeWords())
-    if only_maneuvers_turn(automaton):
+    on_nodes = bool(problem.place_costs) and automaton.lattice is not None and searched
+    if only_maneuvers_turn(automaton) and not on_nodes:  # a sequence ends at a node by chance
         steps.append(TurnedByManeuvers())
     if linked and searched:
         steps.append(Lattice(polish))

@@ -17,7 +17,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, terms_of
 from maneuver_automaton.models import Car, Model, Unicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.scene import Polished
@@ -110,7 +110,8 @@ def gear_sequences(
     Parameters
     ----------
     problem : Problem
-        Start, goal and obstacles; its automaton and cost are replaced.
+        Start, goal, obstacles and what places cost, beside its price of a second; its automaton is
+        replaced, and the prices of changes of direction.
     libraries : sequence of Automaton
         Kinematic ones, from `car_library` or `unicycle_library`.
     estimate : callable
@@ -126,14 +127,16 @@ def gear_sequences(
     TimedDrive
         The best of the first prices before the others are tried; then the others, by estimate.
     """
+    terms = terms_of(problem.cost)
+    second = terms.time if terms and terms.time else 1.0
     found: list[TimedDrive] = []
     first: TimedDrive | None = None
     for turning, switching in PRICES:
         for library in libraries:
             if budget.is_over:
                 break
-            unit = _unit(library)
-            cost = Cost(time=1.0, direction_change=turning * unit, switch=switching * unit)
+            unit = second * _unit(library)
+            cost = Cost(time=second, direction_change=turning * unit, switch=switching * unit)
             variant = replace(problem, automaton=library, cost=cost)
             for plan in _plans(variant, budget):
                 drive = TimedDrive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))

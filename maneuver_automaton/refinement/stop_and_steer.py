@@ -226,7 +226,18 @@ def kinematic_problem(
 
 
 def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Problem:
-    """The way of a kinematic vehicle between the same obstacles, from start to goals."""
+    """The way of a kinematic vehicle between the same obstacles, from start to goals.
+
+    Where places are priced, a second costs what it costs in the dearest trim: so much beside them.
+    """
+    if problem.place_costs:
+        second = float(problem.rates.max()) or 1.0
+        cost = replace(
+            cost,
+            time=second * cost.time,
+            switch=second * cost.switch,
+            direction_change=second * cost.direction_change,
+        )
     return Problem(
         automaton,
         problem.start,
@@ -239,6 +250,7 @@ def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Pr
         obstacles=problem.obstacles,
         footprint=problem.footprint,
         margin=problem.margin,
+        place_costs=problem.place_costs,
     )
 
 

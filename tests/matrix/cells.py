@@ -55,6 +55,8 @@ def tried(feature: str, vehicle: str, *, seconds: int = SECONDS) -> Outcome:
     try:
         with _at_most(seconds):
             FEATURES[feature](VEHICLES[vehicle])
+        if told := FEATURES[feature].refused(VEHICLES[vehicle]):
+            sign, reason = REFUSED, told
     except Exception as error:  # noqa: BLE001  # whatever it is, it is this cell's alone
         sign, reason = sign_of(error), _line(error)
     return Outcome(

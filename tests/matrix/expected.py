@@ -75,6 +75,7 @@ SLOW = {
         )
     ),
     ("switch_price", "grid"),
+    *((feature, QUICK_VEHICLE) for feature in ("clearance", "loop_clearance", "via_free_heading")),
 }
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
@@ -104,6 +105,8 @@ LONG_ONE_BY_ONE = {  # with -m slow
     ("hovercraft", "max_trims"),
     ("second_order_unicycle", "loop_obstacles"),
     ("second_order_car", "resume"),
+    *((QUICK_VEHICLE, row) for row in ("clearance", "loop_clearance", "via_free_heading")),
+    ("user", "off_library_start"),
 }
 
 
@@ -131,10 +134,14 @@ SLOW_MUTANTS = frozenset(
     {
         "alternatives_among_obstacles",
         "carried_parts",
+        "clearance",
         "heights",
         "max_time_among_obstacles",
+        "loop_clearance",
         "moved_problem_among_obstacles",
         "moving_ends",
+        "no_steering_at_rest",
+        "off_library_start",
         "planner_with_all",
         "polishing",
         "polishing_past_movers",

@@ -10,6 +10,7 @@ import numpy as np
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Shape, Zone
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.places import Clearance, Ground
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Goal, Problem
@@ -54,8 +55,28 @@ def asked(
     result = engine.plan(problem, time_limit=TIME_LIMIT)
     obeys(vehicle, problem, found(result), result.goal_index or 0)
     if cost_is and isinstance(problem.cost, Cost):
-        close(cost_of(problem.cost, result.plan), result.cost, "cost", share=SAMPLED)
+        seen = cost_of(problem.cost, result.plan) + price_of_places(vehicle, problem, result.plan)
+        close(seen, result.cost, "cost", share=SAMPLED)
     return result
+
+
+def price_of_places(vehicle: Vehicle, problem: Problem, motion: Plan | None) -> float:
+    """What the places along a plan cost, by samples of its body: obstacles near, priced areas."""
+    if not problem.place_costs or motion is None:
+        return 0.0
+    course = Course.driven(motion, vehicle.automaton.model, step_m=0.02 * vehicle.size)
+    price = 0.0
+    for cost in problem.place_costs:
+        if isinstance(cost, Clearance):
+            bodies = around(vehicle, course, problem.footprint)
+            apart = outside.clearances(
+                course, bodies, problem.obstacles, body_height=problem.body_height
+            )
+            price += outside.price_near(course, apart, weight=cost.weight, within=cost.within)
+        else:
+            assert isinstance(cost, Ground)
+            price += sum(cost.price * outside.way_within(course, area) for area in cost.areas)
+    return price
 
 
 def close(measured: float, stated: float | None, what: str, *, share: float = SAME) -> None:

@@ -118,10 +118,13 @@ def flat(pose: np.ndarray) -> np.ndarray:
     return np.concatenate([pose, np.zeros((*pose.shape[:-1], 1))], axis=-1)
 
 
-def _driven(course: Trajectory, model: Model, step_m: float) -> tuple[np.ndarray, ...]:
+def _driven(
+    course: Trajectory, model: Model, step_m: float, *, to_the_end: bool = False
+) -> tuple[np.ndarray, ...]:
     """Times, poses, states and controls of a course, every interval integrated from its begin.
 
-    Runge-Kutta of order four, all intervals at once: in each the control is constant.
+    Runge-Kutta of order four, all intervals at once: in each the control is constant. `to_the_end`
+    gives the end of every interval alone.
     """
     lasting, control = np.diff(course.time), course.control[:-1]
     speed = np.abs(model.body_velocity(course.reduced_state, course.control)[:, :2]).max()
@@ -138,13 +141,15 @@ def _driven(course: Trajectory, model: Model, step_m: float) -> tuple[np.ndarray
 
     x = np.hstack([course.pose, course.reduced_state])[:-1]
     rows = [x]
-    for _ in range(steps - 1):
+    for _ in range(steps if to_the_end else steps - 1):
         a = rates(x)
         b = rates(x + size / 2.0 * a)
         c = rates(x + size / 2.0 * b)
         d = rates(x + size * c)
         x = x + size / 6.0 * (a + 2.0 * b + 2.0 * c + d)
         rows.append(x)
+    if to_the_end:
+        return course.time[1:], x[:, :dof], x[:, dof:], control
     every = np.stack(rows, axis=1).reshape(-1, x.shape[1])
     last = np.append(course.pose[-1], course.reduced_state[-1])
     every = np.vstack([every, last])
@@ -290,6 +295,38 @@ def outside_bounds(course: Course, bounds: Bounds) -> float:
         pair = getattr(bounds, name)
         if pair is not None:
             worst = max(worst, pair[0] - course.pose[:, k].min(), course.pose[:, k].max() - pair[1])
+    return worst
+
+
+def price_near(
+    course: Course, clearance: np.ndarray, *, weight: float, within: float, per_second: bool = False
+) -> float:
+    """What it costs to be near: the integral of ``weight (1 - d / within)^2``, by trapezoids."""
+    rates = weight * np.maximum(1.0 - clearance / within, 0.0) ** 2
+    steps = course.lasting if per_second else course.ways
+    return float(steps @ (rates[1:] + rates[:-1]) / 2.0)
+
+
+def way_within(course: Course, shape: Shape) -> float:
+    """Length [m] of the way of the pose inside a shape, climbs included: each step by its share."""
+    area, radius = solid(shape)
+    area = area.buffer(radius, quad_segs=200) if radius else area
+    ends = np.stack([course.pose[:-1, :2], course.pose[1:, :2]], axis=1)
+    moving = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > 1e-12
+    lines = shapely.linestrings(ends[moving])
+    shares = shapely.length(shapely.intersection(lines, area)) / shapely.length(lines)
+    return float(course.ways[moving] @ shares)
+
+
+def defect(plan: Plan, model: Model) -> float:
+    """How far any maneuver's interval, integrated from its begin, ends from the next sample."""
+    worst = 0.0
+    for maneuver in filter(None, plan.maneuvers):
+        course = maneuver.course
+        assert course is not None
+        ends = _driven(course, model, 0.05, to_the_end=True)
+        samples = np.hstack([course.pose, course.reduced_state])[1:]
+        worst = max(worst, float(np.abs(np.hstack([ends[1], ends[2]]) - samples).max()))
     return worst
 
 

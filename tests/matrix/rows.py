@@ -50,10 +50,21 @@ class Feature:
     mutant_vehicle: str  # on which the check fails with the mutant
     says: str  # how it then complains
     applies: Callable[[Vehicle], bool]
+    refused: Callable[[Vehicle], str]  # why, in the words of the package; empty if it is not
 
     def __call__(self, vehicle: Vehicle, engine: Engine = PACKAGE) -> None:
-        """Fail unless the feature works for the vehicle."""
-        self.check(vehicle, engine)
+        """Fail unless the feature works for the vehicle, or is refused for the reason stated."""
+        reason = self.refused(vehicle)
+        if not reason:
+            self.check(vehicle, engine)
+            return
+        try:
+            self.check(vehicle, engine)
+        except ValueError as error:
+            if reason not in str(error):
+                raise AssertionError(f"refused because {error}") from error
+            return
+        raise AssertionError(f"it is not refused, though {reason}")
 
 
 def feature(
@@ -62,6 +73,7 @@ def feature(
     says: str,
     on: str = "dubins",
     applies: Callable[[Vehicle], bool] = lambda _: True,
+    refused: Callable[[Vehicle], str] = lambda _: "",
 ) -> Callable[[Check], Feature]:
     """Make a check a row of the matrix, under its name."""
 
@@ -73,6 +85,7 @@ def feature(
             mutant_vehicle=on,
             says=says,
             applies=applies,
+            refused=refused,
         )
 
     return entered
@@ -88,6 +101,9 @@ def without(*names: str, **changes: object) -> Engine:
         "margin": 0.0,
         "cost": Cost(time=1.0),
         "start_trim": None,
+        "start_state": None,
+        "place_costs": (),
+        "via": (),
     }
     values = {name: defaults[name] for name in names} | changes
 

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from tests.matrix.cells import SECONDS, SENSELESS, WORKS, Outcome, cells, tried
+from tests.matrix.cells import REFUSED, SECONDS, SENSELESS, WORKS, Outcome, cells, tried
 from tests.matrix.features import FEATURES
 from tests.matrix.vehicles import VEHICLES
 
@@ -50,8 +50,8 @@ def markdown(results: Sequence[Outcome], features: Sequence[str], vehicles: Sequ
     for feature in features:
         row = [signs.get((feature, vehicle), SENSELESS) for vehicle in vehicles]
         lines.append(f"| {feature.replace('_', ' ')} | " + " | ".join(row) + " |")
-    working = sum(one.sign == WORKS for one in results)
-    lines += ["", f"{working} of {len(results)} cells work.", ""]
+    working, refused = (sum(one.sign == sign for one in results) for sign in (WORKS, REFUSED))
+    lines += ["", f"{working} of {len(results)} cells work, {refused} are refused.", ""]
     order = {name: k for k, name in enumerate(features)}
     faults = sorted(
         (one for one in results if one.sign != WORKS),

@@ -14,8 +14,11 @@ from tests.matrix.features import (
     free_space,
     heights,
     obstacles,
+    on_the_way,
+    places,
     planner,
     polishing,
+    states,
     symmetry,
 )
 from tests.matrix.rows import Feature
@@ -32,6 +35,9 @@ TOPICS = (
     closed_loops,
     polishing,
     heights,
+    places,
+    on_the_way,
+    states,
 )
 FEATURES = {  # in the order of the table's rows
     row.name: row for topic in TOPICS for row in vars(topic).values() if isinstance(row, Feature)
