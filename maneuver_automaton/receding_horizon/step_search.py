@@ -17,7 +17,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.on_the_way import goal_around, what_is_missed
 from maneuver_automaton.planning.tracking import free_until
-from maneuver_automaton.problem import Horizon, Problem, moves
+from maneuver_automaton.problem import Goal, Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, holding, within
 from maneuver_automaton.receding_horizon.failsafe import (
     FailSafe,
@@ -106,11 +106,19 @@ class StepSearch:
         """No plan to any goal costs less."""
         return min(closed_bound(self.here, goal) for goal in self.here.goals)
 
-    def planned_anew(self, share: float = 1.0, *, improve: bool = True) -> StepPlan | None:
-        """The plan of a planner, from the end of the committed part on, in a share of the time."""
+    def planned_anew(
+        self, share: float = 1.0, *, improve: bool = True, then: Plan | None = None
+    ) -> StepPlan | None:
+        """The plan of a planner, from the end of the committed part on, in a share of the time.
+
+        It leads to a goal, or to where a plan begins that leads on from there.
+        """
         now, limit, problem = self.now, self.now.longest, self.onward()
         if problem is None:
             return None
+        if then is not None:
+            trim = then.trims[0].name if self.here.has_inertia else None
+            problem = replace(problem, via=(), goals=(Goal(then.start, trim=trim),))
         search = replace(problem.search, improve=improve and problem.search.improve)
         if self.here.moves:  # a motion in one piece could not be left where something comes
             search = replace(search, polish=False)
@@ -120,6 +128,8 @@ class StepSearch:
             self.reason = f": {result.reason}"
             return None
         plan, index = now.whole(result.plan), result.goal_index
+        if then is not None and now.last is not None:
+            plan, index = followed_by(plan, then), now.last.goal_index
         if limit is not None and plan.duration > limit * (1.0 + EXACT):
             self.reason = ": it takes too long"
         elif (self.here.moves or self.here.via) and not self.is_safe(plan):
@@ -137,12 +147,18 @@ class StepSearch:
     def on_the_way(self, kept: StepPlan | None) -> list[StepPlan]:
         """The plan of a planner, which alone knows what is passed on the way.
 
-        The rest of the last plan is followed as long as it is driven as planned, and nothing moves.
+        The rest of the last plan is followed as long as it is driven as planned, and nothing moves;
+        if it is lost, that after the next pose on the way.
         """
         followed = kept is not None and not (self.now.off_plan or self.now.changed)
         if followed and not self.here.moves:
             return []
-        found = self.planned_anew(improve=kept is None)
+        then = self.now.after_next
+        found = None
+        if kept is None and then is not None:
+            found = self.planned_anew(0.5, improve=False, then=then)
+        if found is None:
+            found = self.planned_anew(improve=kept is None)
         return [] if found is None else [found]
 
     # --- the decision ---
