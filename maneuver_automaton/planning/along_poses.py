@@ -326,7 +326,7 @@ class _Search:
                 self.is_proven = best is not None
                 break
             before = self.costs.copy()
-            chain = self.driven(chosen, budget)
+            chain = self.driven(chosen, self.found.budget if best is None else budget)
             if (
                 chain is not None
                 and (best is None or chain.cost < best.cost)
@@ -564,7 +564,12 @@ def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) 
     masks = [(1 << k) - 1 for k in range(n)] if in_order else range((1 << n) - 1)
     for mask in reversed(masks):
         after = _following(remains, mask, of_way, stays, in_order=in_order)
-        remains[mask] = (costs[:, :-1] + after).min(axis=1)
+        last = np.flatnonzero(mask >> of_way & 1) if mask else np.array([len(of_way)])
+        coming = np.flatnonzero(after < np.inf)
+        remains[mask] = np.full(len(of_way) + 1, np.inf)
+        if coming.size:
+            sums = costs[np.ix_(last, coming)] + after[coming]
+            remains[mask][last] = sums.min(axis=1)
     return remains
 
 
