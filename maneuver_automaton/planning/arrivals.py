@@ -151,10 +151,28 @@ def _headings(problem: Problem, number: int) -> list[float]:
     angles = [math.atan2(line[1], line[0]) for line in lines if line[:2].any()]
     if problem.order == "free":
         angles = angles[:1]
+    elif estimates_words(problem):
+        angles += _of_single_trims(problem, here - before, 1.0)
+        angles += _of_single_trims(problem, after - here, -1.0)
     first = angles[0] if angles else float(problem.start[2])
     count = headings_tried(problem)
     angles += [first + 2.0 * math.pi * k / count for k in range(count)]
     return list(dict.fromkeys(math.remainder(angle, 2.0 * math.pi) for angle in angles))
+
+
+def _of_single_trims(problem: Problem, way: Array, side: float) -> list[float]:
+    """Headings at which one trim leads along a way, at its end (side 1) or at its begin (-1)."""
+    found, distance = list[float](), float(np.hypot(way[0], way[1]))
+    for twist in moving_trims(problem.automaton, problem.cost).twists[:MOST_LETTERS].tolist():
+        speed, rate = math.hypot(twist[0], twist[1]), twist[2]
+        if speed > 0.0 and distance * abs(rate) <= 2.0 * speed:
+            half = math.asin(distance * rate / (2.0 * speed))  # of the turn on the way
+            straight = math.atan2(way[1], way[0]) - math.atan2(twist[1], twist[0])
+            found += [
+                straight + side * half,
+                straight + side * (math.copysign(math.pi, rate) - half),
+            ]
+    return found
 
 
 def headings_tried(problem: Problem) -> int:
