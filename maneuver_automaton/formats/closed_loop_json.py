@@ -231,8 +231,8 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
     )
     if not loop.problem.via:
         del document["via"]
-        for row in document["steps"][:-1]:
-            del row["via"]  # type: ignore[misc]
+        for row in document["steps"]:
+            row.pop("via", None)  # type: ignore[typeddict-item]
     return document
 
 

@@ -293,7 +293,8 @@ class _Search:
                     on = self.costs[rows[m][picked[-1]], rows[m + 1]]
                     picked.append(int(np.argmin(on + back[m + 1])))
                 chains[tuple(picked)] = float(through[at])
-        better, more = Improving(problem, self.estimated, order), [[] for _ in self.ways]
+        better = Improving(problem, self.estimated, order)
+        more: list[list[Arrival]] = [[] for _ in self.ways]
         for chain in sorted(chains, key=chains.__getitem__)[:VALLEYS]:
             poses = [self.arrivals[row[at]][1].pose for row, at in zip(rows, chain, strict=True)]
             for k, pose in zip(order, better.chain(poses, lambda: budget.is_over), strict=True):

@@ -332,7 +332,8 @@ class LegCosts:
                 np.where(np.isnan(leaving).any(axis=-1), np.nan, leaving[..., 0]).ravel(),
             ]
         )
-        return (found[~np.isnan(found)][:, None] + [-BESIDE, BESIDE]).ravel()
+        beside = found[~np.isnan(found)][:, None] + np.array([-BESIDE, BESIDE])
+        return np.asarray(beside.ravel())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -83,9 +83,9 @@ def going_on(
         one = found.get(k)
         if one is None or one.stay_left > MET:
             since = max(earliest, -math.inf if one is None else one.until - begin)
-            one = found[k] = seen.passing(k, via, one, since)
-            if one is None:
-                del found[k]
+            one = seen.passing(k, via, one, since)
+        if one is not None:
+            found[k] = one
         if problem.order == "given":
             if one is None or one.stay_left > MET:
                 break
@@ -168,16 +168,18 @@ def _seen(problem: Problem, plan: Plan, ended: Array | None = None) -> _Seen:
     start, origin = np.array(plan.start), problem.via[0].place
     start[places] -= origin
     near = plan.begun_at(start, start_time=0.0)
-    pose_at = near.pose_at
+    pose_at: Callable[[Array], Array] = near.pose_at
     if ended is not None and near.duration > 0.0:
         end = np.array(ended)
         end[places] -= origin
         group = group_of(end.size)
         off = (group(near.end).inverse() @ group(end)).log()
 
-        def pose_at(times: Array) -> Array:
+        def bent(times: Array) -> Array:
             shares = np.asarray(times)[..., None] / near.duration
-            return (group(near.pose_at(times)) @ group.exp(shares * off)).pose
+            return np.asarray((group(near.pose_at(times)) @ group.exp(shares * off)).pose)
+
+        pose_at = bent
 
     return _Seen(
         origin=origin,
@@ -205,7 +207,8 @@ def _times(problem: Problem, plan: Plan) -> list[float | None]:
 
 def _rests(problem: Problem, plan: Plan) -> list[tuple[float, float]]:
     """From when to when [s] a plan is in trims in which the vehicle stands, for no time too."""
-    found, time, model = [], 0.0, problem.automaton.model
+    found = list[tuple[float, float]]()
+    time, model = 0.0, problem.automaton.model
     for k, (trim, lasting) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if model.reduced_names:
             velocity = model.body_velocity(trim.reduced_state, trim.control)

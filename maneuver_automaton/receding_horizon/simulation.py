@@ -380,9 +380,11 @@ def _closed_loop(
         elif applied:  # the value of the step that would have come next
             controller.last = applied[-1]
             then = applied[-1].number + 1
-            there = seen and seen(then)
             now = controller.step(
-                track.poses[-1], track.state, obstacles=there, passed=track.passed
+                track.poses[-1],
+                track.state,
+                obstacles=seen and seen(then),
+                passed=track.passed,
             )[1]
             value = now.value
             controller.last = applied[-1]
