@@ -27,6 +27,7 @@ from maneuver_automaton.fleet import (
 from maneuver_automaton.fleet.driven import FINE
 from maneuver_automaton.formats.documents import kind_of, parsed, told_of
 from maneuver_automaton.formats.plan_json import load_plan, load_plans
+from maneuver_automaton.planning.on_the_way import Passed, going_on, still_ahead
 from maneuver_automaton.planning.verdict import Verdict, verify
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon import ClosedLoop, within
@@ -70,7 +71,9 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
             return scenario.name, _plans(path, file.document, scenario.fleet)
         return scenario.name, _loop(path, file.document, file.result())
     if file.kind == "loop":
-        return scenario.name, _loop(path, file.document, _log_of(file.result()))
+        loop = file.result()
+        found = _loop(path, file.document, _log_of(loop))
+        return scenario.name, [*found, *_on_the_way(loop)]
     plan = load_plan(path, model=scenario.problem.automaton.model)
     with announced(), _of_this(path):
         verdict = verify(scenario.problem, plan, leave=leave)
@@ -198,7 +201,7 @@ def _log_of(loop: ClosedLoop) -> FleetLog:
     ]
     return FleetLog(
         problem=FleetProblem(  # which admits no fixed time, and no goal in motion but of who leaves
-            [replace(loop.problem, horizon=Horizon())], names=["vehicle"], leaves=[True]
+            [replace(loop.problem, horizon=Horizon(), via=())], names=["vehicle"], leaves=[True]
         ),
         step=loop.step,
         steps=tuple(steps),
@@ -208,6 +211,22 @@ def _log_of(loop: ClosedLoop) -> FleetLog:
         closest=None,
         status=loop.status,
         cost=loop.cost,
+    )
+
+
+def _on_the_way(loop: ClosedLoop) -> Iterator[Finding]:
+    """Whether what was driven passed all that is on the way, if the loop has arrived."""
+    problem, passed = loop.problem, tuple[Passed, ...]()
+    if not problem.via:
+        return
+    for piece in loop.driven:
+        passed = going_on(problem, passed, piece)
+    left = still_ahead(problem, passed)
+    told = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed if not one.stay_left)
+    yield Finding(
+        what="vehicle: on the way",
+        holds=None if any(step.off_plan for step in loop.steps) else not (left and loop.reached),
+        words=f"passed {told or 'nothing'}" + (f", {len(left)} left" if left else ""),
     )
 
 

@@ -43,8 +43,10 @@ from maneuver_automaton.formats.entries import (
     of,
     says,
 )
+from maneuver_automaton.formats.plan_json import PassedEntry
 from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.planning.on_the_way import Passed, still_ahead
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon import (
@@ -73,6 +75,13 @@ class BrokenEntry(TypedDict):
 
 
 VehiclePose = Annotated[Numbers, says("where it was, if pose is where it will be")]
+
+
+class MetEntry(PassedEntry):
+    """A pose on the way that was passed, or where the vehicle has begun to stay."""
+
+    until_s: Annotated[Number, of("until"), says("it was passed then, or was stood at last")]
+    stay_left_s: Annotated[Number, of("stay_left"), says("to stand there; 0 if it is passed")]
 
 
 class PlaceEntry(TypedDict):
@@ -115,6 +124,9 @@ class AppliedEntry(PlaceEntry):
     clearance_m: Known
     broken_guarantees: Annotated[list[BrokenEntry], of("violations")]
     disturbed: NotRequired[Annotated[list[BrokenEntry], says("what noise took from it")]]
+    via: NotRequired[
+        Annotated[list[MetEntry], of("passed"), says("met on the way by its end, if anything is")]
+    ]
 
 
 class EndedEntry(PlaceEntry):
@@ -161,6 +173,9 @@ class LoopDocument(DocumentHead):
     collisions: NotRequired[Annotated[Whole, says("steps that hit an obstacle, by the audit")]]
     broken_guarantees: NotRequired[list[BrokenEntry]]
     disturbed: NotRequired[list[BrokenEntry]]
+    via: NotRequired[
+        Annotated[list[MetEntry], of("passed"), says("met on the way, if anything is")]
+    ]
     steps: Annotated[list[StepEntry], Field(min_length=1)]
 
 
@@ -178,7 +193,7 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
     (True, 1.0, [1.0, 0.5, 0.0])
     """
     automaton, poses = loop.problem.automaton, loop.poses.tolist()
-    return document_of(
+    document = document_of(
         LoopDocument,
         loop,
         name=name,
@@ -214,6 +229,11 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
             ),
         ],
     )
+    if not loop.problem.via:
+        del document["via"]
+        for row in document["steps"]:
+            row.pop("via", None)  # type: ignore[typeddict-item]
+    return document
 
 
 def save_closed_loop(
@@ -310,6 +330,11 @@ def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
     """
     steps, poses = load_steps(path, problem.automaton)
     document = read_document(path, "loop")
+    passed: list[tuple[Passed, ...]] = [(), *(step.passed for step in steps)]
+    inside = [
+        any(within(pose, goal) for goal in problem.goals) and not still_ahead(problem, before)
+        for pose, before in zip(poses, passed, strict=True)
+    ]
     with told_of(path):
         return made(
             ClosedLoop,
@@ -323,7 +348,7 @@ def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
             driven=tuple(
                 replace(step.piece, start=pose) for step, pose in zip(steps, poses, strict=False)
             ),
-            inside=tuple(any(within(pose, goal) for goal in problem.goals) for pose in poses),
+            inside=tuple(inside),
         )
 
 

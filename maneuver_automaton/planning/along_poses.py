@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -26,54 +26,32 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined
-from maneuver_automaton.automaton.headings import posed
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.groups import SE2
-from maneuver_automaton.planning.blocked import (
-    blocked_ends,
-    goals_off_lattice,
-    why_goal_blocked,
-    why_off_lattice,
+from maneuver_automaton.planning.arrivals import (
+    VALLEYS,
+    Arrival,
+    Improving,
+    LegCosts,
+    arrivals_of,
+    freedoms,
+    set_bound,
 )
-from maneuver_automaton.planning.bounds import straight_bound
+from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_goal_blocked
 from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, Step
+from maneuver_automaton.planning.on_the_way import goal_around
 from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
-from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Via
-from maneuver_automaton.search.lattice_goals import nodes_within
-from maneuver_automaton.search.limits import closed_bound
-from maneuver_automaton.words._kernels_steering import steer_batch
-from maneuver_automaton.words.library import most_different, moving_trims
 
-HEADINGS = 12  # that stand for a free one at least, beside those along the lines to neighbours
-MOST_HEADINGS = 144  # the same where legs are estimated in a moment
-MOST_ESTIMATES = 2_000_000  # words of three trims that are tried in all to estimate legs
-ALONG_GATE = (0.5, 0.2, 0.8)  # shares of a gate at which it is crossed at first
-AROUND = 4  # places at the rim of a tolerance
-MOST_SPEEDS = 3  # straight trims in which a vehicle with inertia passes, beside rest
 LEG_SHARE = 0.2  # of the time left, for a leg that is planned for the first time
+IMPROVED = 0.15  # of the time, for arrivals that are better by estimates
 SEARCHED = 0.4  # of the time, for the search over arrivals
 VARIED = 0.6  # of the time left then, for free headings and places
-GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
+THINNED = 3  # of so many arrivals one stays where improved ones come in
+SECTORS = 12  # of headings, in each of which the best arrival is improved
 FINE = 1e-4  # of a heading or place, as a share of where it was looked for, at the last
-MOST_LETTERS = 7  # trims of which words are tried to estimate a leg
-STEERED = 1e-12  # relative, for circles that touch
-NEARLY = 1e-6  # [rad, s] of a turn that is none
+NARROWER = 0.3  # of a step in which a heading or place gained nothing
 GAIN = 1e-7  # share of a cost that is a gain
 GOAL = -1  # number of the goal among poses on the way
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Arrival:
-    """How a pose on the way is passed: where, and in which trim."""
-
-    pose: Array  # (dof,)
-    trim: str | None = None  # rest, or any for a vehicle that switches at will
-
-    @property
-    def key(self) -> tuple[bytes, str | None]:
-        """Equal for equal arrivals."""
-        return self.pose.tobytes(), self.trim
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -120,7 +98,10 @@ class AlongPoses(Step):
                 ended.why = said[0], f"pose {k + 1} on the way: {said[1]}"
                 return
             ways.append(Way(via, arrivals))
-        search = _Search(found, _Legs(found, between, self.answer), ways)
+        legs = _Legs(found, between, self.answer)
+        search = _Search(found, legs, ways)
+        if search.estimated.by_words and search.is_free:
+            search = _Search(found, legs, search.improved(budget.part(IMPROVED)))
         best = search.best(budget.before((1.0 - SEARCHED) * budget.left))
         if best is not None and found.wants_more:
             best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
@@ -141,13 +122,12 @@ class Way:
     @property
     def is_sole(self) -> bool:
         """Whether there is one way to pass it, and no other."""
-        return len(self.arrivals) == 1 and not (self.via.free_heading or self.via.radius)
+        return len(self.arrivals) == 1 and not self.is_free
 
     @property
-    def around(self) -> Goal:
-        """A goal that is met wherever and however it is passed."""
-        free = self.via.free_heading
-        return Goal(pose=self.via.pose, free_heading=free, tolerance_m=self.via.radius)
+    def is_free(self) -> bool:
+        """Whether a heading or a place may be chosen."""
+        return self.via.free_heading or self.via.radius > 0.0
 
 
 @dataclass(slots=True, eq=False)
@@ -247,9 +227,11 @@ class _Search:
     arrivals: list[tuple[int, Arrival]] = field(init=False)  # all of them, with their way
     costs: Array = field(init=False)  # (A + 1, A + 1) of legs: estimates until they are planned
     bounds: Array = field(init=False)  # (n + 1, n + 1) the same between ways: nothing is cheaper
+    estimated: LegCosts = field(init=False)
 
     def __post_init__(self) -> None:
         n, middle, goals = len(self.ways), self.legs.middle, self.legs.between.goals
+        self.estimated = LegCosts(middle)
         self.arrivals = [(k, to) for k, way in enumerate(self.ways) for to in way.arrivals]
         self.numbers = {(k, to.key): a for a, (k, to) in enumerate(self.arrivals)}
         self.bounds = np.zeros((n + 1, n + 1))
@@ -257,9 +239,9 @@ class _Search:
         between = self.legs.between
         bounded = replace(between, horizon=middle.horizon) if between.has_states else middle
         for i, k in self._pairs():
-            ends = goals if k == n else (self.ways[k].around,)
-            begin = None if i == n else self.ways[i].around
-            self.bounds[i, k] = min(_set_bound(bounded, begin, end) for end in ends)
+            ends = goals if k == n else (goal_around(self.ways[k].via),)
+            begin = None if i == n else goal_around(self.ways[i].via)
+            self.bounds[i, k] = min(set_bound(bounded, begin, end) for end in ends)
         self.costs = np.full((len(self.arrivals) + 1,) * 2, np.inf)
         rows: list[list[int]] = [[] for _ in range(n)]
         for a, (k, _) in enumerate(self.arrivals):
@@ -269,7 +251,7 @@ class _Search:
         for i, k in self._pairs():
             begins = np.array([poses[a] for a in rows[i]])
             aims = [*goals] if k == n else [Goal(poses[a]) for a in rows[k]]
-            priced = _estimates(middle, begins, aims)
+            priced = self.estimated.to(begins, aims)
             if k == n:
                 priced = priced.min(axis=1, keepdims=True)
             self.costs[np.ix_(rows[i], rows[k])] = np.maximum(priced, self.bounds[i, k])
@@ -280,6 +262,57 @@ class _Search:
         for i, k in itertools.product(range(n + 1), repeat=2):
             if (k == (i + 1) % (n + 1)) if self.in_order else (i != k or n == 0):
                 yield i, k
+
+    @property
+    def is_free(self) -> bool:
+        """Whether any heading or place may be chosen."""
+        return any(way.is_free for way in self.ways)
+
+    def improved(self, budget: Budget) -> list[Way]:
+        """The ways with arrivals that cost less by estimates, in the order that seems best.
+
+        The best chain through each sector of headings at each pose is improved, cheapest first.
+        """
+        problem = self.found.problem
+        order = [k for k, _ in self._cheapest()[1]]
+        rows = [np.flatnonzero([k == number for k, _ in self.arrivals]) for number in order]
+        ahead = [self.costs[-1, rows[0]]]
+        back = [self.costs[rows[-1], -1]]
+        for one, other in itertools.pairwise(rows):
+            ahead.append((ahead[-1][:, None] + self.costs[np.ix_(one, other)]).min(axis=0))
+        for one, other in itertools.pairwise(rows[::-1]):
+            back.insert(0, (self.costs[np.ix_(other, one)] + back[0]).min(axis=1))
+        chains: dict[tuple[int, ...], float] = {}
+        for n, row in enumerate(rows):
+            through = ahead[n] + back[n]
+            headings = np.array([self.arrivals[a][1].pose[2] for a in row])
+            sectors = np.floor(headings * SECTORS / (2.0 * math.pi)).astype(int) % SECTORS
+            for sector in set(sectors.tolist()):
+                at = int(np.argmin(np.where(sectors == sector, through, np.inf)))
+                picked = [at]
+                for m in range(n, 0, -1):
+                    into = self.costs[rows[m - 1], rows[m][picked[0]]]
+                    picked.insert(0, int(np.argmin(ahead[m - 1] + into)))
+                for m in range(n, len(rows) - 1):
+                    on = self.costs[rows[m][picked[-1]], rows[m + 1]]
+                    picked.append(int(np.argmin(on + back[m + 1])))
+                chains[tuple(picked)] = float(through[at])
+        better = Improving(problem, self.estimated, order)
+        more: list[list[Arrival]] = [[] for _ in self.ways]
+        for chain in sorted(chains, key=chains.__getitem__)[:VALLEYS]:
+            poses = [self.arrivals[row[at]][1].pose for row, at in zip(rows, chain, strict=True)]
+            for k, pose in zip(order, better.chain(poses, lambda: budget.is_over), strict=True):
+                if not why_goal_blocked(problem, Goal(pose)):
+                    more[k].append(Arrival(pose))
+        return [
+            replace(
+                way,
+                arrivals=tuple({to.key: to for to in (*more[k], *way.arrivals[::THINNED])}.values())
+                if way.is_free
+                else way.arrivals,
+            )
+            for k, way in enumerate(self.ways)
+        ]
 
     @property
     def in_order(self) -> bool:
@@ -298,7 +331,7 @@ class _Search:
                 self.is_proven = best is not None
                 break
             before = self.costs.copy()
-            chain = self.driven(chosen, budget)
+            chain = self.driven(chosen, self.found.budget if best is None else budget)
             if (
                 chain is not None
                 and (best is None or chain.cost < best.cost)
@@ -468,23 +501,15 @@ class _Search:
         problem, way = self.found.problem, self.ways[best.passed[n]]
         if problem.automaton.lattice is not None or problem.automaton.translated is not None:
             return best
-        for moved, reach in _freedoms(problem, way.via):
-            here, tried = best, dict[float, Chain | None]()
-
-            def price(
-                by: float,
-                here: Chain = here,
-                moved: Callable[[Array, float], Array] = moved,
-                tried: dict[float, Chain | None] = tried,
-            ) -> float:
-                to = replace(here.arrivals[n], pose=moved(here.arrivals[n].pose, by))
-                tried[by] = self._with(here, n, to, budget)
-                return _price(tried[by])
-
-            if self.legs.is_over(budget):
-                break
-            at = golden_section(price, -reach, reach, lambda: self.legs.is_over(budget))
-            best = _cheaper(best, tried.get(at))
+        for moved, reach in freedoms(problem, way.via):
+            step = reach
+            while step > FINE * reach and not self.legs.is_over(budget):
+                here = best.arrivals[n]
+                before = best.cost
+                for by in (step, -step):
+                    to = replace(here, pose=moved(here.pose, by))
+                    best = _cheaper(best, self._with(best, n, to, budget))
+                step *= 1.0 if best.cost < before else NARROWER
         return best
 
     def with_more_time(self, chain: Chain) -> None:
@@ -524,251 +549,13 @@ class _Search:
         end = "the goal" if k == GOAL else f"pose {k + 1} on the way"
         sole = all(self.ways[i].is_sole for i in (last, k) if i != GOAL) and self.in_order
         status = result.status if sole else PlanStatus.NO_PLAN
+        if any(one.status is PlanStatus.OUT_OF_BUDGET for one in self.failed.values()):
+            status = PlanStatus.OUT_OF_BUDGET
         return status, f"from {begin} to {end}: {result.reason}"
-
-
-def arrivals_of(
-    problem: Problem, number: int
-) -> tuple[tuple[Arrival, ...], tuple[PlanStatus, str] | None]:
-    """The arrivals that stand for a pose on the way, or why there is none: a status, a sentence."""
-    via, automaton = problem.via[number], problem.automaton
-    around = Goal(via.pose, free_heading=via.free_heading, tolerance_m=via.radius)
-    if automaton.lattice is not None:
-        nodes = [one for one in nodes_within(problem, around) if max(via.off(one.pose)) <= 1e-9]
-        if not nodes:
-            said = why_off_lattice(problem, replace(around, tolerance_m=via.tolerance_m))
-            return (), (PlanStatus.NO_PLAN, _about(said or "no node of the lattice is on it"))
-        found = [Arrival(one.pose, one.trim) for one in nodes]
-    elif automaton.translated is not None:
-        found = [
-            Arrival(pose, trim)
-            for place in _places(problem, number)
-            for pose, trim in posed(automaton, place, "via", free=via.free_heading)
-        ]
-    else:
-        poses = [
-            _with_heading(place, heading)
-            for place in _places(problem, number)
-            for heading in _headings(problem, number)
-        ]
-        found = [Arrival(pose, trim) for pose in poses for trim in _trims(problem, via)]
-    blocked = [why_goal_blocked(problem, Goal(one.pose, trim=one.trim)) for one in found]
-    if all(blocked):
-        proven = len(found) == 1 and not via.radius
-        status = PlanStatus.GOAL_BLOCKED if proven else PlanStatus.NO_PLAN
-        return (), (status, _about(blocked[0]))
-    free = (one for one, why in zip(found, blocked, strict=True) if not why)
-    return tuple(free), None
-
-
-def _about(said: str) -> str:
-    """What is said of a goal, said of a pose on the way."""
-    return said.replace("at the goal ", "").replace("the goal is", "it is")
-
-
-def _places(problem: Problem, number: int) -> Iterator[Array]:
-    """Poses (dof,) at the places of a pose on the way, with the heading that is stated."""
-    via = problem.via[number]
-    places = [0, 1, *range(3, via.pose.size)]
-    if via.gate is None:
-        yield via.pose
-    else:
-        for share in (*_straight_through(problem, number), *ALONG_GATE):
-            pose = np.array(via.pose)
-            pose[places] = via.gate[0] + share * (via.gate[1] - via.gate[0])
-            yield pose
-    for k in range(AROUND if via.tolerance_m else 0):
-        angle = 2.0 * math.pi * k / AROUND
-        pose = np.array(via.pose)
-        pose[:2] += (1.0 - GAIN) * via.tolerance_m * np.array([math.cos(angle), math.sin(angle)])
-        yield pose
-
-
-def _straight_through(problem: Problem, number: int) -> Iterator[float]:
-    """The share of a gate at which the line between its neighbours crosses it."""
-    gate = problem.via[number].gate
-    ends = [problem.start, *(one.pose for one in problem.via), problem.goals[0].pose]
-    before, after = ends[number][:2], ends[number + 2][:2]
-    assert gate is not None
-    lines = np.column_stack([gate[1, :2] - gate[0, :2], before - after])
-    if problem.order == "given" and abs(np.linalg.det(lines)) > GAIN:
-        share = float(np.linalg.solve(lines, before - gate[0, :2])[0])
-        yield min(max(share, 0.0), 1.0)
-
-
-def _with_heading(pose: Array, heading: float) -> Array:
-    turned = np.array(pose)
-    turned[2] = heading
-    return turned
-
-
-def _headings(problem: Problem, number: int) -> list[float]:
-    """Headings at a pose on the way: its own, or along the lines to neighbours and all around."""
-    via = problem.via[number]
-    if not via.free_heading:
-        return [float(via.pose[2])]
-    automaton = problem.automaton
-    turns = automaton.body_velocities[:, 2].any() or any(
-        one.displacement[2] for one in automaton.maneuvers
-    )
-    if not turns:
-        return [float(problem.start[2])]
-    ends = [problem.start, *(one.pose for one in problem.via), problem.goals[0].pose]
-    before, here, after = ends[number : number + 3]
-    lines = [after - before, here - before, after - here]
-    angles = [math.atan2(line[1], line[0]) for line in lines if line[:2].any()]
-    if problem.order == "free":
-        angles = angles[:1]
-    first = angles[0] if angles else float(problem.start[2])
-    count = _headings_tried(problem)
-    angles += [first + 2.0 * math.pi * k / count for k in range(count)]
-    return list(dict.fromkeys(math.remainder(angle, 2.0 * math.pi) for angle in angles))
-
-
-def _headings_tried(problem: Problem) -> int:
-    """How many headings stand for a free one: more where a leg is estimated in a moment."""
-    if problem.has_inertia or problem.start.size != 3:
-        return HEADINGS
-    n = len(problem.via)
-    letters = len(moving_trims(problem.automaton, problem.cost).twists)
-    legs = (n + 1) * (1 if problem.order == "given" else n) * min(letters, MOST_LETTERS) ** 3
-    places = max(sum(1 for _ in _places(problem, k)) for k in range(n))
-    return int(np.clip(math.sqrt(MOST_ESTIMATES / legs) / places, HEADINGS, MOST_HEADINGS))
-
-
-def _trims(problem: Problem, via: Via) -> list[str | None]:
-    """Trims in which a pose on the way may be passed, None for rest, or for switching at will."""
-    automaton = problem.automaton
-    if not problem.has_inertia or via.stop:
-        return [None]
-    moving = [trim for trim in automaton.trims if not trim.is_rest]
-    straight = [trim for trim in moving if not trim.body_velocity[2]] or moving
-
-    def speed(trim: Trim) -> float:
-        return float(np.linalg.norm(trim.body_velocity[[0, 1, *range(3, problem.start.size)]]))
-
-    ahead = sorted((one for one in straight if one.body_velocity[0] >= 0.0), key=speed)
-    few = ahead[:: -max(1, math.ceil(len(ahead) / MOST_SPEEDS))]
-    rest: list[str | None] = [None] if automaton.rest is not None else []
-    return rest + [trim.name for trim in few]
-
-
-def _freedoms(
-    problem: Problem, via: Via
-) -> Iterator[tuple[Callable[[Array, float], Array], float]]:
-    """How a pose may be moved within what a pose on the way admits, and how far at first."""
-    places = [0, 1, *range(3, via.pose.size)]
-
-    def turned(pose: Array, by: float) -> Array:
-        return _with_heading(pose, pose[2] + by)
-
-    def along(direction: Array) -> Callable[[Array, float], Array]:
-        def shifted(pose: Array, by: float) -> Array:
-            to = np.array(pose)
-            to[places] += by * direction
-            if via.gate is not None and not via.tolerance_m:
-                way = via.gate[1] - via.gate[0]
-                share = min(1.0, max(0.0, float((to[places] - via.gate[0]) @ way / (way @ way))))
-                to[places] = via.gate[0] + share * way
-                return to
-            beyond = via.offs(to)[0]
-            off = to[places] - via.place
-            if beyond > 0.0 and via.gate is None:
-                to[places] = via.place + off * (
-                    (1.0 - GAIN) * via.tolerance_m / np.linalg.norm(off)
-                )
-            return pose if beyond > 0.0 and via.gate is not None else to
-
-        return shifted
-
-    if via.free_heading and problem.automaton.body_velocities[:, 2].any():
-        yield turned, 2.0 * math.pi / _headings_tried(problem)
-    if via.gate is not None:
-        length = float(np.linalg.norm(via.gate[1] - via.gate[0]))
-        yield along((via.gate[1] - via.gate[0]) / length), length / 2.0
-    if via.tolerance_m:
-        for direction in np.eye(len(places)):
-            yield along(direction), via.tolerance_m
-
-
-def golden_section(
-    price: Callable[[float], float], low: float, high: float, is_over: Callable[[], bool]
-) -> float:
-    """Where a function of one number is least, as far as it falls and then rises.
-
-    Examples
-    --------
-    >>> round(golden_section(lambda x: (x - 0.3) ** 2, -1.0, 1.0, lambda: False), 3)
-    0.3
-    """
-    width = FINE * (high - low)
-    one, other = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    prices = price(one), price(other)
-    while high - low > width and not is_over():
-        if prices[0] <= prices[1]:
-            high, other = other, one
-            one = high - GOLDEN * (high - low)
-            prices = price(one), prices[0]
-        else:
-            low, one = one, other
-            other = low + GOLDEN * (high - low)
-            prices = prices[1], price(other)
-    return one if prices[0] <= prices[1] else other
-
-
-def _set_bound(problem: Problem, way: Goal | None, goal: Goal) -> float:
-    """No leg costs less that begins within the tolerance of a pose, or at the start."""
-    if way is None:
-        return _least(problem, goal)
-    free = goal.free_heading or way.free_heading
-    to = replace(goal, free_heading=free, tolerance_m=goal.tolerance_m + way.tolerance_m)
-    return _least(problem.starting_at(way.pose, time=problem.start_time), to)
-
-
-def _least(problem: Problem, goal: Goal) -> float:
-    """No plan to a goal costs less, whatever its trims: by distance and turn alone."""
-    if problem.has_inertia:
-        return straight_bound(problem, (goal,))
-    return closed_bound(problem, goal)
 
 
 def _cheaper(chain: Chain, other: Chain | None) -> Chain:
     return chain if other is None or chain.cost <= other.cost else other
-
-
-def _price(chain: Chain | None) -> float:
-    return math.inf if chain is None else chain.cost
-
-
-def _estimates(problem: Problem, begins: Array, ends: Sequence[Goal]) -> Array:
-    """What legs (m, n) from poses (m, dof) to goals cost about, where nothing is in the way.
-
-    For a vehicle that switches at will in a plane, the cheapest word of three trims; else a bound.
-    """
-    exact = not any(one.free_heading or one.tolerance_m or one.tolerance_rad for one in ends)
-    if problem.has_inertia or begins.shape[1] != 3 or not exact:
-        heres = [problem.starting_at(begin, time=problem.start_time) for begin in begins]
-        return np.array([[_least(here, end) for end in ends] for here in heres])
-    library = moving_trims(problem.automaton, problem.cost)
-    few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
-    twists, rates = library.twists[few][:, :3].copy(), library.rates[few]
-    words = np.array(list(itertools.product(range(len(few)), repeat=3)), dtype=np.int64)
-    goals = np.array([one.pose for one in ends])
-    seen = (SE2(begins[:, None]).inverse() @ SE2(goals[None])).pose.reshape(-1, 3)
-    k = len(seen)
-    times = steer_batch(
-        twists,
-        np.repeat(words, k, axis=0),
-        np.zeros((len(words) * k, 2, 3)),
-        np.tile(seen, (len(words), 1)),
-        STEERED,
-    ).reshape(len(words), k, 2, 3)
-    turns = np.abs(twists[words, 2])[:, None, None]
-    times = np.where(times * turns > 2.0 * math.pi - NEARLY, 0.0, times)
-    times = np.where(times < -NEARLY, np.nan, times)
-    sums = (times * rates[words][:, None, None]).sum(axis=-1)
-    least = np.where(np.isnan(sums), np.inf, sums).min(axis=(0, 2))
-    return np.where(np.isfinite(least), least, 0.0).reshape(len(begins), len(ends))
 
 
 def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) -> dict[int, Array]:
@@ -782,7 +569,12 @@ def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) 
     masks = [(1 << k) - 1 for k in range(n)] if in_order else range((1 << n) - 1)
     for mask in reversed(masks):
         after = _following(remains, mask, of_way, stays, in_order=in_order)
-        remains[mask] = (costs[:, :-1] + after).min(axis=1)
+        last = np.flatnonzero(mask >> of_way & 1) if mask else np.array([len(of_way)])
+        coming = np.flatnonzero(after < np.inf)
+        remains[mask] = np.full(len(of_way) + 1, np.inf)
+        if coming.size:
+            sums = costs[np.ix_(last, coming)] + after[coming]
+            remains[mask][last] = sums.min(axis=1)
     return remains
 
 

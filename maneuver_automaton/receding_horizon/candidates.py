@@ -125,15 +125,15 @@ def candidate(
 ) -> StepPlan:
     """A plan at its best pace, if that is asked for, and in the order that costs most at first.
 
-    The order stays where another one drives elsewhere among obstacles, or where there
-    are maneuvers.
+    The order stays where another one drives elsewhere among obstacles or past what is on the way,
+    or where there are maneuvers.
     """
     if settings.retimed:
         paced = at_best_pace(here, plan)
         if not here.place_costs or here.cost_of(paced) <= here.cost_of(plan):
             plan = paced
     cost = here.cost_of(plan)
-    fixed = bool(here.obstacles or here.zones or any(plan.maneuvers))
+    fixed = bool(here.obstacles or here.zones or here.via or any(plan.maneuvers))
     ordered = plan if fixed else costliest_first(plan, here.rates_of(plan))
     if ordered is not plan:
         costlier = here.cost_of(ordered)

@@ -15,6 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING, with_samples_at
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, AnyShape, as_obstacles
+from maneuver_automaton.planning.on_the_way import Passed, going_on, still_ahead
 from maneuver_automaton.primitives.on_the_spot import state_of
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.receding_horizon.at_will import AmongObstacles, InFreeSpace, as_it_stands
@@ -31,6 +32,7 @@ from maneuver_automaton.receding_horizon.log import (
     Origin,
     Step,
     Violation,
+    first_part,
 )
 from maneuver_automaton.receding_horizon.over_maneuvers import (
     OverManeuvers,
@@ -65,6 +67,10 @@ class RecedingHorizon:
     that is not free, and followed by a free motion: a plan to the goal and time to stand there, or
     a fail-safe trajectory, which waits, evades or brakes. Where there is none, the motion that
     collides last is driven, and flagged.
+
+    What was passed on the way stays passed, and of a stay that something interrupts the rest is
+    made up for. Plans lead through what is left: the rest of the last one, and where that is not
+    to be driven as it is, one of the planner.
 
     Source: the paper, Algorithm 14, Theorem 17, Sec. 4.2 and 4.3.
 
@@ -172,6 +178,7 @@ class RecedingHorizon:
         total = problem.horizon.time
         # a fixed time that no rest fills cannot be prolonged: it ends then [s]
         self.arrival = None if total is None or settings.pad else problem.start_time + total
+        self.ahead = problem  # with what is still to be passed on the way
         self.promises = promises(problem, step=settings.step)
         self.most_steps: int | None = None
         if last is not None and not settings.continuous:  # the bound counts from the first step
@@ -187,6 +194,7 @@ class RecedingHorizon:
         *,
         elapsed: float | None = None,
         obstacles: AnyObstacle | AnyShape | Sequence[AnyObstacle | AnyShape] | None = None,
+        passed: Sequence[Passed] | None = None,
     ) -> tuple[Array | None, Step]:
         """The control to apply from `measured_state`, and the log of the decision.
 
@@ -202,6 +210,9 @@ class RecedingHorizon:
         obstacles : as the obstacles of a `Problem`, optional
             The obstacles from now on, with their predicted motions in the time of the world; if
             omitted, those seen last, at first those of the problem.
+        passed : sequence of Passed, optional
+            What was passed on the way by now; if omitted, what the last plan passed, as it was
+            driven steadily away from it to where the vehicle was measured.
 
         Returns
         -------
@@ -234,16 +245,20 @@ class RecedingHorizon:
         budget = Budget.from_now(self.settings.time_limit)
         last = self.last
         elapsed = None if elapsed is None else as_number("elapsed", elapsed)
-        passed = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
-        if not 0.0 <= passed < math.inf:
-            raise ValueError(f"elapsed must be at least 0, got {passed} s")
+        driven = 0.0 if last is None else (last.applied if elapsed is None else elapsed)
+        if not 0.0 <= driven < math.inf:
+            raise ValueError(f"elapsed must be at least 0, got {driven} s")
         if last is not None:
-            last = self._cut(last, passed)
-        at = self.problem.start_time if last is None else last.time + passed
+            last = self._cut(last, driven)
+        at = self.problem.start_time if last is None else last.time + driven
+        if passed is None and last is not None and self.problem.via:
+            motion = first_part(last.plan, driven)
+            passed = going_on(self.problem, last.passed, motion, ended=pose)
+        self._look_ahead(passed or ())
         automaton = self.problem.automaton
         known = None if state is None else state_of(automaton.model, state, "measured")
         trim = automaton.trim_names[automaton.rest or 0]  # where a plan is held, it says which
-        here = self.problem.starting_at(
+        here = self.ahead.starting_at(
             pose,
             time=at,
             horizon=self._horizon(at),
@@ -251,15 +266,24 @@ class RecedingHorizon:
             state=known if last is None else None,
         )
         now, search = _started(
-            self.settings, here, last, passed=passed, budget=budget, changed=changed, state=known
+            self.settings, here, last, passed=driven, budget=budget, changed=changed, state=known
         )
         if self.proven is not None:
             now.bound = self._known(now)
-        self.last = self._logged(search.decide(), search, now)
+        step = self._logged(search.decide(), search, now)
+        self.last = replace(step, passed=tuple(passed)) if passed else step
         control = self.last.control
         if control is None and self.settings.pad is not None:
             control = self.settings.pad.control
         return control, self.last
+
+    def _look_ahead(self, passed: Sequence[Passed]) -> None:
+        """Have the problem ahead be the one without what was passed on the way."""
+        via = still_ahead(self.problem, passed)
+        if via != self.ahead.via or self.ahead.obstacles is not self.problem.obstacles:
+            self.ahead = replace(self.problem, via=via)
+            if not via:
+                load_search(self.ahead)
 
     def _known(self, now: Situation) -> float:
         """What steps before have proven of this one."""
@@ -298,7 +322,8 @@ class RecedingHorizon:
         same = is_rest_of(plan, now.rest)
         decision = _decision(chosen, now, same=same)
         bound = self._bound(chosen, search, now)
-        value = chosen.cost if decision.leads or search.knows_all else bound
+        known = decision.leads or (search.knows_all and not here.via)
+        value = chosen.cost if known else bound
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
         step = Step(
             time=here.start_time,

@@ -73,8 +73,8 @@ class Promises:
 def promises(problem: Problem, *, step: float) -> Promises:
     """The constants of a problem whose loop closes every `step` seconds.
 
-    Along a maneuver a vehicle may stand nearly still, and a zone may slow it down, so that no least
-    rate is promised then.
+    Along a maneuver a vehicle may stand nearly still, it may stay on its way, and a zone may slow
+    it down, so that no least rate is promised then.
 
     Examples
     --------
@@ -90,7 +90,8 @@ def promises(problem: Problem, *, step: float) -> Promises:
     moving = problem.automaton.body_velocities.any(axis=1)
     rates = problem.rates
     rest = rest_rate(problem) or 0.0
-    steady = switches_at_will(problem) and not problem.zones
+    stays = any(one.stay_s for one in problem.via)
+    steady = switches_at_will(problem) and not problem.zones and not stays
     least = float(rates[moving].min()) - rest if steady and moving.any() else 0.0
     cost = terms_of(problem.cost)
     fixed = problem.horizon.time is not None

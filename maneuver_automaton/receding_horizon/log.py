@@ -14,6 +14,7 @@ from maneuver_automaton._display import Played
 from maneuver_automaton.audit import Audit
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import head_of
+from maneuver_automaton.planning.on_the_way import Passed
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Problem
 
@@ -101,6 +102,7 @@ class Step:
     free_until: float | None = None  # [s] no contact is predicted until then; None: nothing there
     is_sole: bool = False  # no other plan was found that costs as much
     clearance_m: float | None = None  # least one while it was driven, by the audit
+    passed: tuple[Passed, ...] = ()  # on the way, before it; by its end, once it was driven
 
     __repr__ = brief
 
@@ -164,6 +166,11 @@ class ClosedLoop(Played):
         """Least distance to an obstacle that the audit measured [m]; None if it measured none."""
         known = [step.clearance_m for step in self.steps if step.clearance_m is not None]
         return min(known, default=None)
+
+    @property
+    def passed(self) -> tuple[Passed, ...]:
+        """What was passed on the way, or where the vehicle has begun to stay."""
+        return self.steps[-1].passed if self.steps else ()
 
     @property
     def collisions(self) -> Iterator[tuple[int, Violation]]:

@@ -15,9 +15,7 @@ from dataclasses import replace
 from maneuver_automaton.audit import closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import head_of
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.planning import plan as planned
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
 from maneuver_automaton.primitives import Trim
@@ -26,9 +24,9 @@ from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, bo
 from maneuver_automaton.receding_horizon.failsafe import FailSafe, Mitigation, settled
 from maneuver_automaton.receding_horizon.log import Decision, Origin
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, rested
-from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
-from maneuver_automaton.receding_horizon.step_search import LATE, StepSearch
+from maneuver_automaton.receding_horizon.step_search import StepSearch
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.refinement.incumbent_words import incumbent_words
 from maneuver_automaton.search.choose import search_insertion
@@ -50,7 +48,6 @@ class OverManeuvers(StepSearch):
     def __init__(self, now: Situation) -> None:
         super().__init__(now)
         self.anew = now.here.moves or now.changed  # obstacles are not where they were
-        self.reason = ""
 
     def is_safe(self, plan: Plan) -> bool:
         """As of every step; the rest of the last plan, driven as it said, was checked before."""
@@ -98,12 +95,6 @@ class OverManeuvers(StepSearch):
             return None
         return whole
 
-    @property
-    def _for_plans(self) -> Budget:
-        """The budget to search a plan in: where something moves, a part is for a fail-safe one."""
-        late = 1.0 - LATE if self.here.moves else 0.0
-        return self.now.budget.before(late * self.settings.time_limit) if late else self.now.budget
-
     def cheaper(self, kept: StepPlan | None) -> list[StepPlan]:
         """The cheapest safe word for each goal, if it costs less than the kept plan.
 
@@ -125,12 +116,12 @@ class OverManeuvers(StepSearch):
         guarded = bool(here.obstacles or here.zones) or bounded(here)
         found: list[StepPlan] = []
         for index, goal in enumerate(problem.goals):
-            if self._for_plans.is_over:
+            if self.for_plans.is_over:
                 break
             words = search_insertion(
                 problem,
                 goal,
-                budget=self._for_plans.part(share),
+                budget=self.for_plans.part(share),
                 alternatives=OTHERS if guarded else 0,
                 upper_bound=upper - committed,
             )
@@ -160,10 +151,10 @@ class OverManeuvers(StepSearch):
         Where something moves the planner comes first: it knows how to stop and steer as well.
         """
         if self.here.moves:
-            return self._planned(PLANNER_SHARE) or self._on_lattice()
+            return self.planned_anew(PLANNER_SHARE) or self._on_lattice()
         first = self.now.last is None
         found = self._on_lattice() if self.anew or not first else None
-        return self._planned() if found is None else found
+        return self.planned_anew() if found is None else found
 
     def _on_lattice(self) -> StepPlan | None:
         problem = self.onward()
@@ -183,7 +174,7 @@ class OverManeuvers(StepSearch):
         query = lattice_query(problem, goals)
         best: StepPlan | None = None
         for incumbent in incumbent_words(
-            query, budget=replace(self._for_plans, expansions=problem.search.max_expansions)
+            query, budget=replace(self.for_plans, expansions=problem.search.max_expansions)
         ):
             if incumbent.word is None:
                 continue
@@ -198,26 +189,6 @@ class OverManeuvers(StepSearch):
             if first and best is not None:
                 break
         return best
-
-    def _planned(self, share: float = 1.0) -> StepPlan | None:
-        """The plan of a planner, from the end of the committed part on, in a share of the time."""
-        now, limit, problem = self.now, self.now.longest, self.onward()
-        if problem is None:
-            return None
-        if self.here.moves:  # a motion in one piece could not be left where something comes
-            problem = replace(problem, search=replace(problem.search, polish=False))
-        result = planned(problem, time_limit=max(share * self._for_plans.left, 1e-3))
-        if result.plan is None or result.goal_index is None:
-            self.reason = f": {result.reason}"
-            return None
-        plan, index = now.whole(result.plan), result.goal_index
-        if limit is not None and plan.duration > limit * (1.0 + EXACT):
-            self.reason = ": it takes too long"
-        elif self.here.moves and not self.is_safe(plan):
-            self.reason = ": the goal does not stay free after arrival"
-        else:
-            return now.candidate(now.padded(plan), index, Origin.SEARCHED)
-        return None
 
     def why_none(self) -> str:
         """Why there is no plan to the goal."""

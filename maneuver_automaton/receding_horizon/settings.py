@@ -68,11 +68,6 @@ class Settings:
                 f"receding horizon: step is {self.step:g} s, need at most the horizon, "
                 f"{horizon:g} s"
             )
-        if problem.via:
-            raise ValueError(
-                "receding horizon: there are poses on the way, which the loop cannot promise to "
-                "pass once something disturbs it; need none, one loop to each of them in turn"
-            )
         if self.continuous:
             self._check_continuous(problem)
 

@@ -21,6 +21,7 @@ from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.on_the_way import Passed, going_on, still_ahead
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.candidates import within
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon
@@ -245,6 +246,7 @@ def simulate(
             f"disturbance: reduced_state has {len(upset.reduced_state)} numbers, need {len(names)} "
             f"for the {problem.automaton.model.name}: {', '.join(names) or 'it has no such state'}"
         )
+    _check_met(problem, upset)
     begin = 0 if last is None else last.number + 1
     random = itertools.islice(draws(upset, problem.start.size), begin, None)  # after those used
     where = np.array(problem.start)
@@ -255,8 +257,10 @@ def simulate(
         measured=where if last is None or last.measured is None else last.measured,
         poses=[where],
         times=[problem.start_time if last is None else last.time + last.applied],
-        inside=[any(within(where, goal) for goal in problem.goals)],
+        inside=[],
+        passed=() if last is None else last.passed,
     )
+    track.inside.append(track.is_inside)
     stops = controller.arrival is None and at_will  # where it likes
     arrived = track.inside[-1] and (
         _arrives(last, stops=stops)
@@ -270,7 +274,9 @@ def simulate(
             draw = next(random)
             measured = track.poses[-1] + draw.measurement
             there = None if obstacles is None else obstacles(number)
-            _, now = controller.step(track.seen(measured), track.state, obstacles=there)
+            _, now = controller.step(
+                track.seen(measured), track.state, obstacles=there, passed=track.passed
+            )
             if stopped():  # the search of this step was cut short: it never was
                 controller.last = track.log[-1] if track.log else last
                 break
@@ -297,11 +303,18 @@ class _Track:
     measured: Array  # at the step before
     poses: list[Array]
     times: list[float]
-    inside: list[bool]  # whether a pose is within a goal's tolerance
+    inside: list[bool]  # whether a pose is within a goal's tolerance, with nothing left on the way
+    passed: tuple[Passed, ...]  # on the way, and the stays begun there
     state: Array | None = None  # the reduced state, where it is disturbed
     log: list[Step] = field(default_factory=list)
     driven: list[Plan] = field(default_factory=list)
     audits: list[Audit] = field(default_factory=list)
+
+    @property
+    def is_inside(self) -> bool:
+        """Whether the vehicle has arrived, with nothing left on the way."""
+        near = any(within(self.poses[-1], goal) for goal in self.problem.goals)
+        return near and not still_ahead(self.problem, self.passed)
 
     def seen(self, measured: Array) -> Array:
         """The pose for the controller: the one measured, or the one predicted from the last."""
@@ -321,6 +334,8 @@ class _Track:
             same = self.driven[-1] is piece
             real = self.audits[-1] if same else _audited(self.problem, self.driven[-1])
             self.log[-1] = _judged(now, real)
+        self.passed = going_on(self.problem, self.passed, self.driven[-1])
+        self.log[-1] = replace(self.log[-1], passed=self.passed)
 
     def arrive(self, draw: Draw) -> None:
         """Note pose and state after the last step: the end of its piece, with noise and pushes."""
@@ -329,7 +344,21 @@ class _Track:
         self.state = shifted_state(self.driven[-1], draw.state, self.problem.automaton.model)
         self.poses.append(where)
         self.times.append(now.time + now.applied)
-        self.inside.append(any(within(where, goal) for goal in self.problem.goals))
+        self.inside.append(self.is_inside)
+
+
+def _check_met(problem: Problem, upset: Disturbance) -> None:
+    """Raise ValueError where a disturbance lets no vehicle meet what is on the way."""
+    blurred = upset.measured_position_m or upset.measured_heading_rad or upset.twist_scale
+    late = upset.delay and (upset.position_m or upset.heading_rad or upset.pushes)
+    for k, via in enumerate(problem.via, 1):
+        if (blurred or late) and not (
+            via.free_heading and (via.tolerance_m or via.gate is not None)
+        ):
+            raise ValueError(
+                f"via {k}: a vehicle that is measured late or wrongly, or differs from its model, "
+                "meets no pose exactly; need free_heading, and tolerance_m above 0 or a gate"
+            )
 
 
 def _closed_loop(
@@ -351,12 +380,19 @@ def _closed_loop(
         elif applied:  # the value of the step that would have come next
             controller.last = applied[-1]
             then = applied[-1].number + 1
-            now = controller.step(track.poses[-1], track.state, obstacles=seen and seen(then))[1]
+            now = controller.step(
+                track.poses[-1],
+                track.state,
+                obstacles=seen and seen(then),
+                passed=track.passed,
+            )[1]
             value = now.value
             controller.last = applied[-1]
         if not reached:
             status = "steps_spent"
             reason = f"the goal is not reached after {len(applied)} steps"
+            left = len(still_ahead(track.problem, track.passed))
+            reason += f", with {left} of {len(track.problem.via)} left on the way" if left else ""
             reason += ", when the loop was interrupted" if stopped() else ""
     there = settled(replace(controller.problem, start_time=track.times[-1]))
     blocked = [] if reached else [why_goal_blocked(there, goal) for goal in there.goals]

@@ -20,8 +20,14 @@ from maneuver_automaton.automaton.cutting import (
 )
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.from_state import leg_from
+from maneuver_automaton.planning.on_the_way import (
+    going_on,
+    passed_on_the_way,
+    still_ahead,
+    what_is_missed,
+)
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Problem, apart
+from maneuver_automaton.problem import Goal, Problem, apart
 from maneuver_automaton.receding_horizon.candidates import (
     StepPlan,
     between_trims,
@@ -31,6 +37,7 @@ from maneuver_automaton.receding_horizon.candidates import (
 )
 from maneuver_automaton.receding_horizon.log import Guarantee, Origin, Step, Violation
 from maneuver_automaton.receding_horizon.rest_of_plan import (
+    followed_by,
     missed,
     moves_on,
     reanchored,
@@ -147,18 +154,19 @@ class Situation:
     @property
     def onward(self) -> Problem | None:
         """The problem from the end of the committed part; None if no time is left then."""
-        head, horizon = self.head, self.here.horizon
+        head, horizon, here = self.head, self.here.horizon, self.here
         if head is None:
-            return self.here
+            return here
         total = None if horizon.time is None else horizon.time - self.busy
         longest = None if horizon.max_time is None else horizon.max_time - self.busy
         if any(left is not None and left <= NOTHING for left in (total, longest)):
             return None
         return replace(
-            self.here,
+            here,
             start=head.end,
-            start_time=self.here.start_time + self.busy,
+            start_time=here.start_time + self.busy,
             horizon=replace(horizon, time=total, max_time=longest),
+            via=still_ahead(here, going_on(here, (), head)),
         )
 
     def whole(self, plan: Plan) -> Plan:
@@ -181,6 +189,9 @@ class Situation:
                 f"receding horizon: first takes {first.duration:g} s, need at most {limit:g} s"
             )
         plan = self.padded(replace(first, start=here.start, start_time=here.start_time))
+        said = what_is_missed(here, plan)
+        if said:
+            raise ValueError(f"receding horizon: first: {said}")
         for index, goal in enumerate(here.goals):
             if missed(plan, goal) <= EXACT * self.size:
                 return self.candidate(plan, index, Origin.FIRST)
@@ -247,8 +258,23 @@ class Situation:
                     yield again, Origin.REANCHORED
             yield self.rest, Origin.SHIFTED
             return
-        for plan in reanchored(here, self.planned(), goal, pad=pad, under_way=under_way):
-            yield plan, Origin.REANCHORED
+        known, then = self._until_next(self.planned())
+        aim = goal if then is None else Goal(then.start, trim=then.trims[0].name)
+        for plan in reanchored(here, known, aim, pad=pad, under_way=under_way):
+            yield plan if then is None else followed_by(plan, then), Origin.REANCHORED
+
+    @property
+    def after_next(self) -> Plan | None:
+        """The last plan after the next pose on the way; None if it leads past none."""
+        return self._until_next(self.planned())[1]
+
+    def _until_next(self, plan: Plan) -> tuple[Plan, Plan | None]:
+        """A plan to the next pose on the way that it passes, and its rest; None if it is whole."""
+        ahead = [one.time - plan.start_time for one in passed_on_the_way(self.here, plan)]
+        if not ahead or committed(plan, ahead[0]) > NOTHING:
+            return plan, None
+        then = tail_of(plan, ahead[0])
+        return (head_of(plan, ahead[0]), then) if then.trims else (plan, None)
 
     def best(self, kept: StepPlan | None, found: Iterable[StepPlan]) -> StepPlan | None:
         """The cheapest; of equal ones, that which costs most at first; of these, the known word."""

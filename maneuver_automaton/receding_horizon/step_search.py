@@ -13,8 +13,11 @@ from dataclasses import replace
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import committed
+from maneuver_automaton.budget import Budget
+from maneuver_automaton.planning import plan as planned
+from maneuver_automaton.planning.on_the_way import goal_around, what_is_missed
 from maneuver_automaton.planning.tracking import free_until
-from maneuver_automaton.problem import Horizon, Problem, moves
+from maneuver_automaton.problem import Goal, Horizon, Problem, moves
 from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, holding, within
 from maneuver_automaton.receding_horizon.failsafe import (
     FailSafe,
@@ -55,6 +58,7 @@ class StepSearch:
         self.free_until = self.until if now.here.moves else None
         self.unsafe: list[Plan] = []  # free plans that end where the vehicle cannot stay
         self.tried: list[Plan] = []  # motions that are not free for long enough
+        self.reason = ""  # why a planner finds nothing
 
     # --- what a kind says ---
 
@@ -102,6 +106,61 @@ class StepSearch:
         """No plan to any goal costs less."""
         return min(closed_bound(self.here, goal) for goal in self.here.goals)
 
+    def planned_anew(
+        self, share: float = 1.0, *, improve: bool = True, then: Plan | None = None
+    ) -> StepPlan | None:
+        """The plan of a planner, from the end of the committed part on, in a share of the time.
+
+        It leads to a goal, or to where a plan begins that leads on from there.
+        """
+        now, limit, problem = self.now, self.now.longest, self.onward()
+        if problem is None:
+            return None
+        if then is not None:
+            trim = then.trims[0].name if self.here.has_inertia else None
+            problem = replace(problem, via=(), goals=(Goal(then.start, trim=trim),))
+        search = replace(problem.search, improve=improve and problem.search.improve)
+        if self.here.moves:  # a motion in one piece could not be left where something comes
+            search = replace(search, polish=False)
+        problem = replace(problem, search=search)
+        result = planned(problem, time_limit=max(share * self.for_plans.left, 1e-3))
+        if result.plan is None or result.goal_index is None:
+            self.reason = f": {result.reason}"
+            return None
+        plan, index = now.whole(result.plan), result.goal_index
+        if then is not None and now.last is not None:
+            plan, index = followed_by(plan, then), now.last.goal_index
+        if limit is not None and plan.duration > limit * (1.0 + EXACT):
+            self.reason = ": it takes too long"
+        elif (self.here.moves or self.here.via) and not self.is_safe(plan):
+            self.reason = ": the goal does not stay free after arrival"
+        else:
+            return now.candidate(now.padded(plan), index, Origin.SEARCHED)
+        return None
+
+    @property
+    def for_plans(self) -> Budget:
+        """The budget to search a plan in: where something moves, a part is for a fail-safe one."""
+        late = 1.0 - LATE if self.here.moves else 0.0
+        return self.now.budget.before(late * self.settings.time_limit) if late else self.now.budget
+
+    def on_the_way(self, kept: StepPlan | None) -> list[StepPlan]:
+        """The plan of a planner, which alone knows what is passed on the way.
+
+        The rest of the last plan is followed as long as it is driven as planned, and nothing moves;
+        if it is lost, that after the next pose on the way.
+        """
+        followed = kept is not None and not (self.now.off_plan or self.now.changed)
+        if followed and not self.here.moves:
+            return []
+        then = self.now.after_next
+        found = None
+        if kept is None and then is not None:
+            found = self.planned_anew(0.5, improve=False, then=then)
+        if found is None:
+            found = self.planned_anew(improve=kept is None)
+        return [] if found is None else [found]
+
     # --- the decision ---
 
     def decide(self) -> StepPlan:
@@ -122,11 +181,12 @@ class StepSearch:
         kept = self._kept()
         gap = now.settings.gap
         proven = gap is not None and kept is not None and kept.cost - now.bound <= gap * kept.cost
-        found = [] if proven else self.cheaper(kept)
+        passes = bool(now.here.via)
+        found = [] if proven else self.on_the_way(kept) if passes else self.cheaper(kept)
         if now.settings.pieces:
             better = now.between_trims(kept, found)
             found = [*found, *(one for one in better if self.is_safe(one.plan))]
-        best = now.best(kept, found) or self.otherwise()
+        best = now.best(kept, found) or (None if passes else self.otherwise())
         if best is None:
             return self._without_plan()
         limit, lasting = now.longest, best.plan.duration
@@ -140,7 +200,7 @@ class StepSearch:
 
     def is_safe(self, plan: Plan) -> bool:
         """Whether a plan stays inside the bounds, is free, and can be followed by a free motion."""
-        if not allowed(self.here, plan):
+        if not allowed(self.here, plan) or what_is_missed(self.here, plan):
             return False
         if self.may_end(plan):
             return True
@@ -158,6 +218,8 @@ class StepSearch:
     def _there(self) -> StepPlan | None:
         """At the goal, or within it if that is to be held: rest, if that is safe."""
         now, here = self.now, self.here
+        if here.via:
+            return None
         goals = here.goals if now.may_rest else ()
         exact = (n for n, goal in enumerate(goals) if max(goal.off(here.start)) <= EXACT)
         index = next(exact, None)
@@ -199,7 +261,8 @@ class StepSearch:
     def _without_plan(self) -> StepPlan:
         now = self.now
         if not now.here.moves or (now.last is not None and now.last.decision.leads):
-            now.flag(Guarantee.FEASIBILITY, self.why_none())
+            said = f"no plan leads through what is on the way{self.reason}"
+            now.flag(Guarantee.FEASIBILITY, said if now.here.via else self.why_none())
         for plan, decision in self.fail_safe():
             return self._known_free(self._leading_nowhere(plan, decision))
         least = self.mitigation()
@@ -238,7 +301,11 @@ class StepSearch:
             return
         static = tuple(one for one in onward.obstacles if not moves(one))
         anyhow = Horizon(max_trims=onward.horizon.max_trims, min_coast=onward.horizon.min_coast)
-        plan = self.heedless(replace(onward, obstacles=static, horizon=anyhow))
+        onward = replace(onward, obstacles=static, horizon=anyhow)
+        if onward.via:  # what is to be passed next comes before the goal
+            next_ones = onward.via[:1] if onward.order == "given" else onward.via
+            onward = replace(onward, via=(), goals=tuple(map(goal_around, next_ones)))
+        plan = self.heedless(onward)
         if plan is not None:
             yield plan
 

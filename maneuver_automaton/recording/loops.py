@@ -11,6 +11,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.polishing import left_out
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee
 from maneuver_automaton.receding_horizon.statistics import Statistics
+from maneuver_automaton.recording.plans import passed_on_the_way
 from maneuver_automaton.recording.values import (
     Curve,
     Event,
@@ -82,6 +83,7 @@ def _facts(loop: ClosedLoop) -> list[Fact]:
             value=f"{count}, {replanned} replanned",
             more="" if bound is None else f" (the paper's bound: {bound})",
         ),
+        *passed_on_the_way([one for one in loop.passed if not one.stay_left]),
         Fact(label="guarantees", value=_guarantees(loop, count - disturbed)),
     ]
     if disturbed:

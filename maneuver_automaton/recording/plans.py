@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model
 from maneuver_automaton.planning import PlanResult
+from maneuver_automaton.planning.on_the_way import Passed
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.recording.values import (
     Fact,
@@ -141,16 +142,16 @@ def _facts(result: PlanResult) -> list[Fact]:
             margin=result.problem.margin,
             error=None if error is None else (error.position_m, error.heading_rad),
         ),
-        *_passed(result),
+        *passed_on_the_way(result.via),
         Fact(label="turning points", value=turns, heads=False),
         *effort_facts(result.timing_s, result.counts),
         Fact(label="notes", value="; ".join(result.notes), heads=False),
     ]
 
 
-def _passed(result: PlanResult) -> list[Fact]:
+def passed_on_the_way(passed: Sequence[Passed]) -> list[Fact]:
     """When each pose on the way is passed."""
-    told = ", ".join(f"{one.number} at {one.time:.4g} s" for one in result.via)
+    told = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed)
     return [Fact(label="on the way", value=told, heads=False)] if told else []
 
 

@@ -177,10 +177,6 @@ def test_a_plan_that_misses_is_refused():
             lambda: ma.FleetProblem([ma.Problem(ROBOT, START, GOAL, via=[START])]),
             "has poses on its way",
         ),
-        (
-            lambda: ma.RecedingHorizon(ma.Problem(ROBOT, START, GOAL, via=[START]), step=1),
-            "there are poses on the way",
-        ),
     ],
 )
 def test_what_is_wrong_is_told(make, said):
