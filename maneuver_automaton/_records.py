@@ -4,6 +4,9 @@ numba hands over a named tuple field by field: for a scene and a library some fi
 every call, each of them an instruction for LLVM, on both sides. Records of this package that hold
 arrays lie in memory instead, nested ones within those that hold them, and a call takes one pointer.
 Nobody writes to a record once it is made, so that whoever reads one may keep what it read.
+
+No references are counted to what a record by its address holds. One that kernels make of arrays of
+their own says ``by_value = True`` in its class, and is handed over as numba does.
 """
 
 from __future__ import annotations
@@ -33,6 +36,7 @@ def is_record(kind: types.Type) -> bool:
     return (
         isinstance(kind, types.BaseNamedTuple)
         and kind.instance_class.__module__.startswith(f"{__package__}.")
+        and not getattr(kind.instance_class, "by_value", False)
         and any(isinstance(one, types.Array) or is_record(one) for one in kind)
     )
 
@@ -146,7 +150,8 @@ def hand_over_by_address() -> None:
     for kind, usual in ((types.NamedTuple, TupleModel), (types.NamedUniTuple, UniTupleModel)):
         default_manager.register(kind, functools.partial(_model, usual))
     context = cpu_target.target_context
-    context.make_tuple = functools.partial(_made, context.make_tuple)
+    contexts = type(context)
+    contexts.make_tuple = functools.partialmethod(_made, contexts.make_tuple)
     context.mangler = _mangled
 
 
@@ -154,11 +159,14 @@ def _model(usual: type[DataModel], manager: Any, kind: types.Type) -> DataModel:
     return (RecordModel if is_record(kind) else usual)(manager, kind)
 
 
-def _made(usual: Any, builder: Any, kind: types.Type, values: Sequence[Any]) -> Any:
-    model = default_manager.lookup(kind)
-    if isinstance(model, RecordModel):
-        return model.made(builder, values)
-    return usual(builder, kind, values)
+def _made(context: Any, usual: Any, builder: Any, kind: types.Type, values: Sequence[Any]) -> Any:
+    model = context.data_model_manager[kind]
+    if not isinstance(model, RecordModel):
+        return usual(context, builder, kind, values)
+    if context.enable_nrt:
+        name = kind.instance_class.__qualname__
+        raise TypeError(f"{name}: made where references are counted: say by_value = True in it")
+    return model.made(builder, values)
 
 
 def _mangled(name: str, args: Sequence[Any], *, abi_tags: Any = (), uid: Any = None) -> str:
