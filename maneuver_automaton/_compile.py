@@ -31,6 +31,7 @@ class CompiledLater:
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
+        self.is_shared = getattr(make, "func", None) is _shared  # by the kernels that call it
         self._function = function
         self._make = make
 
