@@ -23,6 +23,7 @@ class CompiledLater:
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
+        self.is_shared = getattr(make, "func", None) is _shared  # by the kernels that call it
         self._function = function
         self._make = make
 
@@ -84,10 +85,15 @@ def bare_inner_kernel(function: Kernel) -> Kernel:
 
 
 def shared_kernel(function: Kernel) -> Kernel:
-    """A `bare_inner_kernel` that is compiled once, and called where it lies by those that call it.
+    """An `inner_kernel` that is compiled once, and called where it lies by those that call it.
 
-    For what many kernels need and takes long enough that a call counts for nothing.
+    For what many kernels need, and what takes long enough that a call counts for nothing.
     """
+    return _later(function, _shared, {})
+
+
+def bare_shared_kernel(function: Kernel) -> Kernel:
+    """A `shared_kernel` that makes no array, and so counts no references."""
     return _later(function, _shared, NO_COUNTS)
 
 

@@ -1,6 +1,7 @@
 """Compile every listed kernel in all cores: when the package is installed, or when one is missing.
 
 Each process is handed one kernel after the other, neighbours in the list: those share functions.
+What all share, and is compiled once, comes first.
 """
 
 from __future__ import annotations
@@ -38,9 +39,13 @@ def compile_kernels(
     *, jobs: int | None = None, report: Report | None = None, settings: dict[str, str] | None = None
 ) -> list[str]:
     """Compile what is not compiled yet, in several processes; what failed, and why."""
-    from maneuver_automaton._kernel_list import listed
+    from maneuver_automaton._kernel_list import kernel_named, listed
 
-    names = sorted(listed(), key=lambda name: (not any(one in name for one in FIRST), name))
+    def place(name: str) -> tuple[bool, bool, str]:
+        is_shared = getattr(kernel_named(name), "is_shared", False)
+        return not is_shared, not any(one in name for one in FIRST), name
+
+    names = sorted(listed(), key=place)
     waiting, failed, done = deque(names), list[str](), list[str]()
     workers = [_worker(settings or {}) for _ in range(min(jobs or affordable(), len(names)))]
 

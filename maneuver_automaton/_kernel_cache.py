@@ -24,7 +24,7 @@ from numba.core.types.containers import BaseTuple
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
 from maneuver_automaton._compile_all import compile_missing, processors
 from maneuver_automaton._kernel_folders import shipped_folder
-from maneuver_automaton._kernel_list import kernel_named
+from maneuver_automaton._kernel_list import kernel_named, listed
 
 ENDING = ".nbc"
 OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
@@ -95,7 +95,7 @@ class KernelCache:
             return
         path = self.folder / self._file(signature, compiled.codegen.magic_tuple())
         try:
-            notes = {"shares": [], "stated": None}
+            notes: dict[str, Any] = {"shares": [], "stated": None}
             notes |= {name: getattr(compiled.library, name, it) for name, it in notes.items()}
             write_checked(path, dumps((signature, notes, compiled._reduce())))
         except OSError as error:
@@ -109,8 +109,6 @@ class KernelCache:
 
 
 def _is_listed(name: str, signature: Any) -> bool:
-    from maneuver_automaton._kernel_list import listed
-
     return tuple(signature) in listed().get(name, ())
 
 

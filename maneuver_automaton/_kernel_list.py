@@ -17,6 +17,7 @@ from typing import Any
 
 FILE = Path(__file__).with_name("kernels.json")
 ARRAY = re.compile(r"(\w+)\[(\d+)([CFA])(, read only)?\]")
+NUMBER = re.compile(r"-?\d+")  # that a kernel is handed as it stands
 LITERALS = {"True": True, "False": False}
 
 USES = {  # modules of kernels, by what calls them
@@ -138,7 +139,8 @@ def stated(kind: Any) -> Stated:
     if isinstance(kind, types.Array) and kind.aligned:
         held = "" if kind.mutable else ", read only"
         return f"{kind.dtype}[{kind.ndim}{kind.layout}{held}]"
-    name = str(kind.literal_value) if isinstance(kind, BooleanLiteral) else str(kind)
+    literal = isinstance(kind, BooleanLiteral | types.IntegerLiteral)
+    name = str(kind.literal_value) if literal else str(kind)
     if type_of(name) != kind:
         raise ValueError(f"no kernel that is compiled ahead takes {kind}")
     return name
@@ -159,6 +161,8 @@ def type_of(name: Stated) -> Any:
         return BaseTuple.from_types(tuple(map(type_of, name)))
     if name in LITERALS:
         return BooleanLiteral(LITERALS[name])
+    if NUMBER.fullmatch(name):
+        return types.literal(int(name))
     if found := ARRAY.fullmatch(name):
         layout: Any
         dtype, axes, layout, held = found.groups()

@@ -10,9 +10,10 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Iterable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numba
+import numpy as np
 from llvmlite.binding import Linkage, parse_assembly
 from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
@@ -25,7 +26,6 @@ from maneuver_automaton._records import hand_over_by_address
 
 CALLED = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object, ctypes.py_object, ctypes.c_void_p)
 
-hand_over_by_address()
 NAMES_ONLY = "maneuver_automaton.names_only"  # marks a module that defines no more than names
 
 
@@ -212,27 +212,42 @@ class SharedCompiler(LinkedCompiler):
 
 @functools.cache
 def _fits() -> bool:
-    """Whether two functions of a line, one calling the other, are compiled and kept right."""
+    """Whether functions of a line, one calling the other, are compiled and kept right."""
+    hand_over_by_address()
 
     class Linked(LinkingCompiler):
         lowering = LinkedLowering
 
+    class Shared(LinkingCompiler):
+        lowering = SharedLowering
+
     class Kernel(LinkingCompiler):
         lowering = KernelLowering
 
+    def compiled_by(pipeline: type[LinkingCompiler], function: Any, **more: bool) -> Any:
+        usual = {"no_cfunc_wrapper": True, "pipeline_class": pipeline, "_nrt": False}
+        return numba.njit(**usual, **more)(function)
+
     try:
-        inner = numba.njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, pipeline_class=Linked)(
-            lambda x: x + 1.0
-        )
-        outer = numba.njit(no_cfunc_wrapper=True, pipeline_class=Kernel)(lambda x: inner(x))
-        if outer(1.0) != 2.0:
-            raise ValueError("1 + 1 is not 2")
+        inner = compiled_by(Linked, lambda tried: tried.values[0], no_cpython_wrapper=True)
+        shared = compiled_by(Shared, lambda tried: inner(tried) + 1.0, no_cpython_wrapper=True)
+        outer = compiled_by(Kernel, lambda tried: shared(tried) + inner(tried) * tried.factor)
+        if outer(Tried(np.array([1.0]), 3.0)) != 5.0:
+            raise ValueError("1 + 1 + 1 * 3 is not 5")
         (compiled,) = outer.overloads.values()
         again = type(compiled)._rebuild(compiled.target_context, *compiled._reduce())
-        if again.entry_point(2.0) != 3.0:
-            raise ValueError("2 + 1 is not 3")
+        if again.entry_point(Tried(np.array([2.0]), 2.0)) != 7.0:
+            raise ValueError("2 + 1 + 2 * 2 is not 7")
     except Exception as error:  # noqa: BLE001, nobody promised that these insides stay as they are
+        hand_over_by_address(False)
         why = " ".join(str(error).split())
         say_once("plainly", f"{PLAINLY}: {type(error).__name__}: {why}")
         return False
     return True
+
+
+class Tried(NamedTuple):
+    """A record to try it with."""
+
+    values: Any
+    factor: float

@@ -4,6 +4,9 @@ numba hands over a named tuple field by field: for a scene and a library some fi
 every call, each of them an instruction for LLVM, on both sides. Records of this package that hold
 arrays lie in memory instead, nested ones within those that hold them, and a call takes one pointer.
 Nobody writes to a record once it is made, so that whoever reads one may keep what it read.
+
+No references are counted to what a record by its address holds. One that kernels make of arrays of
+their own says ``by_value = True`` in its class, and is handed over as numba does.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils, types
+from numba.core.base import BaseContext
 from numba.core.boxing import unbox_tuple
 from numba.core.datamodel import default_manager
 from numba.core.datamodel.models import DataModel, TupleModel, UniTupleModel
@@ -22,8 +26,10 @@ from numba.core.funcdesc import default_mangler
 from numba.core.imputils import impl_ret_borrowed, lower_getattr_generic
 from numba.core.pythonapi import NativeValue, unbox
 from numba.core.registry import cpu_target
+from numba.core.types.containers import BaseNamedTuple, NamedTuple, NamedUniTuple
 from numba.np.numpy_support import as_dtype
 
+USUAL = BaseContext.make_tuple, BaseContext.mangler  # of numba
 ADDRESS = ir.IntType(8).as_pointer()
 NEVER_WRITTEN = ("noalias", "captures(none)")  # memory behind an argument
 
@@ -31,8 +37,9 @@ NEVER_WRITTEN = ("noalias", "captures(none)")  # memory behind an argument
 def is_record(kind: types.Type) -> bool:
     """Whether values of a type are handed over by their address."""
     return (
-        isinstance(kind, types.BaseNamedTuple)
+        isinstance(kind, BaseNamedTuple)
         and kind.instance_class.__module__.startswith(f"{__package__}.")
+        and not getattr(kind.instance_class, "by_value", False)
         and any(isinstance(one, types.Array) or is_record(one) for one in kind)
     )
 
@@ -130,8 +137,8 @@ def _read(builder: Any, place: Any, kind: ir.Type) -> Any:
     return whole
 
 
-@lower_getattr_generic(types.NamedTuple)
-@lower_getattr_generic(types.NamedUniTuple)
+@lower_getattr_generic(NamedTuple)  # type: ignore[untyped-decorator]
+@lower_getattr_generic(NamedUniTuple)  # type: ignore[untyped-decorator]
 def _attribute(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     n, model = kind.fields.index(name), context.data_model_manager[kind]
     if isinstance(model, RecordModel):
@@ -141,24 +148,29 @@ def _attribute(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
     return impl_ret_borrowed(context, builder, kind[n], found)
 
 
-def hand_over_by_address() -> None:
-    """Have numba do so, for records of this package and for nothing else."""
-    for kind, usual in ((types.NamedTuple, TupleModel), (types.NamedUniTuple, UniTupleModel)):
-        default_manager.register(kind, functools.partial(_model, usual))
-    context = cpu_target.target_context
-    context.make_tuple = functools.partial(_made, context.make_tuple)
-    context.mangler = _mangled
+def hand_over_by_address(wanted: bool = True) -> None:
+    """Have numba do so, or not, for records of this package and for nothing else."""
+    for kind, usual in ((NamedTuple, TupleModel), (NamedUniTuple, UniTupleModel)):
+        made = functools.partial(_model, usual) if wanted else usual
+        default_manager.register(kind, made)
+    default_manager._cache.clear()
+    contexts = type(cpu_target.target_context)
+    contexts.make_tuple = functools.partialmethod(_made, USUAL[0]) if wanted else USUAL[0]
+    contexts.mangler = staticmethod(_mangled) if wanted else USUAL[1]
 
 
 def _model(usual: type[DataModel], manager: Any, kind: types.Type) -> DataModel:
     return (RecordModel if is_record(kind) else usual)(manager, kind)
 
 
-def _made(usual: Any, builder: Any, kind: types.Type, values: Sequence[Any]) -> Any:
-    model = default_manager.lookup(kind)
-    if isinstance(model, RecordModel):
-        return model.made(builder, values)
-    return usual(builder, kind, values)
+def _made(context: Any, usual: Any, builder: Any, kind: types.Type, values: Sequence[Any]) -> Any:
+    model = context.data_model_manager[kind]
+    if not isinstance(model, RecordModel):
+        return usual(context, builder, kind, values)
+    if context.enable_nrt:
+        name = model.fe_type.instance_class.__qualname__
+        raise TypeError(f"{name}: made where references are counted: say by_value = True in it")
+    return model.made(builder, values)
 
 
 def _mangled(name: str, args: Sequence[Any], *, abi_tags: Any = (), uid: Any = None) -> str:
@@ -170,8 +182,8 @@ def _mangled(name: str, args: Sequence[Any], *, abi_tags: Any = (), uid: Any = N
     return str(default_mangler(name, (), abi_tags=(*abi_tags, f"r{digest}"), uid=uid))
 
 
-@unbox(types.NamedTuple)
-@unbox(types.NamedUniTuple)
+@unbox(NamedTuple)  # type: ignore[untyped-decorator]
+@unbox(NamedUniTuple)  # type: ignore[untyped-decorator]
 def _from_python(kind: types.Type, value: Any, c: Any) -> NativeValue:
     if not is_record(kind):
         return unbox_tuple(kind, value, c)

@@ -29,7 +29,7 @@ def test_every_kernel_is_listed():
         for before, line in zip(
             path.read_text().splitlines(), path.read_text().splitlines()[1:], strict=False
         )
-        if before in ("@kernel", "@bare_kernel")
+        if before in ("@kernel", "@bare_kernel", "@shared_kernel", "@bare_shared_kernel")
         for name in [line.removeprefix("def ").split("(")[0]]
     }
     assert set(listed()) == decorated

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._compile import bare_inner_kernel, kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import (
     NEAR,
     field_bound,
@@ -22,7 +22,7 @@ from maneuver_automaton.groups._kernels import coast, compose
 FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
 
 
-@shared_kernel
+@bare_shared_kernel
 def free_time(
     world: WorldArrays,
     body: Body,

@@ -28,7 +28,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, bare_shared_kernel
 from maneuver_automaton.search._kernels_coast import coast_inside, coast_proven, coasted, edge_end
 from maneuver_automaton.search._kernels_connection import edge_free
 from maneuver_automaton.search._kernels_distance import pop, push
@@ -93,7 +93,7 @@ def is_new(
     return enter(cells, key)
 
 
-@shared_kernel
+@bare_shared_kernel
 def add_node(
     task: FailSafeTask,
     lib: LatticeArrays,

@@ -10,7 +10,7 @@ The arrays are those of `arrays.WordArrays`. `now` is the word; `poses` (n, 4), 
 
 from __future__ import annotations
 
-from maneuver_automaton._compile import bare_inner_kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel
 from maneuver_automaton.refinement.arrays import ImproveTask, Improving, WordArrays, WordSteps
 from maneuver_automaton.search._kernels_coast import (
     coast_free,
@@ -244,7 +244,7 @@ def admitted(lib: LatticeArrays, task: ImproveTask, word: WordArrays, size: int)
     return duration <= task.limits.most_time
 
 
-@shared_kernel
+@bare_shared_kernel
 def still_free(one: Improving, size: int, begin: float) -> bool:
     """Whether the word in `word.new` is free after `begin` [s], where obstacles move."""
     # What ends before `begin` is driven as before, and was proven then.

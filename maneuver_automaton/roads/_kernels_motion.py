@@ -17,9 +17,9 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import (
     bare_inner_kernel,
     bare_kernel,
+    bare_shared_kernel,
     inner_kernel,
     kernel,
-    shared_kernel,
 )
 from maneuver_automaton.collision._kernels_advancement import free_of_static
 from maneuver_automaton.collision._kernels_moving import free_of_moving
@@ -200,7 +200,7 @@ def maneuvers_between(limits: Limits, trims: RoadTrims, most: int) -> Maneuvers:
     )
 
 
-@shared_kernel
+@bare_shared_kernel
 def free_tick(
     clearing: Clearing,
     before: tuple[float, float, float],

@@ -44,6 +44,8 @@ class RoadTrims(NamedTuple):
 class Maneuvers(NamedTuple):
     """E maneuvers from the identity pose, all of the same number of ticks."""
 
+    by_value = True  # kernels make it of new arrays, to which they count references
+
     # Sorted by the trim they leave, so that the edges of a node are one range.
     first: np.ndarray  # (S + 1,) where those of each trim begin; (2,) of a single state
     target: np.ndarray  # (E,) trim that is reached
@@ -201,6 +203,8 @@ class Moves(NamedTuple):
 
 class TickPlan(NamedTuple):
     """A plan tick by tick, the stop after it included."""
+
+    by_value = True  # kernels make it of new arrays, to which they count references
 
     states: np.ndarray  # (m + 1, 5)
     controls: np.ndarray  # (m, 2)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.groups._kernels import compose
 from maneuver_automaton.search._kernels_coast import (
@@ -102,7 +102,7 @@ def edge_inside(
     return True
 
 
-@shared_kernel
+@bare_shared_kernel
 def edge_free(
     scene: Scene,
     lib: LatticeArrays,
@@ -136,7 +136,7 @@ def transition_free(
     return True, pose, clock
 
 
-@shared_kernel
+@bare_shared_kernel
 def connection_free(
     scene: Scene,
     lib: LatticeArrays,

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_clearance import field_bound
 from maneuver_automaton.collision._kernels_swept import FREE as NOTHING_MET
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, overlaps
@@ -90,7 +90,7 @@ def expand(search: LatticeSearch, n: int, upper_bound: float) -> int:
     return expanded(search, n, upper_bound)
 
 
-@shared_kernel
+@bare_shared_kernel
 def expanded(search: LatticeSearch, n: int, upper_bound: float) -> int:
     """Expand up to `n` nodes, the roots first; stops at the first connection if the task says so.
 

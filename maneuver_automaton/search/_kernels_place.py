@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_clearance import SHARP, field_bound, near_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.collision.arrays import WorldArrays
@@ -104,7 +104,7 @@ def place_rate(
     return rate
 
 
-@shared_kernel
+@bare_shared_kernel
 def coast_place(
     scene: Scene, lib: LatticeArrays, trim: int, pose: tuple[float, float, float, float], t: float
 ) -> float:
@@ -149,7 +149,7 @@ def part_along(
     return x, y, heading, pose[3] + 0.5 * (pieces.low[k] + pieces.high[k])
 
 
-@shared_kernel
+@bare_shared_kernel
 def edge_place(
     scene: Scene, lib: LatticeArrays, edge: int, pose: tuple[float, float, float, float]
 ) -> float:

@@ -28,6 +28,8 @@ PARALLEL = 1e-9  # sine of the angle between twists below which they span one li
 class Alphabet(NamedTuple):
     """What a search over words knows of its trims, beside their motion and rates."""
 
+    by_value = True  # kernels make it of new arrays, to which they count references
+
     numbers: IntArray  # (M,) the number of each row in the whole problem
     prices: Array  # (M, 2) cost per metre and per radian, inf where a trim makes none
     periods: Array  # (M,) [s] time of a full turn, inf for straights
@@ -58,6 +60,8 @@ class ScanSettings(NamedTuple):
 
 class WordProblem(NamedTuple):
     """Trims and conditions: of all words of one search, or of the one word that is seen."""
+
+    by_value = True  # kernels make it of new arrays, to which they count references
 
     library: TimesProblem  # M trims; rates less that of rest where it pads, twists as they are seen
     trims: Alphabet

@@ -125,6 +125,8 @@ def solve_triple(
 class FreeTime(NamedTuple):
     """A word of four trims with one time free, and room to solve for the other three."""
 
+    by_value = True  # kernels make it of new arrays, to which they count references
+
     word: IntArray  # (n,)
     n: int
     triple: IntArray  # (3,) positions that are solved for

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel, shared_kernel
+from maneuver_automaton._compile import bare_inner_kernel, bare_shared_kernel, inner_kernel, kernel
 from maneuver_automaton.groups._kernels import back_from, coast, compose, nearest_turn
 from maneuver_automaton.words._kernels_library import (
     NO_TRIM,
@@ -120,7 +120,7 @@ def word_misses(
     return max(abs(x - g_x), abs(y - g_y), abs(nearest_turn(heading - g_heading)))
 
 
-@shared_kernel
+@bare_shared_kernel
 def candidates(
     lib: LibraryArrays,
     words: IntArray,

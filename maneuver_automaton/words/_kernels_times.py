@@ -22,6 +22,8 @@ class TimesProblem(NamedTuple):
     Its columns are the trims of a word, or all trims of a library that words are made of.
     """
 
+    by_value = True  # kernels make it of new arrays, to which they count references
+
     twists: Array  # (n, 4) v_x, v_y, turn rate, v_z
     rates: Array  # (n,) cost per second
     rows: Array  # (m, n) of the linear conditions: altitude, fixed time
