@@ -42,7 +42,9 @@ def compile_kernels(
     from maneuver_automaton._kernel_list import kernel_named, listed
 
     def place(name: str) -> tuple[bool, bool, str]:
-        is_shared = getattr(kernel_named(name), "is_shared", False)
+        is_shared = False
+        with contextlib.suppress(ImportError):  # the process that is handed it says so
+            is_shared = getattr(kernel_named(name), "is_shared", False)
         return not is_shared, not any(one in name for one in FIRST), name
 
     names = sorted(listed(), key=place)

@@ -7,6 +7,7 @@ lowered here; the kernel that Python calls is optimised with all of them, which 
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import functools
 from collections.abc import Iterable
@@ -213,7 +214,6 @@ class SharedCompiler(LinkedCompiler):
 @functools.cache
 def _fits() -> bool:
     """Whether functions of a line, one calling the other, are compiled and kept right."""
-    hand_over_by_address()
 
     class Linked(LinkingCompiler):
         lowering = LinkedLowering
@@ -229,6 +229,7 @@ def _fits() -> bool:
         return numba.njit(**usual, **more)(function)
 
     try:
+        hand_over_by_address()
         inner = compiled_by(Linked, lambda tried: tried.values[0], no_cpython_wrapper=True)
         shared = compiled_by(Shared, lambda tried: inner(tried) + 1.0, no_cpython_wrapper=True)
         outer = compiled_by(Kernel, lambda tried: shared(tried) + inner(tried) * tried.factor)
@@ -239,7 +240,8 @@ def _fits() -> bool:
         if again.entry_point(Tried(np.array([2.0]), 2.0)) != 7.0:
             raise ValueError("2 + 1 + 2 * 2 is not 7")
     except Exception as error:  # noqa: BLE001, nobody promised that these insides stay as they are
-        hand_over_by_address(False)
+        with contextlib.suppress(Exception):
+            hand_over_by_address(False)
         why = " ".join(str(error).split())
         say_once("plainly", f"{PLAINLY}: {type(error).__name__}: {why}")
         return False

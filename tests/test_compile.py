@@ -94,6 +94,7 @@ def package(tmp_path, monkeypatch):
         "_compile.py": "decorators",
         "other.py": "no kernel",
         "_linking.py": "three",
+        "_records.py": "four",
         "search/_kernels.py": "one",
         "search/_kernels_words.py": "two",
     }.items():
@@ -121,14 +122,14 @@ def test_the_hash_sees_every_kernel_source_and_how_kernels_are_compiled(package)
     (package / "search" / "notes.txt").write_text("new")
     assert _kernel_folders.source_hash() == before
     seen = {before}
-    for name in ("_compile.py", "_linking.py", "search/_kernels.py", "search/_kernels_words.py"):
+    for name in (*_kernel_folders.HOW, "search/_kernels.py", "search/_kernels_words.py"):
         (package / name).write_text("changed")
         seen.add(_kernel_folders.source_hash())
     (package / "search" / "_kernels_words.py").rename(package / "search" / "_kernels_letters.py")
     seen.add(_kernel_folders.source_hash())
     (package / "search" / "_kernels_more.py").write_text("new")
     seen.add(_kernel_folders.source_hash())
-    assert len(seen) == 7
+    assert len(seen) == 8
 
 
 @pytest.mark.parametrize(
@@ -254,6 +255,10 @@ JITCodeLibrary._raise_if_finalized = for_itself
 """,
         "AttributeError: no attribute '_raise_if_finalized'",
     ),
+    "a part of records is gone": (
+        "from numba.core.base import BaseContext as one; del one.make_tuple",
+        "AttributeError: type object 'BaseContext' has no attribute 'make_tuple'",
+    ),
     "a part does something else": (
         """
 import numba, types
@@ -274,6 +279,64 @@ def test_a_numba_with_unknown_insides_compiles_as_it_does(example, kind):
     (line,) = complaint.splitlines()
     assert line.startswith("kernels are compiled as numba does by itself, which takes longer: ")
     assert said in line
+
+
+SHARING = """
+import json
+import sys
+import numpy as np
+from maneuver_automaton._compile import bare_kernel, bare_shared_kernel, inner_kernel, kernel
+from maneuver_automaton._linking import Tried
+
+
+@bare_shared_kernel
+def product(tried):
+    return tried.values[0] * tried.factor
+
+
+@bare_kernel
+def of_two(first, second):
+    swapped = Tried(second.values, first.factor)
+    return product(first) + 10.0 * product(swapped)
+
+
+@inner_kernel
+def squared(tried):
+    return product(tried) ** 2
+
+
+@kernel
+def square(tried):
+    return squared(tried)
+
+
+@kernel
+def made(factor):
+    return product(Tried(np.array([1.0]), factor))
+
+
+if __name__ == "__main__":
+    import example_sharing as one
+
+    records = Tried(np.array([2.0]), 3.0), Tried(np.array([5.0]), 7.0)
+    results = [one.of_two(*records), one.square(records[1])]
+    try:
+        one.made(2.0)
+    except TypeError as error:
+        results.append(str(error).splitlines()[-1])
+    kernels = one.product, one.of_two, one.square
+    hits = [sum(kernel.stats.cache_hits.values()) for kernel in kernels]
+    print(json.dumps([results, hits]))
+"""
+
+
+def test_what_kernels_share_is_compiled_once_and_handed_records_by_their_address(tmp_path):
+    (tmp_path / "example_sharing.py").write_text(SHARING)
+    code = "import runpy; runpy.run_module('example_sharing', run_name='__main__')"
+    first, again = (run(code, tmp_path, NUMBA_CACHE_DIR=tmp_path / "cache") for _ in range(2))
+    refused = "Tried: made where references are counted: say by_value = True in it"
+    assert first[0] == again[0] == [2.0 * 3.0 + 10.0 * 5.0 * 3.0, 35.0**2, refused]
+    assert (first[1], again[1]) == ([0, 0, 0], [1, 1, 1])
 
 
 KERNEL_IN_KERNEL = """
