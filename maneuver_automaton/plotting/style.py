@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -20,7 +21,7 @@ SMALL_PT = 8.0
 FAR_M = 1e5  # from here on coordinates are counted from a round number
 NAME_LENGTH = 60  # characters of a name before it is cut
 LEAST_SHARE = 0.3  # of the width of axes that a legend beside them leaves
-CHARACTER = 0.062  # [in] in a legend
+CHARACTER, ROW = 0.062, 0.19  # [in] of a character in a legend, and from row to row
 
 
 def tidy(ax: Axes, *, x: str, y: str) -> None:
@@ -83,39 +84,55 @@ def mark_handle(marker: str, *, size: float, edge: Color = INK, face: Any = "whi
     )  # fmt: skip
 
 
-def plain(legend: Legend, labels: Sequence[str]) -> Legend:
+def plain(legend: Legend, labels: Sequence[str], *, length: int = NAME_LENGTH) -> Legend:
     """The `legend` with `labels` as they are: no mathematics, no hidden leading underscore."""
     for text, label in zip(legend.get_texts(), labels, strict=True):
         text.set_parse_math(False)
-        text.set_text(shortened(label))
+        text.set_text(shortened(label, length))
     return legend
 
 
-def outer_legend(ax: Axes, handles: Sequence[Artist], labels: Sequence[str]) -> Legend:
-    """A legend on the right of `ax`, never over what is drawn.
+def outer_legend(
+    ax: Axes,
+    handles: Sequence[Artist],
+    labels: Sequence[str],
+    *,
+    above: bool = False,
+    length: int = NAME_LENGTH,
+) -> Legend:
+    """A legend on the right of `ax`, or `above` it, never over what is drawn.
 
     The axes make room for it unless a layout engine does, or too little of them were left.
     """
     figure = ax.get_figure(root=True)
     assert figure is not None
+    wide, high = figure.get_size_inches()
     place = ax.get_position()
-    longest = max((min(len(label), NAME_LENGTH) for label in labels), default=1)
-    width = place.width - (CHARACTER * longest + 0.6) / figure.get_size_inches()[0]
-    if figure.get_layout_engine() is None and width > LEAST_SHARE * place.width:
-        ax.set_position((place.x0, place.y0, width, place.height))
+    longest = max((min(len(label), length) for label in labels), default=1)
+    if above:
+        columns = max(1, min(len(labels), int(place.width * wide / (CHARACTER * longest + 0.5))))
+        room = (0.0, (ROW * math.ceil(len(labels) / columns) + 0.08) / high)
+    else:
+        columns, room = 1, ((CHARACTER * longest + 0.6) / wide, 0.0)
+    width, height = place.width - room[0], place.height - room[1]
+    enough = width > LEAST_SHARE * place.width and height > LEAST_SHARE * place.height
+    if figure.get_layout_engine() is None and enough:
+        ax.set_position((place.x0, place.y0, width, height))
     legend = ax.legend(
         handles,
         [str(k) for k in range(len(labels))],
-        loc="upper left",
-        bbox_to_anchor=(1.02, 1.0),
+        loc="lower left" if above else "upper left",
+        bbox_to_anchor=(0.0, 1.0) if above else (1.02, 1.0),
+        ncols=columns,
         fontsize=SMALL_PT,
         frameon=False,
-        borderaxespad=0.0,
+        borderaxespad=0.2 if above else 0.0,
         borderpad=0.1,
         labelspacing=0.3,
+        columnspacing=1.2,
         handlelength=1.6,
     )
-    return plain(legend, labels)
+    return plain(legend, labels, length=length)
 
 
 UNITS = {
