@@ -16,6 +16,7 @@ from maneuver_automaton._cache_files import PLAINLY, say_once
 from maneuver_automaton._kernel_folders import kernel_folder
 
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])  # the function that is compiled
+Record = TypeVar("Record", bound=type)
 
 
 class CompiledLater:
@@ -95,6 +96,15 @@ def shared_kernel(function: Kernel) -> Kernel:
 def bare_shared_kernel(function: Kernel) -> Kernel:
     """A `shared_kernel` that makes no array, and so counts no references."""
     return _later(function, _shared, NO_COUNTS)
+
+
+def by_value(record: Record) -> Record:
+    """Have kernels copy a record of arrays where they hand it over, and count references to them.
+
+    For records that kernels make of new arrays; all others are handed over by their address.
+    """
+    record.by_value = True  # type: ignore[attr-defined]
+    return record
 
 
 def plain(function: Kernel) -> Kernel:

@@ -21,6 +21,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
+from maneuver_automaton import _kernel_list
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 
 FIRST = ("refinement.", "search._kernels_lattice", "receding_horizon.")  # share most, take longest
@@ -39,15 +40,14 @@ def compile_kernels(
     *, jobs: int | None = None, report: Report | None = None, settings: dict[str, str] | None = None
 ) -> list[str]:
     """Compile what is not compiled yet, in several processes; what failed, and why."""
-    from maneuver_automaton._kernel_list import kernel_named, listed
 
     def place(name: str) -> tuple[bool, bool, str]:
         is_shared = False
         with contextlib.suppress(ImportError):  # the process that is handed it says so
-            is_shared = getattr(kernel_named(name), "is_shared", False)
+            is_shared = getattr(_kernel_list.kernel_named(name), "is_shared", False)
         return not is_shared, not any(one in name for one in FIRST), name
 
-    names = sorted(listed(), key=place)
+    names = sorted(_kernel_list.listed(), key=place)
     waiting, failed, done = deque(names), list[str](), list[str]()
     workers = [_worker(settings or {}) for _ in range(min(jobs or affordable(), len(names)))]
 
@@ -123,15 +123,13 @@ def _report(lock: Path, bar: Report | None, done: Sequence[str], names: Sequence
 def work() -> None:
     """What a process does: compile the kernels whose names come in, and say so."""
     gc.disable()  # the compiler makes millions of objects, and few of them in circles
-    from maneuver_automaton._kernel_list import kernel_named, listed
-
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # nothing else is an answer
     for line in sys.stdin:
         name, answer = line.strip(), "done"
         try:
-            for signature in listed()[name]:
-                kernel_named(name).compile(signature)  # type: ignore[attr-defined]
+            for signature in _kernel_list.listed()[name]:
+                _kernel_list.kernel_named(name).compile(signature)  # type: ignore[attr-defined]
         except Exception as error:  # noqa: BLE001, whatever it is, the kernel is compiled when used
             answer = " ".join(f"{type(error).__name__}: {error}".split())
         answers.write(f"{answer}\n")

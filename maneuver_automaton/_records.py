@@ -6,7 +6,7 @@ arrays lie in memory instead, nested ones within those that hold them, and a cal
 Nobody writes to a record once it is made, so that whoever reads one may keep what it read.
 
 No references are counted to what a record by its address holds. One that kernels make of arrays of
-their own says ``by_value = True`` in its class, and is handed over as numba does.
+their own is decorated as `by_value`, and handed over as numba does.
 """
 
 from __future__ import annotations
@@ -50,7 +50,11 @@ class RecordModel(DataModel):  # type: ignore[misc]
     @functools.cached_property
     def laid_out(self) -> ir.LiteralStructType:
         """What lies at the address: the fields in their order, records among them whole."""
-        return ir.LiteralStructType([_laid_out(kind) for kind in self.fe_type])
+        models = map(default_manager.lookup, self.fe_type)
+        kinds = [
+            one.laid_out if isinstance(one, RecordModel) else one.get_value_type() for one in models
+        ]
+        return ir.LiteralStructType(kinds)
 
     def get_value_type(self) -> ir.Type:
         """An address."""
@@ -115,11 +119,6 @@ class RecordModel(DataModel):  # type: ignore[misc]
         return room
 
 
-def _laid_out(kind: types.Type) -> ir.Type:
-    model = default_manager.lookup(kind)
-    return model.laid_out if isinstance(model, RecordModel) else model.get_value_type()
-
-
 def _room(builder: Any, kind: ir.Type) -> Any:
     with builder.goto_entry_block():
         return builder.alloca(kind)
@@ -151,16 +150,15 @@ def _attribute(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
 def hand_over_by_address(wanted: bool = True) -> None:
     """Have numba do so, or not, for records of this package and for nothing else."""
     for kind, usual in ((NamedTuple, TupleModel), (NamedUniTuple, UniTupleModel)):
-        made = functools.partial(_model, usual) if wanted else usual
-        default_manager.register(kind, made)
+
+        def model(manager: Any, one: types.Type, usual: type[DataModel] = usual) -> DataModel:
+            return (RecordModel if wanted and is_record(one) else usual)(manager, one)
+
+        default_manager.register(kind, model)
     default_manager._cache.clear()
     contexts = type(cpu_target.target_context)
     contexts.make_tuple = functools.partialmethod(_made, USUAL[0]) if wanted else USUAL[0]
     contexts.mangler = staticmethod(_mangled) if wanted else USUAL[1]
-
-
-def _model(usual: type[DataModel], manager: Any, kind: types.Type) -> DataModel:
-    return (RecordModel if is_record(kind) else usual)(manager, kind)
 
 
 def _made(context: Any, usual: Any, builder: Any, kind: types.Type, values: Sequence[Any]) -> Any:
@@ -169,7 +167,7 @@ def _made(context: Any, usual: Any, builder: Any, kind: types.Type, values: Sequ
         return usual(context, builder, kind, values)
     if context.enable_nrt:
         name = model.fe_type.instance_class.__qualname__
-        raise TypeError(f"{name}: made where references are counted: say by_value = True in it")
+        raise TypeError(f"{name}: made where references are counted: decorate it as by_value")
     return model.made(builder, values)
 
 

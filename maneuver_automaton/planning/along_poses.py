@@ -30,7 +30,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.arrivals import (
     VALLEYS,
     Arrival,
-    Improving,
+    BetterArrivals,
     LegCosts,
     arrivals_of,
     freedoms,
@@ -297,7 +297,7 @@ class _Search:
                     on = self.costs[rows[m][picked[-1]], rows[m + 1]]
                     picked.append(int(np.argmin(on + back[m + 1])))
                 chains[tuple(picked)] = float(through[at])
-        better = Improving(problem, self.estimated, order)
+        better = BetterArrivals(problem, self.estimated, order)
         more: list[list[Arrival]] = [[] for _ in self.ways]
         for chain in sorted(chains, key=chains.__getitem__)[:VALLEYS]:
             poses = [self.arrivals[row[at]][1].pose for row, at in zip(rows, chain, strict=True)]

@@ -337,7 +337,7 @@ class LegCosts:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Improving:
+class BetterArrivals:
     """Better arrivals at some poses on the way in an order, by what legs are estimated to cost."""
 
     problem: Problem

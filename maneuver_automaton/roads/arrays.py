@@ -6,6 +6,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from maneuver_automaton._compile import by_value
 from maneuver_automaton.collision.arrays import WorldArrays
 from maneuver_automaton.collision.body import Body
 
@@ -41,10 +42,9 @@ class RoadTrims(NamedTuple):
     first: np.ndarray  # (speeds + 1,) first trim of each speed: slow ones have more angles
 
 
+@by_value
 class Maneuvers(NamedTuple):
     """E maneuvers from the identity pose, all of the same number of ticks."""
-
-    by_value = True  # kernels make it of new arrays, to which they count references
 
     # Sorted by the trim they leave, so that the edges of a node are one range.
     first: np.ndarray  # (S + 1,) where those of each trim begin; (2,) of a single state
@@ -201,10 +201,9 @@ class Moves(NamedTuple):
     size: np.ndarray  # (S, 2) of acceleration [m/s^2] and steering rate [rad/s]
 
 
+@by_value
 class TickPlan(NamedTuple):
     """A plan tick by tick, the stop after it included."""
-
-    by_value = True  # kernels make it of new arrays, to which they count references
 
     states: np.ndarray  # (m + 1, 5)
     controls: np.ndarray  # (m, 2)

@@ -18,17 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, by_value, inner_kernel
 from maneuver_automaton.groups._kernels import back_from, compose
 from maneuver_automaton.words._kernels_times import TimesProblem
 
 PARALLEL = 1e-9  # sine of the angle between twists below which they span one line
 
 
+@by_value
 class Alphabet(NamedTuple):
     """What a search over words knows of its trims, beside their motion and rates."""
-
-    by_value = True  # kernels make it of new arrays, to which they count references
 
     numbers: IntArray  # (M,) the number of each row in the whole problem
     prices: Array  # (M, 2) cost per metre and per radian, inf where a trim makes none
@@ -58,10 +57,9 @@ class ScanSettings(NamedTuple):
     tolerance: float  # of the steering function, relative
 
 
+@by_value
 class WordProblem(NamedTuple):
     """Trims and conditions: of all words of one search, or of the one word that is seen."""
-
-    by_value = True  # kernels make it of new arrays, to which they count references
 
     library: TimesProblem  # M trims; rates less that of rest where it pads, twists as they are seen
     trims: Alphabet

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import bare_inner_kernel, inner_kernel
+from maneuver_automaton._compile import bare_inner_kernel, by_value, inner_kernel
 from maneuver_automaton.search._kernels_problem import (
     Candidates,
     WordProblem,
@@ -122,10 +122,9 @@ def solve_triple(
     )
 
 
+@by_value
 class FreeTime(NamedTuple):
     """A word of four trims with one time free, and room to solve for the other three."""
-
-    by_value = True  # kernels make it of new arrays, to which they count references
 
     word: IntArray  # (n,)
     n: int

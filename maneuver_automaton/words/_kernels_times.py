@@ -12,17 +12,16 @@ from typing import NamedTuple
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton._compile import inner_kernel
+from maneuver_automaton._compile import by_value, inner_kernel
 from maneuver_automaton.groups._kernels import coast, compose, nearest_turn
 
 
+@by_value
 class TimesProblem(NamedTuple):
     """Minimise ``rates @ times`` such that the word ends at `goal` and ``rows @ times = targets``.
 
     Its columns are the trims of a word, or all trims of a library that words are made of.
     """
-
-    by_value = True  # kernels make it of new arrays, to which they count references
 
     twists: Array  # (n, 4) v_x, v_y, turn rate, v_z
     rates: Array  # (n,) cost per second
