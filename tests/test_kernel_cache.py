@@ -70,7 +70,7 @@ def test_a_damaged_file_is_compiled_again_and_mended(tmp_path, said, damage):
     elif damage == "not a pickle":
         _cache_files.write_checked(path, b"I am whole")
     elif damage == "other":
-        _cache_files.write_checked(path, _kernel_cache.dumps(((numba.int64,), ())))
+        _cache_files.write_checked(path, _kernel_cache.dumps(((numba.int64,), {}, ())))
     else:
         path.write_bytes(damage)
     assert hits(compiled_in(tmp_path)) == 0
