@@ -220,6 +220,8 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
         )
     except _OutOfTime:
         return None
+    if costs and not solved.success:  # where it stopped is chance: a moved problem stops elsewhere
+        return None
     times = np.clip(np.where(solved.x > NOTHING, solved.x, least), least, longest)
     return _closed(task, times) if np.isfinite(times).all() else None
 
