@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,15 +28,14 @@ from maneuver_automaton.planning.polishing import BY_TIME, Polish
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.planning.tracking import AT_ONCE
 from maneuver_automaton.problem import Problem, moves
-from maneuver_automaton.refinement.clear_insertion import has_paces, paced, whole_of
-from maneuver_automaton.refinement.improve import Improved, Patience, improve, restarts_of
-from maneuver_automaton.refinement.incumbent_words import quick_word
+from maneuver_automaton.refinement.clear_insertion import has_paces, paced
+from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, WordSearch, words_of
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.arrays import CostTable
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.lattice_pass import plan_of_word
+from maneuver_automaton.search.lattice_pass import plan_of_word, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.scene import Ends
@@ -147,10 +146,13 @@ class Lattice(Step):
         word, first = None, None
         if not known and (math.isfinite(query.most_time) or query.library.per_metre == 0.0):
             # where a search by cost alone would look everywhere, or for too long motions
-            in_time = replace(problem, cost=BY_TIME)
-            quick = late_at_first(lattice_query(in_time, _goals(query), prepared=prepared))
-            word, more = quick_word(query, quick, budget=limit)
-            found.counts.update(expansions=more)
+            by_time = replace(problem, cost=BY_TIME)
+            quick = late_at_first(lattice_query(by_time, _goals(query), prepared=prepared))
+            search = words_of(quick, budget=limit, schedule=Schedule())
+            in_time = (one for one in search if one.duration <= query.most_time)
+            if (soon := next(in_time, None)) is not None:
+                word = with_cost(soon, query)
+            found.counts.update(expansions=search.expansions)
         elif problem.moves and known:  # one with rests, if a quick search finds none
             first = self.first_plan(query, limit, most=QUICK)
             word = first.word
@@ -235,19 +237,21 @@ class Lattice(Step):
         self._count(found.expansions, found.queries, searches=1)
         return found
 
-    def improve(
-        self, query: LatticeQuery, word: Word, budget: Budget, *, patience: Patience, **more: Any
-    ) -> Improved:
-        """A better word for a query, its attempts and expansions counted."""
-        found = improve(
-            query,
-            word,
-            budget=budget,
-            patience=patience,
-            table=self.table,
-            restarts=restarts_of(query.library),
-            **more,
+    def words_of(
+        self,
+        query: LatticeQuery,
+        budget: Budget,
+        *,
+        known: Word | None = None,
+        better: Callable[[Word], None] = lambda word: None,
+        **schedule: Any,
+    ) -> WordSearch:
+        """A search for ever better words to its end, its attempts and expansions counted."""
+        found = words_of(
+            query, budget=budget, schedule=Schedule(table=self.table, **schedule), known=known
         )
+        for word in found:
+            better(word)
         self._count(found.expansions, found.queries, searches=found.passes, attempts=found.attempts)
         return found
 
@@ -264,21 +268,22 @@ class Lattice(Step):
         if has_paces(self.query):
             # take the trims of a large library that fill the time, once the first word is shortened
             query, left = self.query, self.for_others
-            self.improve(query, self.words[-1], left, patience=AT_ONCE, better=self.gained)
+            known = self.words[-1]
+            self.words_of(query, left, known=known, better=self.gained, patience=AT_ONCE)
             self.query, word = paced(query, self.words[-1])
             if word is not self.words[-1]:
                 self.gained(word)
         query, found = self.query, self.found
         if query.problem.moves and self.finds_plans:
             self._let_pass()
-        better = self.improve(
+        better = self.words_of(
             query,
-            self.words[-1],
             self._for_the_best(),
+            known=self.words[-1],
+            better=self.gained,
             patience=Patience(),
             floor=found.ended.bound.value - query.padding if found.ended.bound else -math.inf,
-            better=self.gained,
-            every_trim=whole_of(query),
+            every_trim=True,
             meanwhile=lambda: load_checks(query.problem, found.workspace),
         )
         if not self.finds_plans:
@@ -308,11 +313,11 @@ class Lattice(Step):
         """Note the cheapest path among static obstacles, with rests that let others pass."""
         query, static = self.query, _among_static(self.query)
         soon = self.limit.part(PASSING_SHARE)
-        found = self.first_plan(static, soon)
-        if found.word is None:
+        in_time = replace(soon, expansions=None)
+        better = self.words_of(static, in_time, most=soon.expansions, patience=BRIEF)
+        if better.first is None or better.first.word is None:
             return
-        better = self.improve(static, found.word, replace(soon, expansions=None), patience=BRIEF)
-        paths = sorted([found.word, better.word, *better.others], key=lambda one: one.cost)
+        paths = sorted([better.first.word, better.word, *better.others], key=lambda one: one.cost)
         distinct = {tuple(path.trims.tolist()): path for path in reversed(paths)}
         for path in list(distinct.values())[::-1][:MOST_PATHS]:
             if soon.is_over:
@@ -332,13 +337,11 @@ class Lattice(Step):
                 if self.for_others.is_over or self.for_others.expansions == 0:
                     return
                 closed = lattice_query(problem, _goals(query), prepared=query.prepared)
-                first = self.first_plan(closed, self.for_others)
-                if first.word is None:
+                beside = self.words_of(closed, self.for_others, patience=SOME).word
+                if beside is NO_WORD:
                     continue
-                word = first.word
-                for where in (closed, query):  # past the disc, then without it
-                    patience = SOME if where is closed else AT_ONCE
-                    word = self.improve(where, word, self.for_others, patience=patience).word
+                # past the disc, then without it
+                word = self.words_of(query, self.for_others, known=beside, patience=AT_ONCE).word
                 plan = plan_of_word(query, word)
                 if is_new(plan, known, UNFINISHED):
                     known.append(plan)

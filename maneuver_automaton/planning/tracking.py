@@ -21,7 +21,7 @@ from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.no_way import along_free_path, proven_apart
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, words_of
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
@@ -170,33 +170,34 @@ def track(
         return Tracked(plan=None, goal_index=None, cost=math.inf, reason="every goal is blocked")
     query = lattice_query(problem, goals, prepared=prepared)
     word = None if known is None else word_of_plan(query, known)
-    expansions = queries = 0
-    if word is None:
-        most = max_expansions or problem.search.max_expansions
-        counted, aside = replace(budget, expansions=most), along_free_path(query, table)
-        proven = functools.partial(proven_apart, problem)
-        found = first_plan(query, budget=counted, table=table, aside=aside, is_proven=proven)
-        word, expansions, queries = found.word, found.expansions, found.queries
-        if word is None:
-            return Tracked(
-                plan=None,
-                goal_index=None,
-                cost=math.inf,
-                reason=found.enclosed or "no plan was found in the time given",
-                expansions=expansions,
-                queries=queries,
-                enclosed=bool(found.enclosed),
-            )
+    aside, proven = along_free_path(query, table), functools.partial(proven_apart, problem)
+    schedule = Schedule(
+        most=max_expansions or problem.search.max_expansions,
+        patience=patience,
+        table=table,
+        first=functools.partial(first_plan, aside=aside, is_proven=proven),
+    )
     timed = replace(budget, expansions=None)
-    better = improve(query, word, budget=timed, patience=patience, table=table)
-    plan = plan_of_word(query, better.word)
+    found = words_of(query, budget=timed, schedule=schedule, known=word).to_the_end()
+    if found.word is NO_WORD:
+        enclosed = found.first.enclosed if found.first else ""
+        return Tracked(
+            plan=None,
+            goal_index=None,
+            cost=math.inf,
+            reason=enclosed or "no plan was found in the time given",
+            expansions=found.expansions,
+            queries=found.queries,
+            enclosed=bool(enclosed),
+        )
+    plan = plan_of_word(query, found.word)
     return Tracked(
         plan=plan,
-        goal_index=query.goal_index[better.word.goal],
+        goal_index=query.goal_index[found.word.goal],
         cost=problem.cost_of(plan),
-        expansions=expansions + better.expansions,
-        queries=queries + better.queries,
-        others=tuple(plan_of_word(query, other) for other in better.others),
+        expansions=found.expansions,
+        queries=found.queries,
+        others=tuple(plan_of_word(query, other) for other in found.others),
     )
 
 

@@ -28,7 +28,7 @@ from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import StepSearch
 from maneuver_automaton.refinement.fitting import fitted_plans
-from maneuver_automaton.refinement.incumbent_words import incumbent_words
+from maneuver_automaton.refinement.improve import Schedule, words_of
 from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -173,15 +173,10 @@ class OverManeuvers(StepSearch):
             return None
         query = lattice_query(problem, goals)
         best: StepPlan | None = None
-        for incumbent in incumbent_words(
-            query, budget=replace(self.for_plans, expansions=problem.search.max_expansions)
-        ):
-            if incumbent.word is None:
-                continue
-            owner = query.goal_index[incumbent.word.goal]
-            for plan in fitted_plans(
-                problem, plan_of_word(query, incumbent.word), problem.goals[owner]
-            ):
+        budget = replace(self.for_plans, expansions=problem.search.max_expansions)
+        for word in words_of(query, budget=budget, schedule=Schedule()):
+            owner = query.goal_index[word.goal]
+            for plan in fitted_plans(problem, plan_of_word(query, word), problem.goals[owner]):
                 one = self.now.candidate(self.now.whole(plan), owner, Origin.SEARCHED)
                 if (best is None or one.cost < best.cost) and is_good(one.plan):
                     best = one

@@ -22,9 +22,8 @@ from maneuver_automaton.models import Car, Model, Unicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.scene import Polished
 from maneuver_automaton.problem import STANDING, Problem
-from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, words_of
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
-from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 
@@ -156,13 +155,11 @@ def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem)
     most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing
-    first = first_plan(query, budget=replace(budget, expansions=most), table=table)
-    if first.word is None:
-        return
+    schedule = Schedule(most=most, patience=BRIEF, table=table)
     timed = replace(budget, expansions=None)
-    improved = improve(query, first.word, budget=timed, patience=BRIEF, table=table)
-    for word in (improved.word, *improved.others[:OTHERS]):
-        yield plan_of_word(query, word)
+    found = words_of(query, budget=timed, schedule=schedule).to_the_end()
+    words = (found.word, *found.others[:OTHERS]) if found.word is not NO_WORD else ()
+    yield from (plan_of_word(query, word) for word in words)
 
 
 def _unit(library: Automaton) -> float:

@@ -7,22 +7,20 @@ call: it is counted in attempts, and a time limit only says where it stops.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import KW_ONLY, dataclass, field, replace
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_improve import attempt_all
-from maneuver_automaton.refinement.clear_insertion import Whole
+from maneuver_automaton.refinement.clear_insertion import Whole, whole_of
 from maneuver_automaton.refinement.work import improving, shortcut, word_of
 from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays
 from maneuver_automaton.search.cost_to_go import NO_TABLE
-from maneuver_automaton.search.lattice import distance_grids
-from maneuver_automaton.search.lattice_library import LatticeLibrary
+from maneuver_automaton.search.lattice import FirstPlan, distance_grids, first_plan
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, as_wide_as_turns
@@ -67,11 +65,12 @@ class Restart(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Restarts:
-    """A schedule, and how many rounds of the dynamic program the words of its searches get."""
+    """New searches, how many rounds their words get, and when it is first looked at the clock."""
 
     of: Callable[[LatticeQuery, np.random.Generator], Iterator[Restart]]
     rounds: int
     moving_rounds: int  # among moving obstacles: the trims that stay are then driven at other times
+    timely: int  # attempts before the first look at the clock: some ms
 
 
 def _random(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
@@ -111,13 +110,8 @@ def _finer(query: LatticeQuery, rng: np.random.Generator) -> Iterator[Restart]:
             yield Restart(resolution, FIRST_CHUNK, all_words=all_words)
 
 
-def restarts_of(library: LatticeLibrary) -> Restarts:
-    """The schedule for a library: trims that are switched at will in the plane, or others."""
-    return RANDOM if library.at_will else FINER
-
-
-RANDOM = Restarts(_random, rounds=1, moving_rounds=0)
-FINER = Restarts(_finer, rounds=8, moving_rounds=8)
+RANDOM = Restarts(_random, rounds=1, moving_rounds=0, timely=100)  # of trims switched at will
+FINER = Restarts(_finer, rounds=8, moving_rounds=8, timely=10)
 
 
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # of the time between points, by which they move in a round
@@ -132,20 +126,6 @@ MOST_OTHERS = 50  # words kept beside the best
 DRAWN = 400  # attempts whose random numbers are drawn at once
 DENSE_SLICE = 200  # attempts with many trims, each of which takes longer
 OTHER_TRIMS = Restart(Resolution(), SLICE)
-TIMELY, TIMELY_LINKED = 100, 10  # attempts before the first look at the clock: some ms
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Improved:
-    """The result of an improvement: the best word and how it ended."""
-
-    word: Word
-    attempts: int
-    expansions: int
-    queries: int  # collision queries of the new searches
-    passes: int  # new searches
-    finished: bool  # nothing gained for as long as the settings ask
-    others: tuple[Word, ...] = ()  # words of the other searches, cheapest first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,69 +136,112 @@ class Patience:
     passes: int = 12
 
 
-Better = Callable[[Word], None]
-Grids = Callable[[], tuple[DistanceGrid, ...]]
+TO_THE_END = Patience(passes=2**62)
 
 
-def improve(
+NO_WORD = Word(trims=np.empty(0, dtype=np.int64), durations=np.empty(0), cost=math.inf)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Schedule:
+    """How words of a query are looked for: a first one, then better ones."""
+
+    most: int | None = None  # expansions of the first alone, if later ones are not counted
+    patience: Patience = TO_THE_END
+    floor: float = -math.inf  # it ends when no word can be cheaper than this allows
+    table: CostTable = NO_TABLE
+    first: Callable[..., FirstPlan] = first_plan  # with what is tried beside its searches
+    every_trim: bool = False  # whether to use what the searches leave out of a large library
+    meanwhile: Callable[[], None] = lambda: None  # to prepare once the first gains are made
+
+
+def words_of(
     query: LatticeQuery,
-    word: Word,
     *,
     budget: Budget = UNLIMITED,
-    patience: Patience,
-    better: Better = lambda word: None,
-    **more: Any,
-) -> Improved:
-    """The cheapest word found from `word` on, which must be free; `better` gets each gain.
+    schedule: Schedule,
+    known: Word | None = None,
+) -> WordSearch:
+    """Ever cheaper words of a query, as they are found: the one driver of all that plan in it.
 
-    See `Improvement` for the other settings.
+    The first comes from the schedule of resolutions, unless a free word is `known`. Where cost is
+    time, it may last longer than the query admits: improved ones need not. The same number of
+    expansions finds the same words at every call. What was found and spent is asked afterwards.
     """
-    grids = functools.partial(distance_grids, query)
-    one = Improvement(query, word, grids=grids, budget=budget, patience=patience, **more)
-    for gain in one.gains():
-        better(gain)
-    return one.result()
+    whole = whole_of(query) if schedule.every_trim else None
+    return WordSearch(query, budget, schedule, known or NO_WORD, whole)
 
 
 @dataclass(slots=True, eq=False)
-class Improvement:
-    """One improvement: its settings and its state."""
+class WordSearch:
+    """A search for ever cheaper words, and what it has found and spent so far."""
 
     query: LatticeQuery
-    best: Word
-    _: KW_ONLY
-    grids: Grids  # distances to the goals, and to the start where searches begin at the goals
     budget: Budget
-    patience: Patience
-    floor: float = -math.inf  # it ends when no word can be cheaper than this allows
-    table: CostTable = NO_TABLE
-    restarts: Restarts = RANDOM
-    meanwhile: Callable[[], None] = lambda: None  # to prepare once the first gains are made
-    every_trim: Whole | None = None  # what the searches leave out of a large library
+    schedule: Schedule
+    best: Word = NO_WORD  # of those whose trims the searches use
+    whole: Whole | None = None
+    first: FirstPlan | None = None  # of its own, with what it says where there is none
     attempts: int = 0
     expansions: int = 0
-    queries: int = 0
-    passes: int = 0
-    others: list[Word] = field(default_factory=list)
+    queries: int = 0  # collision queries
+    passes: int = 0  # new searches
+    words: list[Word] = field(default_factory=list)  # all that the searches have led to
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED))
     arrays: SearchArrays | None = None  # of the last search
 
-    def gains(self) -> Iterator[Word]:
-        """Words, each cheaper than the one before: the word itself first, then new searches."""
-        restarts = self.restarts.of(self.query, self.rng)
-        first = next(restarts)
+    @property
+    def word(self) -> Word:
+        """The cheapest word so far, whatever trims it has; NO_WORD if there is none."""
+        return self.best if self.whole is None else self.whole.cheaper_than(self.best)
+
+    @property
+    def restarts(self) -> Restarts:
+        """Which new searches suit the library: trims switched at will in the plane, or others."""
+        return RANDOM if self.query.library.at_will else FINER
+
+    @property
+    def others(self) -> tuple[Word, ...]:
+        """Words of the other searches, cheapest first."""
+        return tuple(sorted(self.words, key=lambda other: other.cost)[:MOST_OTHERS])
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the budget is used up, in time or in expansions."""
+        if self.budget.expansions is not None and self.expansions >= self.budget.expansions:
+            return True
+        return self.budget.is_over
+
+    def to_the_end(self) -> WordSearch:
+        """Itself, once nothing gains any more, or the budget is used up."""
+        for _ in self:
+            pass
+        return self
+
+    def __iter__(self) -> Iterator[Word]:
+        """Words, each cheaper than the one before: a first one, itself shortened, then others."""
+        if self.best is NO_WORD:
+            most, table = self.schedule.most, self.schedule.table
+            counted = self.budget if most is None else replace(self.budget, expansions=most)
+            first = self.first = self.schedule.first(self.query, budget=counted, table=table)
+            self.expansions, self.queries, self.passes = first.expansions, first.queries, 1
+            if first.word is None:
+                return
+            self.best = first.word
+            yield first.word
         self.best = with_cost(self.best, self.query)
         if self.budget.is_over:
             return
-        yield from self._considered(self._shortened(self.best, first, SLICE))
-        restart: Restart | None = first
-        grids = self.grids()
+        restarts = self.restarts.of(self.query, self.rng)
+        patience, slice_, begun = self.schedule.patience, SLICE, next(restarts)
+        restart: Restart | None = begun
+        yield from self._considered(self._shortened(self.best, begun, SLICE))
+        grids = distance_grids(self.query)
         idle_attempts = idle_passes = step = 0
-        slice_ = SLICE
         while (
             restart is not None
             and not self._over()
-            and (idle_attempts < self.patience.attempts or idle_passes < self.patience.passes)
+            and (idle_attempts < patience.attempts or idle_passes < patience.passes)
         ):
             before = self.best.cost
             yield from self._searched_again(restart, grids)
@@ -230,58 +253,37 @@ class Improvement:
                 slice_ = min(int(1.2 * slice_), 8000)
             step += 1
             if step == FIRST_GAINS:
-                self.meanwhile()
-            if self.every_trim is not None and self.every_trim.is_due(step):
-                yield from self._with_every_trim(self.every_trim, step)
+                self.schedule.meanwhile()
+            if self.whole is not None and self.whole.is_due(step):
+                yield from self._with_every_trim(self.whole, step)
             begun, restart = restart, next(restarts, None)
             if restart is not None and restart.all_words != begun.all_words:
                 yield from self._considered(self._shortened(self.best, restart, SLICE))
-        if self.every_trim is not None:
-            yield from self._with_every_trim(self.every_trim, step)
-
-    def result(self) -> Improved:
-        """The result so far."""
-        return Improved(
-            word=self._cheapest,
-            attempts=self.attempts + (self.every_trim.attempts if self.every_trim else 0),
-            expansions=self.expansions,
-            queries=self.queries,
-            passes=self.passes,
-            finished=not self._late(),
-            others=tuple(sorted(self.others, key=lambda other: other.cost)[:MOST_OTHERS]),
-        )
+        if self.whole is not None:
+            yield from self._with_every_trim(self.whole, step)
 
     def _gained(self, before: float) -> bool:
         return self.best.cost < before * (1.0 - 1e-4)
 
     def _over(self) -> bool:
-        return self._late() or self._cheapest.cost <= self.floor * (1.0 + 1e-12)
-
-    def _late(self) -> bool:
-        if self.budget.expansions is not None and self.expansions >= self.budget.expansions:
-            return True
-        return self.budget.is_over
+        return self.is_late or self.word.cost <= self.schedule.floor * (1.0 + 1e-12)
 
     def _considered(self, candidate: Word) -> Iterator[Word]:
         """The candidate, if it is the best."""
-        self.others.append(candidate)
+        self.words.append(candidate)
         if candidate.cost < self.best.cost:
-            cheapest = candidate.cost < self._cheapest.cost
+            cheapest = candidate.cost < self.word.cost
             self.best = candidate
             if cheapest:
                 yield candidate
-
-    @property
-    def _cheapest(self) -> Word:
-        """The cheapest word, whatever trims it has."""
-        whole = self.every_trim
-        return self.best if whole is None else whole.cheaper_than(self.best)
 
     def _with_every_trim(self, whole: Whole, step: int) -> Iterator[Word]:
         """Words that any trims of a large library have made cheaper: attempts, no expansions."""
         if not self.budget.is_over:
             shorten = self._shortened_with
+            before = whole.attempts
             yield from whole.gains(self.best, step=step, budget=self.budget, shorten=shorten)
+            self.attempts += whole.attempts - before
 
     def _shortened_with(self, query: LatticeQuery, word: Word) -> Word:
         """The word shortened with the trims of another query, the draws of this one left alone."""
@@ -295,7 +297,7 @@ class Improvement:
             restart.resolution,
             grid=grids[0 if restart.sign > 0.0 else 1],
             sign=restart.sign,
-            table=self.table,
+            table=self.schedule.table,
             arrays=self.arrays,
         )
         one.chunk, last = restart.chunk, math.inf
@@ -342,7 +344,7 @@ class Improvement:
     def _attempted(self, word: Word, attempts: int) -> Word:
         """The word after random shortcuts and via-points."""
         query, one = self.query, improving(self.query, word)
-        pace = Pace(self.budget, TIMELY if query.library.at_will else TIMELY_LINKED)
+        pace = Pace(self.budget, self.restarts.timely)
         done = 0
         while done < attempts:
             n = min(DRAWN, attempts - done)

@@ -66,7 +66,6 @@ def first_plan(
     *,
     budget: Budget = UNLIMITED,
     table: CostTable = NO_TABLE,
-    grids: Grids | None = None,
     begun: Begun | None = None,
     aside: Callable[[Budget], FirstPlan] | None = None,
     is_proven: Callable[[Budget], bool] | None = None,
@@ -74,13 +73,12 @@ def first_plan(
     """The first connection from start to a goal, at the first resolution that has one.
 
     The library of the query says which resolutions are tried, and when; expansions of the `budget`
-    are those of all searches together. `grids` are those of fine cells, and `begun` is the first
-    search of the schedule, if they are known. What finds words otherwise is asked `aside`, once,
-    where this takes long or ends without one; if that is exhausted, so is all. Whether it
-    `is_proven` that there is none is asked once, before that.
+    are those of all searches together. `begun` is the first search of the schedule, if it is known.
+    What finds words otherwise is asked `aside`, once, where this takes long or ends without one; if
+    that is exhausted, so is all. Whether it `is_proven` that there is none is asked once, before.
     """
     schedule = schedule_of(query.library)
-    guides = _Guides(query, table, grids)
+    guides = _Guides(query, table)
     room = 2**62 if budget.expansions is None else budget.expansions
     stages = list(schedule.stages[1:])
     turns = _turns(guides, schedule, first_resolutions(query.library, query.settings))
@@ -158,7 +156,7 @@ class _Guides:
 
     query: LatticeQuery
     table: CostTable
-    fine_grids: Grids | None
+    fine_grids: Grids | None = None
     coarse_grids: dict[float, DistanceGrid] = field(default_factory=dict)
 
     @property

@@ -15,7 +15,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
-from maneuver_automaton.refinement.improve import Patience, improve
+from maneuver_automaton.refinement.improve import Patience, Schedule, words_of
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -58,6 +58,14 @@ def query_of(problem):
     return lattice_query(problem, tuple(range(len(problem.goals))))
 
 
+PATIENT = Patience()
+
+
+def improving(query, word, *, budget=UNLIMITED, patience=PATIENT, **more):
+    schedule = Schedule(patience=patience, **more)
+    return words_of(query, budget=budget, schedule=schedule, known=word)
+
+
 @functools.cache
 def improved(name, *, expansions=EXPANSIONS):
     """First word, words found on the way, and what came of it."""
@@ -66,7 +74,8 @@ def improved(name, *, expansions=EXPANSIONS):
     assert first is not None
     incumbents = []
     counted = replace(UNLIMITED, expansions=expansions)
-    better = improve(query, first, budget=counted, patience=Patience(), better=incumbents.append)
+    better = improving(query, first, budget=counted)
+    incumbents += better
     return query, with_cost(first, query), incumbents, better
 
 
@@ -128,15 +137,7 @@ def incumbents_until(deadline, name="car"):
     query = query_of(PROBLEMS[name])
     first = improved(name)[1]
     word = Word(trims=first.trims, durations=first.durations)
-    incumbents = []
-    improve(
-        query,
-        word,
-        budget=budget,
-        patience=Patience(),
-        better=lambda better: incumbents.append(better.cost),
-    )
-    return incumbents
+    return [better.cost for better in improving(query, word, budget=budget)]
 
 
 @pytest.mark.exhaustive
@@ -154,10 +155,9 @@ def test_less_time_gives_the_beginning_of_what_more_time_gives():
 
 def test_less_patience_gives_the_beginning_too():
     query, first, incumbents, _ = improved("car")
-    short = []
     counted = replace(UNLIMITED, expansions=EXPANSIONS)
     impatient = Patience(attempts=1, passes=1)
-    improve(query, first, budget=counted, patience=impatient, better=short.append)
+    short = list(improving(query, first, budget=counted, patience=impatient))
     costs = [word.cost for word in incumbents]
     assert [word.cost for word in short] == costs[: len(short)]
 
@@ -165,21 +165,22 @@ def test_less_patience_gives_the_beginning_too():
 def test_it_ends_at_the_floor():
     query, first, _, better = improved("car")
     floor = 1.02 * better.word.cost
-    ended = improve(query, first, patience=Patience(), floor=floor)
+    ended = improving(query, first, floor=floor).to_the_end()
     assert ended.word.cost <= floor
     assert ended.attempts <= better.attempts
 
 
 def test_no_time_at_all():
     query, first, _, _ = improved("car")
-    ended = improve(query, first, budget=Budget(began=0.0, deadline=-math.inf), patience=Patience())
+    budget = Budget(began=0.0, deadline=-math.inf)
+    ended = improving(query, first, budget=budget).to_the_end()
     assert ended.word.cost <= first.cost
-    assert (ended.attempts, ended.expansions, ended.finished) == (0, 0, False)
+    assert (ended.attempts, ended.expansions, ended.is_late) == (0, 0, True)
 
 
 def test_the_empty_word_stays_empty():
     query = query_of(replace(BASE, goals=(Goal(pose=BASE.start),)))
-    ended = improve(query, query.word_of([], 0), patience=Patience(), floor=0.0)
+    ended = improving(query, query.word_of([], 0), floor=0.0).to_the_end()
     assert (len(ended.word.trims), ended.word.cost) == (0, 0.0)
 
 
@@ -196,6 +197,7 @@ def test_a_detour_round_nothing_is_cut_short():
              (ahead, 2.0)]  # fmt: skip
     word = query.word_of([(SWITCH, int(query.library.trims[k]), t) for k, t in there], 0)
     assert_admitted(query, with_cost(word, query))
-    ended = improve(query, word, patience=Patience(attempts=2000, passes=1))
+    patience = Patience(attempts=2000, passes=1)
+    ended = improving(query, word, patience=patience).to_the_end()
     assert ended.word.trims.tolist() == query.library.trims[[ahead]].tolist()
     assert ended.word.cost == pytest.approx(6.0, abs=1e-9)

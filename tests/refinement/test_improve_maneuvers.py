@@ -12,8 +12,7 @@ import pytest
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
-from maneuver_automaton.refinement.improve import FINER, Improvement, Patience
-from maneuver_automaton.refinement.incumbent_words import incumbent_words
+from maneuver_automaton.refinement.improve import Patience, Schedule, words_of
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps
@@ -27,12 +26,13 @@ pytestmark = compiled_only
 @functools.cache
 def first_word():
     """The first word past the walls, as the lattice finds it."""
-    return next(incumbent_words(query(), budget=replace(UNLIMITED, expansions=600))).word
+    counted = replace(UNLIMITED, expansions=600)
+    return next(iter(words_of(query(), budget=counted, schedule=Schedule())))
 
 
 def improving(word, **changes):
-    settings = {"budget": replace(UNLIMITED, expansions=0), "patience": Patience()} | changes
-    return Improvement(query(), word, grids=tuple, restarts=FINER, **settings)
+    counted, schedule = replace(UNLIMITED, expansions=0), Schedule(patience=Patience(), **changes)
+    return words_of(query(), budget=counted, schedule=schedule, known=word)
 
 
 def assert_sound(word):
@@ -56,7 +56,7 @@ def assert_sound(word):
 def test_every_gain_is_a_sound_word_and_cheaper():
     """Without a new search, shortcuts and via-points alone."""
     first = first_word()
-    gains = list(improving(first).gains())
+    gains = list(improving(first))
     costs = [first.cost, *(word.cost for word in gains)]
     assert gains
     assert all(b < a for a, b in itertools.pairwise(costs))
@@ -65,7 +65,7 @@ def test_every_gain_is_a_sound_word_and_cheaper():
 
 
 def test_the_same_twice_to_the_last_bit():
-    one, other = (list(improving(first_word()).gains())[-1] for _ in range(2))
+    one, other = (list(improving(first_word()))[-1] for _ in range(2))
     assert one.cost.hex() == other.cost.hex()
     assert one.durations.tobytes() == other.durations.tobytes()
 
@@ -73,7 +73,7 @@ def test_the_same_twice_to_the_last_bit():
 def test_attempts_gain_beyond_the_dynamic_program(monkeypatch):
     def cost(attempts):
         monkeypatch.setattr(improvement, "SLICE", attempts)
-        return list(improving(first_word()).gains())[-1].cost
+        return list(improving(first_word()))[-1].cost
 
     assert cost(4000) < cost(0)
 

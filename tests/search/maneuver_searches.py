@@ -9,7 +9,7 @@ import numpy as np
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.refinement.incumbent_words import incumbent_words
+from maneuver_automaton.refinement.improve import Schedule, words_of
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
 from maneuver_automaton.search._kernels_connection import edge_end, edge_free
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -41,7 +41,7 @@ def search_maneuvers(
     max_expansions: int | None = None,
     first_only: bool = False,
 ) -> ManeuverResult:
-    """Words from the start to a goal, each cheaper than the one before: see `incumbent_words`.
+    """Words from the start to a goal, each cheaper than the one before: see `words_of`.
 
     Returns
     -------
@@ -50,20 +50,18 @@ def search_maneuvers(
     """
     begun = time.monotonic()
     found: list[tuple[Word, int, float]] = []
-    total, status = 0, SearchStatus.EXHAUSTED
-    counted = replace(budget, expansions=max_expansions)
-    for incumbent in incumbent_words(query, budget=counted):
-        total, status = incumbent.expansions, incumbent.status
-        if incumbent.word is not None:
-            found.append((incumbent.word, total, time.monotonic() - begun))
-            if first_only:
-                break
+    search = words_of(query, budget=replace(budget, expansions=max_expansions), schedule=Schedule())
+    for word in search:
+        found.append((word, search.expansions, time.monotonic() - begun))
+        if first_only:
+            break
+    status = SearchStatus.OUT_OF_BUDGET if search.is_late else SearchStatus.EXHAUSTED
     return ManeuverResult(
         status=SearchStatus.FOUND if found else status,
         words=tuple(word for word, _, _ in found),
         found_after=tuple(n for _, n, _ in found),
         found_s=tuple(s for _, _, s in found),
-        expansions=total,
+        expansions=search.expansions,
     )
 
 
