@@ -748,7 +748,7 @@ class Problem:
     @property
     def has_inertia(self) -> bool:
         """Whether the vehicle cannot switch at will between the trims that it needs."""
-        return bool(self.automaton.model.reduced_names) or not self.automaton.is_kinematic
+        return self.automaton.has_inertia
 
     @property
     def climbs_among_obstacles(self) -> bool:

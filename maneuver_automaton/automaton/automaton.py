@@ -66,9 +66,9 @@ class Automaton(Drawn):
             raise InvalidAutomaton("automaton: got no trim, need at least one")
         _check_names(self.trim_names)
         object.__setattr__(self, "model", in_world(self.model))
-        if isinstance(self.model, OnlyTranslated):  # what is along the world's axes gets headings
-            trims = tuple(trim_in_world(self.model, trim) for trim in self.trims)
-            maneuvers = tuple(maneuver_in_world(self.model, one) for one in self.maneuvers)
+        if self.translated is not None:  # what is along the world's axes gets headings
+            trims = tuple(trim_in_world(self.translated, trim) for trim in self.trims)
+            maneuvers = tuple(maneuver_in_world(self.translated, one) for one in self.maneuvers)
             object.__setattr__(self, "trims", trims)
             object.__setattr__(self, "maneuvers", maneuvers)
         dof, n_controls = self.model.group.dof, len(self.model.control_names)
@@ -339,6 +339,11 @@ class Automaton(Drawn):
             return None
         sizes = [float(np.abs(self.trims[k].reduced_state).sum()) for k in still]
         return int(still[int(np.argmin(sizes))])
+
+    @property
+    def has_inertia(self) -> bool:
+        """Whether the vehicle cannot switch at will between the trims that it needs."""
+        return bool(self.model.reduced_names) or not self.is_kinematic
 
     @cached_property
     def is_kinematic(self) -> bool:

@@ -9,7 +9,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.groups import LieGroup
-from maneuver_automaton.models import OnlyTranslated
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 
@@ -90,8 +89,8 @@ def posed(
     ValueError
         If no trim has the heading, or the trim named has another one: the nearest is named.
     """
-    model, kinematic = automaton.model, automaton.is_kinematic
-    assert isinstance(model, OnlyTranslated)
+    model, kinematic = automaton.translated, automaton.is_kinematic
+    assert model is not None
     stated = pose.shape == (model.stated.group.dof,)
     if not stated and pose.shape != (model.group.dof,):
         raise ValueError(
@@ -136,8 +135,8 @@ def motion_of(automaton: Automaton, by: LieGroup) -> LieGroup:
     ValueError
         If translations alone move the vehicle, and `by` turns it.
     """
-    model = automaton.model
-    if not isinstance(model, OnlyTranslated):
+    model = automaton.translated
+    if model is None:
         return by
     if by.dof == model.stated.group.dof and "heading" not in by.coordinates:
         return model.group(np.insert(by.pose, 2, 0.0))

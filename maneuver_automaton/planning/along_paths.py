@@ -16,7 +16,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.checking import TooLate, what_is_hit
-from maneuver_automaton.planning.incumbents import Incumbents, Step
+from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.no_way import proven_apart
 from maneuver_automaton.planning.polishing import Polish, guess_along
 from maneuver_automaton.planning.result import Workspace
@@ -33,7 +33,7 @@ WAITS = 9  # at rest, before a path is followed among moving obstacles
 
 
 @dataclass(slots=True, eq=False)
-class AlongPaths(Step):
+class AlongPaths(PlanningStep):
     """Stop and steer along the paths of a kinematic vehicle."""
 
     polish: Polish | None  # what guesses along the paths are for

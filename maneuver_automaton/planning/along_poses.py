@@ -37,7 +37,7 @@ from maneuver_automaton.planning.arrivals import (
     set_bound,
 )
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_goal_blocked
-from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, Step
+from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, PlanningStep
 from maneuver_automaton.planning.on_the_way import goal_around
 from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, Via
@@ -72,7 +72,7 @@ class Chain:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AlongPoses(Step):
+class AlongPoses(PlanningStep):
     """Plans that pass the poses on the way of a problem, by `answer` to problems without."""
 
     answer: Answer

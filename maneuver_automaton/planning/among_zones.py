@@ -30,7 +30,7 @@ from maneuver_automaton.collision.surroundings import fastest_point, parts_of, s
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.planning.blocked import blocked_ends
-from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, Step
+from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, PlanningStep
 from maneuver_automaton.planning.polishing import (
     guess_of_plan,
     iterations_within,
@@ -53,7 +53,7 @@ SAMPLES = 1000  # of a plan, between which a zone may be touched
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AmongZones(Step):
+class AmongZones(PlanningStep):
     """Plans that keep to zones, by `search`, which asks nothing of zones but what it is told.
 
     The answer need not be the best: only where the plan that knows of no zones keeps to them, it is

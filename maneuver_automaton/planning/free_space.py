@@ -14,7 +14,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.blocked import goals_left
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.checking import Condition, load_checking
-from maneuver_automaton.planning.incumbents import Candidate, Incumbents, Step
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents, PlanningStep
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search import SearchStatus
@@ -92,7 +92,7 @@ def certificate_of(found: Incumbents) -> float | None:
 
 
 @dataclass(slots=True, eq=False)
-class AllWords(Step):
+class AllWords(PlanningStep):
     """The words of free space, by exhaustive search or insertion: obstacles sort out what hits."""
 
     candidates: list[Candidate] = field(default_factory=list)  # cheapest first, then the shortest
@@ -202,7 +202,7 @@ def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | No
     )
 
 
-class FreeWords(Step):
+class FreeWords(PlanningStep):
     """Words of free space before the lattice is searched; among obstacles some may be free."""
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
@@ -226,7 +226,7 @@ class FreeWords(Step):
         found.offer_as_they_come(plans, proven=not problem.obstacles)
 
 
-class TurnedByManeuvers(Step):
+class TurnedByManeuvers(PlanningStep):
     """Maneuvers in a row with straight coasts, where no word of trims turns the vehicle."""
 
     def is_due(self, found: Incumbents) -> bool:

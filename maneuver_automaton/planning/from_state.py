@@ -21,7 +21,7 @@ from maneuver_automaton.automaton.cutting import joined
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import TooLate, what_is_hit
-from maneuver_automaton.planning.incumbents import Incumbents, Step
+from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.polishing import Polish, why_not_polished
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus, Workspace
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -62,7 +62,7 @@ class BetweenTrims(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FromState(Step):
+class FromState(PlanningStep):
     """Plans from or to a state, by `answer` to problems between trims, which `prepares` readies."""
 
     answer: Answer

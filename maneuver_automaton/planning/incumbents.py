@@ -422,7 +422,7 @@ class Incumbents:
         return {"search": searched, "refine": refined, "audit": self.checking}
 
 
-class Step(Protocol):
+class PlanningStep(Protocol):
     """One way to plans of a problem."""
 
     __slots__ = ()

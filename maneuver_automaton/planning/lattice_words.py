@@ -22,7 +22,7 @@ from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
-from maneuver_automaton.planning.incumbents import Candidate, Incumbents, Step
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents, PlanningStep
 from maneuver_automaton.planning.no_way import along_free_path, before_proof, proven_apart
 from maneuver_automaton.planning.polishing import BY_TIME, Polish
 from maneuver_automaton.planning.result import Workspace
@@ -64,7 +64,7 @@ BLOCKING = (  # where discs block a way and their radii, in shares of the path
 
 
 @dataclass(slots=True, eq=False)
-class Lattice(Step):
+class LatticeWords(PlanningStep):
     """The words that the lattice finds: a first one, then better ones, and others beside it."""
 
     polish: Polish | None = None  # of what it finds; it then gets a share of the time alone
@@ -80,16 +80,16 @@ class Lattice(Step):
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """Load the kernels, price the maneuvers, make the library and its table."""
         load_kernels("lattice", "improvement")
-        if not problem.has_inertia and problem.start.size == 3:
-            cost_to_go_table(problem, prepared=workspace.prepared)
-            if stands_for_more(problem):
-                load_kernels("insertion")
-        elif problem.has_inertia:
+        if problem.has_inertia:
             goals, horizon = range(len(problem.goals)), problem.horizon
             library = lattice_library(problem, goals, prepared=workspace.prepared)
             if horizon.time or horizon.max_time or library.per_metre == 0.0:
                 in_time = replace(problem, cost=BY_TIME)
                 lattice_library(in_time, goals, prepared=workspace.prepared)
+        elif problem.start.size == 3:
+            cost_to_go_table(problem, prepared=workspace.prepared)
+            if stands_for_more(problem):
+                load_kernels("insertion")
 
     def offer(self, found: Incumbents) -> None:
         """Offer words as they are found, then what improving them finds.

@@ -34,7 +34,7 @@ Goals = ArrayLike | Sequence[Goal]
 Queries = list[Problem] | tuple[Array, list[Any]]  # problems; or starts and goals of a planner
 
 
-class Prepared(Protocol):
+class AnyPlanner(Protocol):
     """A `Planner`, as far as queries are asked with it."""
 
     @property
@@ -49,7 +49,7 @@ class Prepared(Protocol):
 class _Asked:
     """Everything that is asked, and how to answer it."""
 
-    planner: Prepared | None
+    planner: AnyPlanner | None
     queries: Queries
     time_limit: float
     take: Take | None
@@ -135,7 +135,7 @@ def plan_many(
 
 
 def plan_many_on(
-    planner: Prepared,
+    planner: AnyPlanner,
     starts: ArrayLike,
     goals: Goals,
     *,
@@ -152,7 +152,7 @@ def plan_many_on(
     return _answers(asked, jobs, scheduler, journal, progress)
 
 
-def _queries(planner: Prepared, starts: ArrayLike, goals: Goals) -> tuple[Array, list[Any]]:
+def _queries(planner: AnyPlanner, starts: ArrayLike, goals: Goals) -> tuple[Array, list[Any]]:
     """Starts (n, dof) and as many goals; one start or one goal serves all."""
     dof = planner.stated["automaton"].model.group.dof
     places = np.atleast_2d(as_array("starts", starts, last=dof))
@@ -230,8 +230,8 @@ def _answered_apart(piece: tuple[bytes, bytes, float, Take | None]) -> bytes:
 
 
 @functools.lru_cache(maxsize=KNOWN_PLANNERS)
-def _planner_of(common: bytes) -> Prepared | None:
-    planner: Prepared | None = pickle.loads(common)
+def _planner_of(common: bytes) -> AnyPlanner | None:
+    planner: AnyPlanner | None = pickle.loads(common)
     return planner
 
 

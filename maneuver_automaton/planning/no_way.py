@@ -137,7 +137,7 @@ def along_free_path(query: LatticeQuery, table: CostTable) -> Callable[[Budget],
 
     The answer is `exhausted` if it is proven that there is no path.
     """
-    able = query.library.at_will and query.problem.start.size == 3 and query.most_trims == 0
+    able = query.library.at_will and query.most_trims == 0
     if not able or query.moves or query.world.arrays.field.distance.size == 0:
         return None
     return functools.partial(_followed, query, table)

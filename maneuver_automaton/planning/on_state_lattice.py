@@ -9,7 +9,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
-from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents, Step
+from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents, PlanningStep
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.lattice import in_frame_of_problem
@@ -24,7 +24,7 @@ MOST_WIDER = 2  # times that a window is widened where there is no plan
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
 
-class StateLattice(Step):
+class OnStateLattice(PlanningStep):
     """The graph of a library on a lattice: its cheapest plan, and the proof.
 
     Every node within the tolerance of a goal is an aim. Obstacles are met where the body comes

@@ -98,8 +98,7 @@ class Planner:
         object.__setattr__(self, "workspace", Workspace(self.obstacles))
         automaton = self.automaton
         # With inertia, without a rest, it has to be given a trim to end in; any will do here.
-        at_will = automaton.is_kinematic and not automaton.model.reduced_names
-        named = not at_will and automaton.rest is None
+        named = automaton.has_inertia and automaton.rest is None
         last = automaton.trim_names[0] if named else None
         here = origin_of(automaton, automaton.trims[0])
         aim = Goal(pose=np.where(np.arange(here.size) == 2, here, 1.0), trim=last)

@@ -26,7 +26,7 @@ from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casad
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import BodyPart, Guard
-from maneuver_automaton.planning.incumbents import Incumbents, Step
+from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
@@ -107,7 +107,7 @@ def left_out(*problems: Problem) -> tuple[str, ...]:
 
 
 @dataclass(slots=True, eq=False)
-class Polish(Step):
+class Polish(PlanningStep):
     """Polish kinematic plans of different gears, and the plans found; offer what is cheaper."""
 
     guesses: list[Aimed] = field(default_factory=list)  # along kinematic plans that are known
@@ -219,10 +219,10 @@ def _other_turns(
 ) -> Iterator[Aimed]:
     """Guesses along words that switch at will, and turn in other ways than the plans known."""
     seen, index = {_turns(plan) for plan, _ in known}, known[0][1]
-    at_will = replace(problem, cost=BY_TIME, horizon=Horizon())
-    setup = sub_library(search_setup(at_will, problem.goals[index]))
+    quickest = replace(problem, cost=BY_TIME, horizon=Horizon())
+    setup = sub_library(search_setup(quickest, problem.goals[index]))
     for word in search_setup_words(
-        at_will, setup, alternatives=MOST_WORDS, budget=budget, spare=False
+        quickest, setup, alternatives=MOST_WORDS, budget=budget, spare=False
     ):
         plan = plan_of(problem, word)
         if (turns := _turns(plan)) not in seen:

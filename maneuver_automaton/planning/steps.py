@@ -31,9 +31,9 @@ from maneuver_automaton.planning.free_space import (
     certificate_of,
 )
 from maneuver_automaton.planning.from_state import FromState, between_trims
-from maneuver_automaton.planning.incumbents import Incumbents, Step
-from maneuver_automaton.planning.lattice_words import Lattice
-from maneuver_automaton.planning.on_state_lattice import StateLattice
+from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
+from maneuver_automaton.planning.lattice_words import LatticeWords
+from maneuver_automaton.planning.on_state_lattice import OnStateLattice
 from maneuver_automaton.planning.polished_price import prices_metres_alone
 from maneuver_automaton.planning.polishing import Polish, why_not_polished
 from maneuver_automaton.planning.result import PlanResult, PlanStatus, Workspace
@@ -51,7 +51,7 @@ SAVING = 1e-3  # share of a cost that better times have to save for others to be
 class Steps(NamedTuple):
     """The steps of a problem in their order, and how what they find is looked at."""
 
-    steps: Sequence[Step]
+    steps: Sequence[PlanningStep]
     likeness: Likeness = CONVERGED  # of plans that count as one motion
     certified: bool = False  # whether reduced costs say something of the cheapest plan
 
@@ -114,7 +114,7 @@ def leg_steps(problem: Problem) -> Steps:
         return Steps(
             [FromState(functools.partial(answer, course=leg_steps), prepare_steps)], POLISHED
         )
-    graph = [StateLattice()] if _may_be_a_graph(problem) else []
+    graph = [OnStateLattice()] if _may_be_a_graph(problem) else []
     if problem.has_tolerance:
         return Steps([*graph, WithinTolerance(functools.partial(answer, course=exact_steps))])
     rest = exact_steps(problem)
@@ -125,9 +125,9 @@ def exact_steps(problem: Problem) -> Steps:
     """The steps to plans that end exactly at a goal: of the search, or of several among zones."""
     if problem.zones:
         zones = AmongZones(functools.partial(answer, course=search_steps))
-        return Steps([Ends(), NearlyMet(), zones])
+        return Steps([FreeEnds(), NearlyMet(), zones])
     rest = search_steps(problem)
-    return rest._replace(steps=[Ends(), *rest.steps])
+    return rest._replace(steps=[FreeEnds(), *rest.steps])
 
 
 def search_steps(problem: Problem) -> Steps:
@@ -143,15 +143,15 @@ def search_steps(problem: Problem) -> Steps:
         if not uses_lattice(problem):
             return Steps([NearlyMet(), AllWords(), BestTimes()], certified=invariant)
         climbs = problem.start.size > 3
-        first: list[Step] = [Checks(), FreeWords()] if climbs else []
-        lattice = [Lattice()] if method in ("auto", "lattice") else []
+        first: list[PlanningStep] = [Checks(), FreeWords()] if climbs else []
+        lattice = [LatticeWords()] if method in ("auto", "lattice") else []
         return Steps([NearlyMet(), *first, *lattice, BestTimes()], UNFINISHED)
     searched, linked = method in ("auto", "lattice"), bool(automaton.maneuvers)
     stops = follows_paths(automaton.model) and steers_at_rest(automaton.model)
     along = searched and stops and problem.rests_at_both_ends
     shortest = along and prices_metres_alone(problem.cost)  # to stop and steer costs no metre
     polish = None if shortest or why_not_polished(problem) else Polish()
-    steps: list[Step] = [NearlyMet(), Checks()]
+    steps: list[PlanningStep] = [NearlyMet(), Checks()]
     if along:
         steps.append(AlongPaths(polish))
     if linked and (not searched or (method == "auto" and _suits_words(problem))):
@@ -160,7 +160,7 @@ def search_steps(problem: Problem) -> Steps:
     if only_maneuvers_turn(automaton) and not on_nodes:  # a sequence ends at a node by chance
         steps.append(TurnedByManeuvers())
     if linked and searched:
-        steps.append(Lattice(polish))
+        steps.append(LatticeWords(polish))
     if polish:
         steps.append(polish)
     steps.append(BestTimes())
@@ -174,7 +174,7 @@ def prepare_steps(problem: Problem, workspace: Workspace) -> None:
     if problem.has_states:
         FromState(answer, prepare_steps).prepare(problem, workspace)
         return
-    if _may_be_a_graph(problem) and StateLattice().prepare(problem, workspace):
+    if _may_be_a_graph(problem) and OnStateLattice().prepare(problem, workspace):
         return
     for step in search_steps(problem).steps:
         step.prepare(problem, workspace)
@@ -218,7 +218,7 @@ def _uses_lattice(problem: Problem) -> bool:
     return placed or method == "lattice" or (method == "auto" and bool(problem.obstacles))
 
 
-class Ends(Step):
+class FreeEnds(PlanningStep):
     """Tell where no vehicle can be; where all ends are free, begin the search of the lattice."""
 
     def is_due(self, found: Incumbents) -> bool:
@@ -234,7 +234,7 @@ class Ends(Step):
             ended.is_complete = ended.verdict is not None
 
 
-class NearlyMet(Step):
+class NearlyMet(PlanningStep):
     """What meets a goal for the checks, however far an exact end is from it."""
 
     def is_due(self, found: Incumbents) -> bool:
@@ -246,7 +246,7 @@ class NearlyMet(Step):
         found.offer_nearly_met()
 
 
-class BestTimes(Step):
+class BestTimes(PlanningStep):
     """The cheapest plan with the best of its coasting times, by what its places cost."""
 
     def is_due(self, found: Incumbents) -> bool:
@@ -265,7 +265,7 @@ class BestTimes(Step):
                 found.offer(better, best.goal_index, proven=False)
 
 
-class Checks(Step):
+class Checks(PlanningStep):
     """Have the map ready for checks, where plans are checked as they come."""
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:

@@ -21,7 +21,7 @@ from maneuver_automaton.automaton.same_motion import CONVERGED
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
-from maneuver_automaton.planning.incumbents import Incumbents, Step
+from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.no_way import proven_blocked
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem
@@ -43,7 +43,7 @@ SPARE = 3  # plans asked for each alternative: with loose ends some are one moti
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class WithinTolerance(Step):
+class WithinTolerance(PlanningStep):
     """Plans that end within the tolerance of a goal, by `answer` to simpler questions."""
 
     answer: Answer

@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.models import CarWithTrailer, Model, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.primitives import Trajectory
@@ -313,15 +313,13 @@ class PathGuesses(NamedTuple):
     """From a plan, the first and last reduced state (n_z,), and how many intervals it gets."""
 
 
-def path_guesses(model: Model) -> PathGuesses | None:
+@functools.singledispatch
+def path_guesses(model: object) -> PathGuesses | None:
     """How guesses are made along kinematic plans; None for a vehicle that is led by no path."""
-    if isinstance(model, SecondOrderCar):
-        return _of_car(model)
-    if isinstance(model, SecondOrderUnicycle):
-        return _of_unicycle(model)
-    return _of_trailer(model) if isinstance(model, CarWithTrailer) else None
+    return None
 
 
+@path_guesses.register
 def _of_car(model: SecondOrderCar) -> PathGuesses:
     library = functools.partial(
         car_library, wheelbase=model.wheelbase, max_steering=model.max_steering
@@ -333,6 +331,7 @@ def _of_car(model: SecondOrderCar) -> PathGuesses:
     )
 
 
+@path_guesses.register
 def _of_unicycle(model: SecondOrderUnicycle) -> PathGuesses:
     library = functools.partial(
         unicycle_library, max_speed=model.max_speed, max_turn_rate=model.max_turn_rate
@@ -344,6 +343,7 @@ def _of_unicycle(model: SecondOrderUnicycle) -> PathGuesses:
     )
 
 
+@path_guesses.register
 def _of_trailer(model: CarWithTrailer) -> PathGuesses:
     """The car alone, which turns no tighter than its trailer can follow for long.
 

@@ -155,7 +155,7 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
     if query.around.place.value.size and bounds.x is None:
         return None  # what places cost is known in the window of one query alone
     plain = first.durations == 1.0 and query.least_coast == 0.0 and first.margin == 1.0
-    if not (library.at_will and plain and query.plane.arrays.field.distance.size):
+    if not (plain and query.plane.arrays.field.distance.size):
         return None
     task = task_of(query, first)
     grid = laid_grid(query.plane, query.box, query.start, coarse=first.coarse)

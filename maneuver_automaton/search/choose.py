@@ -317,7 +317,7 @@ def insertion_stages(task: InsertionTask) -> Iterator[SearchResult]:
     """Results so far after each stage; the last one is the answer of `search_insertion`."""
     most = task.alternatives + 1
     # a trim that has to last a while cannot be priced for an instant
-    at_will = task.problem.automaton.is_kinematic and task.problem.horizon.min_coast == 0.0
-    for stage in (free_stages if at_will else linked_stages)(task):
+    instants = task.problem.automaton.is_kinematic and task.problem.horizon.min_coast == 0.0
+    for stage in (free_stages if instants else linked_stages)(task):
         kept = tuple(one for one in stage.solutions if one.cost < task.upper_bound)[:most]
         yield replace(stage, solutions=kept, status=SearchStatus.FOUND if kept else stage.status)

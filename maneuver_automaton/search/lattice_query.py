@@ -201,7 +201,7 @@ def lattice_query(
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
-    if library.at_will and problem.start.size == 3 and not (problem.parts or problem.moves):
+    if library.at_will and not (problem.parts or problem.moves):
         aimed = _ends_in_plane(problem, goals, ends or ends_of(problem))
     else:
         aimed = _ends(problem, goals, library, worlds)

@@ -15,7 +15,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
-from maneuver_automaton.planning.lattice_words import Lattice
+from maneuver_automaton.planning.lattice_words import LatticeWords
 from maneuver_automaton.planning.polishing import guess_of_plan, polish_plans
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.receding_horizon import simulate
@@ -59,8 +59,8 @@ def test_a_plan_that_only_polishing_finds_does_not_wait_for_the_lattice():
         had.append(lattice.found.cost)
         return improved(lattice)
 
-    improved = Lattice.improved
-    with patch.object(Lattice, "improved", late):
+    improved = LatticeWords.improved
+    with patch.object(LatticeWords, "improved", late):
         result = plan(problem, time_limit=60.0)
     assert had[0] < math.inf
     assert result.plan.word == ("polished",)
