@@ -22,7 +22,7 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.refinement.improve import Schedule, words_of
+from maneuver_automaton.refinement.improve import WordSchedule, words_of
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
 
@@ -82,7 +82,7 @@ def measured(problem: Problem, seconds: float) -> Row:
     query = lattice_query(problem, (0,))
     first = word = None
     first_s = word_s = np.nan
-    for word in words_of(query, budget=Budget.from_now(seconds), schedule=Schedule()):
+    for word in words_of(query, budget=Budget.from_now(seconds), schedule=WordSchedule()):
         word_s = time.perf_counter() - began
         if first is None:
             first, first_s = word, word_s

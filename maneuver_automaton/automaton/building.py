@@ -193,12 +193,6 @@ def all_pairs(automaton: Automaton, *, keep_sign: Sequence[str] = ()) -> list[Pa
 
     Where controls keep their sign, there is one pair for every sign that both classes have, zero
     apart: ahead to ahead, and reverse to reverse.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> all_pairs(Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0)}))
-    []
     """
     kept = [automaton.model.control_names.index(name) for name in keep_sign]
     signs = np.sign(automaton.controls[:, kept])

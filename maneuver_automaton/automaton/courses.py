@@ -108,13 +108,7 @@ def samples_entry(course: Trajectory) -> dict[str, Any]:
 
 
 def even_times(duration: float, count: int) -> Array:
-    """Ends (count,) of equal intervals [s].
-
-    Examples
-    --------
-    >>> even_times(3.0, 2).tolist()
-    [1.5, 3.0]
-    """
+    """Ends (count,) of equal intervals [s]."""
     return duration * (np.arange(1, count + 1) / max(count, 1))  # the last one is the duration
 
 

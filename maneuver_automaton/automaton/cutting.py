@@ -22,10 +22,7 @@ NOTHING = 1e-9  # [s] what lasts no longer has passed, or has not begun
 def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
     """A plan whose maneuvers have samples at `times` (n,) [s] too, where it can be cut exactly.
 
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course.
+    Raises ValueError if a maneuver has no course.
     """
     if not any(plan.maneuvers):
         return plan
@@ -42,20 +39,7 @@ def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
 
 
 def head_of(plan: Plan, until: float) -> Plan:
-    """The first `until` seconds of a plan; of a maneuver that is cut, its begin.
-
-    Examples
-    --------
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0])
-    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0])
-    >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1, 0, 0], duration=2,
-    ...     course=Trajectory(time=np.array([0.0, 1.0, 2.0]), control=np.ones((3, 1)),
-    ...                       pose=np.array([[0, 0, 0], [0.25, 0, 0], [1.0, 0, 0]]),
-    ...                       reduced_state=np.array([[0.0], [0.5], [1.0]])))
-    >>> plan = Plan([0, 0, 0], (rest, ahead), durations=[0.0, 3.0], maneuvers=(go,))
-    >>> head_of(plan, 1.0).end.tolist(), head_of(plan, 3.0).end.tolist()
-    ([0.25, 0.0, 0.0], [2.0, 0.0, 0.0])
-    """
+    """The first `until` seconds of a plan; of a maneuver that is cut, its begin."""
     if not plan.maneuvers:
         heads = first_times(plan.durations.tolist(), until)
         trims = plan.trims[: len(heads)]
@@ -81,21 +65,8 @@ def head_of(plan: Plan, until: float) -> Plan:
 def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
     """The rest of a plan `after` seconds, from `start`; of a maneuver under way, its end.
 
-    Parameters
-    ----------
-    plan : Plan
-    after : float
-        [s] that have passed since its start.
-    start : (dof,) array, optional
-        Where the vehicle is [m, m, rad(, m)]; if omitted, where the plan says.
-
-    Examples
-    --------
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0])
-    >>> hop = Maneuver(name="hop", source="rest", target="rest", displacement=[1, 0, 0], duration=2)
-    >>> plan = Plan([0, 0, 0], (rest, rest), durations=[1.0, 3.0], maneuvers=(hop,))
-    >>> tail_of(plan, 3.5).start.tolist(), tail_of(plan, 3.5).durations.tolist()
-    ([1.0, 0.0, 0.0], [2.5])
+    `after`: [s] that have passed since its start. `start`: where the vehicle is [m, m, rad(, m)];
+    if omitted, where the plan says.
     """
     if not plan.maneuvers:
         lasting = last_times(plan.durations.tolist(), after)

@@ -14,17 +14,7 @@ from maneuver_automaton.primitives.turning import HEADING_TOLERANCE
 
 
 def trim_headings(automaton: Automaton) -> Array | None:
-    """Heading (m,) [rad] that each trim has; None if a trim is driven at any heading.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.groups import translations
-    >>> from maneuver_automaton.models import UserModel
-    >>> stage = UserModel(name="stage", group=translations(2), control_names=("v_x", "v_y"),
-    ...                   velocity=lambda z, u: [u[0], u[1]])
-    >>> trim_headings(Automaton.of_controls(stage, {"right": (1, 0), "up": (0, 1)})).tolist()
-    [0.0, 0.0]
-    """
+    """Heading (m,) [rad] that each trim has; None if a trim is driven at any heading."""
     model = automaton.translated
     if model is None:
         return None
@@ -71,23 +61,10 @@ def posed(
 ) -> tuple[tuple[Array, str | None], ...]:
     """Poses with a heading, and the trims in which the vehicle is there: one for each heading.
 
-    Parameters
-    ----------
-    automaton : Automaton
-        Of a vehicle that translations alone move.
-    pose : array
-        With or without a heading.
-    what : str
-        What messages call it.
-    trim : str, optional
-        The trim there, if it is known.
-    free : bool
-        Whether any heading will do.
-
-    Raises
-    ------
-    ValueError
-        If no trim has the heading, or the trim named has another one: the nearest is named.
+    `automaton`: of a vehicle that translations alone move. `pose`: with or without a heading.
+    `what`: what messages call it. `trim`: the trim there, if it is known. `free`: whether any
+    heading will do. Raises ValueError if no trim has the heading, or the trim named has another
+    one: the nearest is named.
     """
     model, kinematic = automaton.translated, automaton.is_kinematic
     assert model is not None
@@ -130,10 +107,7 @@ def posed(
 def motion_of(automaton: Automaton, by: LieGroup) -> LieGroup:
     """The motion `by` on the poses of an automaton, by which the vehicle looks the same.
 
-    Raises
-    ------
-    ValueError
-        If translations alone move the vehicle, and `by` turns it.
+    Raises ValueError if translations alone move the vehicle, and `by` turns it.
     """
     model = automaton.translated
     if model is None:

@@ -45,13 +45,7 @@ class Entry:
 
 
 def journal_path(library: Path) -> Path:
-    """Where the journal of a library file lies: beside it.
-
-    Examples
-    --------
-    >>> journal_path(Path("boats/hovercraft.json")).as_posix()
-    'boats/hovercraft.json.journal'
-    """
+    """Where the journal of a library file lies: beside it."""
     return library.with_name(library.name + ".journal")
 
 

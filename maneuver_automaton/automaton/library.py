@@ -319,13 +319,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def stock_libraries() -> tuple[str, ...]:
-    """Names of the libraries that come with the package, in order.
-
-    Examples
-    --------
-    >>> "second_order_car" in stock_libraries()
-    True
-    """
+    """Names of the libraries that come with the package, in order."""
     names = (entry.name for entry in _folder().iterdir())
     return tuple(sorted(name.removesuffix(".json") for name in names if name.endswith(".json")))
 

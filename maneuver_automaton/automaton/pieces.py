@@ -58,10 +58,8 @@ def words_of(plan: Plan, library: Automaton) -> list[Piece]:
 def plan_of(start: ArrayLike, time: float, words: Sequence[Piece], library: Automaton) -> Plan:
     """The plan from a pose (dof,) at a time [s]; maneuvers are those of the library, or cut.
 
-    Raises
-    ------
-    ValueError, KeyError, TypeError
-        If a piece misses a key, or names what the library has not.
+    Raises ValueError, KeyError, TypeError if a piece misses a key, or names what the library has
+    not.
     """
     durations = [float(one["duration_s"]) for one in words]
     if all(one["kind"] == "trim" for one in words) and library.is_kinematic:

@@ -18,17 +18,7 @@ from maneuver_automaton.primitives import Maneuver
 
 
 def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> IntArray:
-    """Indices, rising, of the trims reached from `start` that lead to one of `goals`.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderCar
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5,
-    ...                      max_acceleration=1.0, max_steering_rate=0.5)
-    >>> library = Automaton.of_model(car, {"speed": [0.0, 1.0], "steering": [0.0]})
-    >>> trims_between(library, 0, [1]).tolist()
-    [0, 1]
-    """
+    """Indices, rising, of the trims reached from `start` that lead to one of `goals`."""
     classes, (graph, against) = automaton.trim_classes, _graphs(automaton)
     ahead = _reached(graph, [int(classes[start])])
     back = _reached(against, sorted({int(classes[goal]) for goal in goals}))
@@ -124,13 +114,6 @@ def validate(automaton: Automaton) -> AutomatonReport:
     way only, unless maneuvers do what trims cannot, which is not looked into.
 
     Source: Jurdjevic (1997), *Geometric Control Theory*, Ch. 3, for the last step.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "back": (-1.0, 0.0)})
-    >>> validate(robot).reason
-    'only straights: the heading never changes'
     """
     components, dead_ends, unused = _reach(automaton)
     controllable, reason = _controllable(automaton, components)

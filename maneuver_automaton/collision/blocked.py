@@ -122,24 +122,7 @@ def touched_all_round(
     which proves it for all headings about one. False also where that takes too many headings.
     Obstacles that move do not count.
 
-    Parameters
-    ----------
-    footprint : tuple of Shape
-    obstacles : tuple of obstacles
-    place : (2,) array
-        Of the footprint's frame [m].
-    margin : float
-        Nearer than this is too near [m].
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Box, Disc, Obstacle
-    >>> walls = [Obstacle(Box([6.0, 0.2], [0.0, y])) for y in (-1.2, 1.2)]
-    >>> touched_all_round((Box([3.0, 2.0]),), tuple(walls), np.zeros(2))
-    False
-    >>> posts = [Obstacle(Box([0.2, 6.0], [x, 0.0])) for x in (-1.2, 1.2)]
-    >>> touched_all_round((Box([3.0, 2.0]),), (*walls, *posts), np.zeros(2))
-    True
+    `place`: of the footprint's frame [m]. `margin`: nearer than this is too near [m].
     """
     import shapely
 

@@ -34,15 +34,7 @@ class Body(NamedTuple):
 
 @functools.lru_cache(maxsize=1024)  # a fleet has as many as it has vehicles
 def body_of(footprint: tuple[Shape, ...]) -> Body:
-    """Arrays of a footprint; a point if it is empty.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision.shapes import Box
-    >>> body = body_of((Box([4.0, 2.0]),))
-    >>> len(body.discs), round(body.reach, 3), body.inscribed, body.half_width
-    (3, 2.236, 1.0, 1.0)
-    """
+    """Arrays of a footprint; a point if it is empty."""
     pieces = [piece for shape in footprint for piece in convex_pieces(shape)]
     if not pieces:
         pieces = [(np.zeros((1, 2)), 0.0)]

@@ -30,16 +30,7 @@ class Solids(NamedTuple):
 
 
 def convex_pieces(shape: Shape) -> list[tuple[Array, float]]:
-    """Convex pieces (corners counter-clockwise, rounding) that together are the shape.
-
-    Examples
-    --------
-    >>> [(len(corners), r) for corners, r in convex_pieces(Box([2.0, 1.0]))]
-    [(4, 0.0)]
-    >>> corner = Polygon([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]])
-    >>> len(convex_pieces(corner))
-    2
-    """
+    """Convex pieces (corners counter-clockwise, rounding) that together are the shape."""
     if isinstance(shape, Disc):
         return [(shape.center[None].copy(), shape.radius)]
     if isinstance(shape, Box):

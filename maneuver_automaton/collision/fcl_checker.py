@@ -62,34 +62,10 @@ class FclChecker:
     `margin`, is never reported free. One that is reported as hit comes closer than
     ``margin + proven``.
 
-    Parameters
-    ----------
-    footprint : tuple of Shape
-        Parts of the body; empty for a point.
-    obstacles : tuple of Obstacle or OccupancyMap
-        Obstacles that the body must not touch.
-    margin : float
-        Distance to keep [m].
-    origin : (2,) sequence
-        Where to count from [m]: poses and obstacles near it lose no digit.
-    proven : float
-        Greatest distance [m] beyond the margin at which a motion may still count as hit.
-
-    Raises
-    ------
-    ValueError
-        If a polygon has no area, or a number is out of range.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Box, Obstacle
-    >>> wall = Obstacle(Box([0.1, 8.0], center=[5.0, 0.0]))
-    >>> checker = FclChecker((Box([4.0, 2.0]),), (wall,))
-    >>> checker.pose_hit([2.0, 0.0, 0.0]), checker.pose_hit([4.0, 0.0, 0.0])
-    (None, 0)
-    >>> start, ahead = [[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]]
-    >>> checker.motions_hit(start, ahead, [2.9]), checker.motions_hit(start, ahead, [12.0])
-    (None, (0, 0))
+    `footprint`: parts of the body; empty for a point. `obstacles`: obstacles that the body must not
+    touch. `margin`: distance to keep [m]. `origin`: where to count from [m]: poses and obstacles
+    near it lose no digit. `proven`: greatest distance [m] beyond the margin at which a motion may
+    still count as hit. Raises ValueError if a polygon has no area, or a number is out of range.
     """
 
     footprint: tuple[Shape, ...]
@@ -137,10 +113,7 @@ class FclChecker:
         Each coasts, ``start @ exp(t * body_velocity)``, from one of `starts` (n, 3) for one of
         `durations` (n,) [s]. `ask` is called again and again, and may raise to give it up.
 
-        Raises
-        ------
-        ValueError
-            If a number is not finite, or a duration negative.
+        Raises ValueError if a number is not finite, or a duration negative.
         """
         here = self._seen("starts", starts)
         twists = as_array("body_velocities", body_velocities, last=3)
@@ -372,10 +345,7 @@ def _ground_of(
 def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
     """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles.
 
-    Raises
-    ------
-    ValueError
-        If a polygon has no area.
+    Raises ValueError if a polygon has no area.
     """
     import shapely
 

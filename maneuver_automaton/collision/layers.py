@@ -39,15 +39,7 @@ class LayerArrays(NamedTuple):
 
 
 def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Layer, ...]:
-    """All obstacles that stand anywhere between neighbouring heights; bands without any left out.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Disc, Obstacle
-    >>> low, high = (Obstacle(Disc(1.0), height=(0.0, h)) for h in (5.0, 20.0))
-    >>> [(band.low, band.high, band.numbers) for band in bands_of((low, high), in_space=True)]
-    [(0.0, 5.0, (0, 1)), (5.0, 20.0, (1,))]
-    """
+    """All obstacles that stand anywhere between neighbouring heights; no band without any."""
     layers = layers_of(obstacles, in_space=in_space)
     heights = {height for layer in layers for height in (layer.low, layer.high)}
     bands = []

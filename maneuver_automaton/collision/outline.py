@@ -58,14 +58,7 @@ def solid_parts(shape: Polygon | Box) -> list[Any]:
 
 
 def united(parts: Iterable[Any]) -> Any:
-    """One geometry of all parts: united in turn where uniting them at once loses some of them.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> united([shapely.box(0, 0, 2, 1), shapely.box(1, 0, 3, 1)]).area
-    3.0
-    """
+    """One geometry of all parts: united in turn where uniting them at once loses some of them."""
     import shapely
 
     every = np.array(list(parts), dtype=object)
@@ -115,11 +108,6 @@ def blocked_rectangles(blocked: NDArray[np.bool_]) -> IntArray:
     """Rectangles (n, 4) of cells [low column, low row, high column, high row), none twice.
 
     Runs of blocked cells, joined with the run below where that has the same ends.
-
-    Examples
-    --------
-    >>> blocked_rectangles(np.array([[1, 1, 0], [1, 1, 1]], dtype=bool)).tolist()
-    [[0, 0, 2, 1], [0, 1, 3, 2]]
     """
     rows, columns = blocked.shape
     padded = np.zeros((rows, columns + 2), dtype=np.int8)

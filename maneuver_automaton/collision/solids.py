@@ -47,14 +47,7 @@ class Skin(NamedTuple):
 
 
 def body_pieces(footprint: tuple[Shape, ...], *, margin: float, excess: float) -> tuple[Array, ...]:
-    """Convex polygons (n, 2) that cover a footprint grown by `margin` [m], and little more.
-
-    Examples
-    --------
-    >>> (square,) = body_pieces((Box([2.0, 2.0]),), margin=0.5, excess=1e-3)
-    >>> bool(np.hypot(*(square - 1.0).T).min() > 0.49), square.max().round(2).item()
-    (True, 1.5)
-    """
+    """Convex polygons (n, 2) that cover a footprint grown by `margin` [m], and little more."""
     round_corners = circumscribed(np.zeros(2), margin, excess) if margin > 0.0 else np.zeros((1, 2))
     if not footprint:
         return (_grown(Box([2.0 * POINT, 2.0 * POINT]).corners, round_corners),)
@@ -73,12 +66,6 @@ def circumscribed(center: Array, radius: float, excess: float) -> Array:
     """Corners (n, 2) of a regular polygon around a disc, none further than `excess` [m] from it.
 
     Of a huge disc, none further than a billionth of its radius.
-
-    Examples
-    --------
-    >>> around = circumscribed(np.zeros(2), 1.0, 1e-3)
-    >>> len(around), bool(np.hypot(*around.T).max() <= 1.0 + 1e-3)
-    (71, True)
     """
     reach = radius + max(excess, 1e-9 * radius)
     corners = max(8, math.ceil(math.pi / math.acos(radius / reach)))
@@ -97,15 +84,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list[Cover]:
-    """The region of each obstacle in its own frame; a disc stands out by at most `excess` [m].
-
-    Examples
-    --------
-    >>> room = OccupancyMap([[1, 1, 1], [1, 0, 1], [1, 1, 1]], resolution=0.5)
-    >>> (region,) = obstacle_regions([room], excess=1e-3)
-    >>> len(region.cover), len(region.posts)
-    (8, 8)
-    """
+    """The region of each obstacle in its own frame; a disc stands out by at most `excess` [m]."""
     shapes = [None if isinstance(one, OccupancyMap) else one.shape for one in obstacles]
     boxes = [one for one in shapes if isinstance(one, Box)]
     fans: Iterator[Cover] = iter(())
@@ -127,14 +106,7 @@ def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list
 
 
 def body_skin(pieces: Sequence[Array]) -> Skin:
-    """Walls and lid over convex polygons (n, 2).
-
-    Examples
-    --------
-    >>> skin = body_skin([Box([1.0, 1.0]).corners])
-    >>> skin.vertices.shape, skin.triangles.shape
-    ((8, 3), (10, 3))
-    """
+    """Walls and lid over convex polygons (n, 2)."""
     vertices, triangles, first = [], [], 0
     for ring in pieces:
         n = len(ring)
@@ -149,15 +121,7 @@ def body_skin(pieces: Sequence[Array]) -> Skin:
 
 
 def obstacle_skin(regions: Sequence[Cover]) -> tuple[Skin, IntArray]:
-    """Sheets and posts of regions, and which region each triangle belongs to.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision.shapes import Obstacle
-    >>> square = obstacle_regions([Obstacle(Box([1.0, 1.0]))], excess=1e-3)[0]
-    >>> obstacle_skin([square, square])[1].tolist()
-    [0, 0, 1, 1, 0, 0, 1, 1]
-    """
+    """Sheets and posts of regions, and which region each triangle belongs to."""
     cover = np.concatenate([region.cover for region in regions]).reshape(-1, 2)
     posts = np.concatenate([region.posts for region in regions])
     feet = _raised(posts.reshape(-1, 2), 0.5).reshape(-1, 2, 3)

@@ -195,14 +195,7 @@ def surroundings_around(
 
 
 def parts_of(shapes: tuple[Shape, ...]) -> list[ShapePart]:
-    """Shapes as shapely knows them; a point if there is none.
-
-    Examples
-    --------
-    >>> (point,) = parts_of(())
-    >>> point.core.wkt, point.radius
-    ('POINT (0 0)', 0.0)
-    """
+    """Shapes as shapely knows them; a point if there is none."""
     import shapely
 
     if not shapes:
@@ -221,13 +214,7 @@ def parts_of(shapes: tuple[Shape, ...]) -> list[ShapePart]:
 
 
 def fastest_point(body: Sequence[ShapePart], twists: Array) -> Array:
-    """Speeds (n,) [m/s] no point of a body exceeds at twists (n, 3).
-
-    Examples
-    --------
-    >>> fastest_point(parts_of((Disc(0.5),)), np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 2.0]])).tolist()
-    [1.0, 1.0]
-    """
+    """Speeds (n,) [m/s] no point of a body exceeds at twists (n, 3)."""
     middles, reaches = np.array([part.middle for part in body]), [part.reach for part in body]
     speeds = point_speeds(twists, middles) + np.abs(twists[:, 2, None]) * reaches
     return np.asarray(speeds.max(axis=1))

@@ -80,14 +80,6 @@ def cut_where_it_pivots(body: GrownBody, twist: Twist) -> GrownBody:
     All that a turning body does at an instant is to turn about one point, which stays where it is
     in the body's frame. A side is cut, and the whole piece with it, where it is nearest to that
     point: it moves outwards on one side of there, and inwards on the other.
-
-    Examples
-    --------
-    >>> body = GrownBody((np.array([[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]),))
-    >>> sorted(part[:, 0].tolist() for part in cut_where_it_pivots(body, (2.0, 0.0, 0.5)).pieces)
-    [[-1.0, 0.0, 0.0, -1.0], [0.0, 3.0, 3.0, 0.0]]
-    >>> cut_where_it_pivots(body, (2.0, 0.0, 0.0)) is body
-    True
     """
     v_x, v_y, turn_rate = twist
     if turn_rate == 0.0 or math.hypot(v_x, v_y) > FAR * abs(turn_rate):
@@ -133,14 +125,6 @@ def swept_hulls(body: GrownBody, poses: Array, steps: Array) -> list[Array]:
     makes the step of `steps` (n, 3) in the frame of the first; the hulls are seen as the poses are.
     A corner runs along an arc, which lies in the triangle of its ends and the point where the
     tangents there meet; points between corners are between such triangles.
-
-    Examples
-    --------
-    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
-    >>> poses = np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]])
-    >>> (ahead,) = swept_hulls(square, poses, np.diff(poses, axis=0))
-    >>> ahead.min(axis=0).tolist(), ahead.max(axis=0).tolist()
-    ([-1.0, -1.0], [3.0, 1.0])
     """
     v_x, v_y, turn = (column[:, None] for column in steps.T)
     half = np.where(turn == 0.0, 1.0, 0.5 * turn)
@@ -166,14 +150,6 @@ def course_boxes(
     Step k goes from ``poses[0, k]`` to ``poses[1, k]``, (2, n, 3), with a constant twist, which
     makes the step of `steps` (n, 3) in the frame of the first. Part i is of the steps from
     ``firsts[i]`` to before ``lasts[i]``; its rectangle lies along the body in the middle of it.
-
-    Examples
-    --------
-    >>> square = GrownBody((np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),))
-    >>> poses = np.array([[[0.0, 0, 0], [1.0, 0, 0]], [[1.0, 0, 0], [2.0, 0, 0]]])
-    >>> steps = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    >>> course_boxes(square, poses, steps, np.array([0]), np.array([2])).round(3).tolist()
-    [[[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]]
     """
     middle, half = body.middle, body.half
     count = lasts - firsts
@@ -204,13 +180,6 @@ def chunks(steps: Array, begins: NDArray[np.bool_]) -> tuple[IntArray, IntArray]
     """Where runs of steps (n, 3) of courses begin and end; each turns by at most `MOST_TURN`.
 
     A course begins with each of the steps that `begins` (n,) marks. A single step may turn more.
-
-    Examples
-    --------
-    >>> steps = np.array([[1.0, 0.0, 0.1], [1.0, 0.0, 0.1], [1.0, 0.0, 0.1]])
-    >>> first, last = chunks(steps, np.array([True, False, False]))
-    >>> first.tolist(), last.tolist()
-    ([0, 2], [2, 3])
     """
     firsts: list[int] = []
     turned = 0.0

@@ -35,7 +35,7 @@ from maneuver_automaton.planning.steps import uses_lattice
 from maneuver_automaton.planning.within_tolerance import aims_within
 from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
-from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, words_of
+from maneuver_automaton.refinement.improve import NO_WORD, Patience, WordSchedule, words_of
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
@@ -279,7 +279,7 @@ class FleetMember:
     def _keep_ways(
         self, query: LatticeQuery, word: Word, budget: Budget, patience: Patience
     ) -> None:
-        schedule = Schedule(patience=patience)
+        schedule = WordSchedule(patience=patience)
         better = words_of(query, budget=budget, schedule=schedule, known=word).to_the_end()
         self.expansions += better.expansions
         words = [better.word, word, *better.others, *self.ways]
@@ -356,7 +356,7 @@ class FleetMember:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
-        schedule = Schedule(patience=AT_ONCE)
+        schedule = WordSchedule(patience=AT_ONCE)
         best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
         if not best.cost < known:
             return None
@@ -389,7 +389,7 @@ class FleetMember:
         if not self.at_will:
             return self._found(self._planned(past, budget, improve=False))
         query = self._query(past)
-        schedule = Schedule(most=QUICK, patience=AT_ONCE)
+        schedule = WordSchedule(most=QUICK, patience=AT_ONCE)
         found = words_of(query, budget=budget, schedule=schedule).to_the_end()
         self.expansions += found.first.expansions if found.first else 0
         return None if found.word is NO_WORD else self._word_found(query, found.word, aims)

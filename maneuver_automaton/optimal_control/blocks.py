@@ -61,16 +61,7 @@ def kind_of(
     zero: Any = None,
     below: Any = None,
 ) -> Kind:
-    """A kind of block from the symbols of one: its price, and rows that are zero or not positive.
-
-    Examples
-    --------
-    >>> import casadi
-    >>> x, p = casadi.SX.sym("x", 2), casadi.SX.sym("p")
-    >>> kind = kind_of(casadi, x, p, price=x[0] ** 2, below=x[0] * x[1] - p)
-    >>> kind.rows, kind.zero, [entry.tolist() for entry in kind.hessian]
-    (1, 0, [[0, 0], [0, 1]])
-    """
+    """A kind of block from the symbols of one: its price, rows that are zero, or not positive."""
     none = casadi.SX(0, 1)
     zero, below = none if zero is None else zero, none if below is None else below
     price, rows = casadi.SX(price), casadi.vertcat(zero, below)

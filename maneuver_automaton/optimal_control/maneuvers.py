@@ -352,13 +352,7 @@ def _inside(low: Array, high: Array, by: float) -> tuple[Array, Array]:
 
 
 def drawn_in(limits: Array, share: float) -> Array:
-    """Limits (n, 2), each drawn in by a share of its range; infinite ones stay.
-
-    Examples
-    --------
-    >>> drawn_in(np.array([[-1.0, 1.0], [0.0, np.inf]]), 0.25).tolist()
-    [[-0.5, 0.5], [0.0, inf]]
-    """
+    """Limits (n, 2), each drawn in by a share of its range; infinite ones stay."""
     width = limits[:, 1] - limits[:, 0]
     by = np.where(np.isfinite(width), share * np.where(np.isfinite(width), width, 0.0), 0.0)
     return np.stack([limits[:, 0] + by, limits[:, 1] - by], axis=-1)

@@ -113,20 +113,10 @@ def solver_of(
 ) -> Solver | float:
     """The program with its lines; where no time is left to build it, what it takes [s].
 
-    Parameters
-    ----------
-    program : PolishProgram
-    point : Point
-        Near which obstacles are where the motion of it meets them.
-    parting : Parting
-    held : sequence of (k,) arrays
-        The intervals that keep the limits of each guard.
-    fixed : bool
-        Whether the lines stand still.
-    price : float
-        Of being inside obstacles, per metre and interval; infinite: it must not be.
-    budget : Budget
-        Every iteration asks it: a solve ends with what it has once the time is over.
+    `point`: near which obstacles are where the motion of it meets them. `held`: the intervals that
+    keep the limits of each guard. `fixed`: whether the lines stand still. `price`: of being inside
+    obstacles, per metre and interval; infinite: it must not be. `budget`: every iteration asks it:
+    a solve ends with what it has once the time is over.
     """
     casadi, own = program.casadi, parting.own
     elastic = math.isfinite(price) and len(own) > 0
@@ -530,13 +520,7 @@ def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
 
 
 def intervals_for(duration: float, settings: PolishSettings) -> int:
-    """How many intervals a motion of a duration [s] gets.
-
-    Examples
-    --------
-    >>> [intervals_for(seconds, PolishSettings()) for seconds in (1.0, 12.0, 100.0)]
-    [40, 100, 300]
-    """
+    """How many intervals a motion of a duration [s] gets."""
     fewest, most = settings.nodes
     return min(max(math.ceil(duration / settings.step), fewest), most)
 

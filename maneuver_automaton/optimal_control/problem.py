@@ -238,18 +238,9 @@ def increments(rule: Rule, field: Field, *, state: Any, control: Any, step: Any)
     Source: Betts (2010), *Practical Methods for Optimal Control*, Sec. 3.4 (trapezoidal), Sec. 3.5
     (Runge-Kutta).
 
-    Parameters
-    ----------
-    rule : "trapezoidal" or "rk4"
-        Controls at the n nodes (n_u, n), or constant over the n - 1 intervals (n_u, n - 1).
-    field : callable
-        The rates.
-    state : (n_x, n) matrix
-        States at the nodes.
-    control : matrix
-        See `rule`.
-    step : number or symbol
-        Time between nodes [s].
+    `rule`: controls at the n nodes (n_u, n), or constant over the n - 1 intervals (n_u, n - 1).
+    `field`: the rates. `state`: states at the nodes. `control`: see `rule`. `step`: time between
+    nodes [s].
 
     Examples
     --------
@@ -335,13 +326,6 @@ def moving_frame(
 
 
 def control_scale(model: Model) -> Array:
-    """Greatest value (n_u,) of each control by size, 1 where there is no limit.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> control_scale(Unicycle(max_speed=3.0)).tolist()
-    [3.0, 1.0]
-    """
+    """Greatest value (n_u,) of each control by size, 1 where there is no limit."""
     greatest = np.abs(model.control_limits).max(axis=-1)
     return np.where(np.isfinite(greatest) & (greatest > 0.0), greatest, 1.0)

@@ -86,17 +86,6 @@ def pieces_during(
 
     Corners of what moves are those at the begin of the interval, then those at its end: their hull
     is the piece.
-
-    Examples
-    --------
-    >>> def poses(times):
-    ...     return np.stack([times, 0 * times, 0 * times], -1)
-    >>> ahead = MovingSolid(np.zeros((1, 2)), 0.5, poses, (0.0, 9.0))
-    >>> pieces = pieces_during([], [ahead], np.ones(2))
-    >>> [corners[:, 0].tolist() for corners, _ in pieces.solids], pieces.interval.tolist()
-    ([[0.0, 1.0], [1.0, 2.0]], [0, 1])
-    >>> pieces.shifts[:, :, 0].round(6).tolist()
-    [[0.0, 0.5], [0.5, 1.0]]
     """
     solids, intervals, shifts = list(still), [np.full(len(still), ALWAYS)], []
     ends = np.cumsum([0.0, *durations.tolist()])

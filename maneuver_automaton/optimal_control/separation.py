@@ -167,28 +167,8 @@ def shared_lines(
 ) -> IntArray:
     """For each pair the pair whose line parts it: lines of near pieces part those behind them.
 
-    Parameters
-    ----------
-    pieces : sequence of Solid
-    pairs : SolidPairs
-    lines : Lines
-        One for each pair.
-    reach : Reach
-        How far both sides of its line come, for each pair.
-
-    Returns
-    -------
-    (n,) integers
-        Of a pair that keeps its own line, its own number.
-
-    Examples
-    --------
-    >>> pairs = SolidPairs(*np.array([[0, 0], [0, 0], [0, 1]]))
-    >>> lines = Lines(np.zeros(2), np.array([[1.0, 0.0], [2.0, 0.0]]))
-    >>> walls = [(np.array([[x, -1.0], [x, 1.0]]), 0.0) for x in (2.0, 4.0)]
-    >>> reach = Reach(-np.ones(2), -np.ones(2), np.array([1.0, 2.0]))
-    >>> shared_lines(walls, pairs, lines, reach).tolist()
-    [0, 0]
+    `lines`: one for each pair. `reach`: how far both sides of its line come, for each pair. Returns
+    of a pair that keeps its own line, its own number.
     """
     owner = np.arange(len(pairs.interval))
     if not len(owner):

@@ -62,11 +62,6 @@ def example_problem(*, smoothing: float = SMOOTHING) -> OptimalControlProblem:
     ``sqrt(u1^2 + u2^2 + smoothing^2)`` is at most `smoothing` above the norm.
 
     Source: the paper, Example 22.
-
-    Examples
-    --------
-    >>> example_problem().start
-    (0.1, 1.0, 0.8)
     """
     return OptimalControlProblem(
         state_names=SE2.coordinates,

@@ -213,10 +213,7 @@ def what_is_hit(
 
     By FCL, and of moving obstacles by the audit's bounds.
 
-    Raises
-    ------
-    TooLate
-        A moment after the time of a `budget` is over.
+    Raises TooLate: a moment after the time of a `budget` is over.
     """
     static = _static_hit(problem, plan, goal, workspace, budget=budget)
     if static or not problem.moves:

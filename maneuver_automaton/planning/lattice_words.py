@@ -29,7 +29,13 @@ from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.planning.tracking import AT_ONCE
 from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.refinement.clear_insertion import has_paces, paced
-from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, WordSearch, words_of
+from maneuver_automaton.refinement.improve import (
+    NO_WORD,
+    Patience,
+    WordSchedule,
+    WordSearch,
+    words_of,
+)
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.arrays import CostTable
 from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
@@ -148,7 +154,7 @@ class LatticeWords(PlanningStep):
             # where a search by cost alone would look everywhere, or for too long motions
             by_time = replace(problem, cost=BY_TIME)
             quick = late_at_first(lattice_query(by_time, _goals(query), prepared=prepared))
-            search = words_of(quick, budget=limit, schedule=Schedule())
+            search = words_of(quick, budget=limit, schedule=WordSchedule())
             in_time = (one for one in search if one.duration <= query.most_time)
             if (soon := next(in_time, None)) is not None:
                 word = with_cost(soon, query)
@@ -248,7 +254,7 @@ class LatticeWords(PlanningStep):
     ) -> WordSearch:
         """A search for ever better words to its end, its attempts and expansions counted."""
         found = words_of(
-            query, budget=budget, schedule=Schedule(table=self.table, **schedule), known=known
+            query, budget=budget, schedule=WordSchedule(table=self.table, **schedule), known=known
         )
         for word in found:
             better(word)

@@ -78,17 +78,7 @@ class PolishedPrice:
 
 
 def polished_price(problem: Problem) -> PolishedPrice:
-    """The price at which plans of a problem are polished.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Cost, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
-    >>> problem = Problem(robot, [0, 0, 0], [5, 0, 0], cost=Cost(time=1.0, switch=9.0))
-    >>> price = polished_price(problem).cost
-    >>> price.time, price.switch
-    (1.0, 0.0)
-    """
+    """The price at which plans of a problem are polished."""
     cost = terms_of(problem.cost)
     if cost is None:
         return PolishedPrice(problem, Cost(time=1.0), 0.0)

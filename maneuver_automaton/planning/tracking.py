@@ -21,7 +21,7 @@ from maneuver_automaton.collision.advancement import clearances, free_times
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.no_way import along_free_path, proven_apart
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, words_of
+from maneuver_automaton.refinement.improve import NO_WORD, Patience, WordSchedule, words_of
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
@@ -54,15 +54,6 @@ def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float
 
     The plan's own duration if all of it is; the obstacles are where they are at the plan's times.
     What comes nearer than ``problem.margin + margin`` [m] counts as hit.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
-    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [5, 0]))
-    >>> plan = Plan([0, 0, 0], (robot.trims[0],), durations=[9.0])
-    >>> bool(3.9 < free_until(problem, plan) <= 4.0)
-    True
     """
     if not plan.trims:
         return plan.duration
@@ -87,17 +78,7 @@ def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float
 def stands_free(
     problem: Problem, pose: Array, *, time: float, duration: float, margin: float = PROVEN
 ) -> float:
-    """How long from `time` on [s] it is proven free to stand at a pose, at most `duration`.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Motion, Obstacle, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
-    >>> coming = Obstacle(Disc(1.0), motion=Motion([0, 9], [[9, 0, 0], [0, 0, 0]]))
-    >>> problem = Problem(robot, [0, 0, 0], [9, 9, 0], obstacles=coming)
-    >>> 3.9 < stands_free(problem, problem.start, time=4.0, duration=60.0) <= 4.0
-    True
-    """
+    """How long from `time` on [s] it is proven free to stand at a pose, at most `duration`."""
     query = lattice_query(problem, (0,))
     (free,) = free_times(
         query.world,
@@ -115,15 +96,6 @@ def clearance_at(problem: Problem, poses: Array, times: Array) -> Array:
     """Clearance (n,) [m] to the nearest obstacle at poses (n, 3) and times (n,): a lower bound.
 
     Exact near contact, at most what the kernels look for, not positive on contact.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "spin": (0.0, 1.0)})
-    >>> problem = Problem(robot, [0, 0, 0], [9, 0, 0], obstacles=Disc(1.0, [1.5, 0]))
-    >>> (clearance,) = clearance_at(problem, np.zeros((1, 3)), np.zeros(1))
-    >>> bool(0.0 < clearance <= 0.5)
-    True
     """
     world = world_around(problem)
     return clearances(world, world.into(poses), times=times)
@@ -171,7 +143,7 @@ def track(
     query = lattice_query(problem, goals, prepared=prepared)
     word = None if known is None else word_of_plan(query, known)
     aside, proven = along_free_path(query, table), functools.partial(proven_apart, problem)
-    schedule = Schedule(
+    schedule = WordSchedule(
         most=max_expansions or problem.search.max_expansions,
         patience=patience,
         table=table,

@@ -28,7 +28,7 @@ from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import StepSearch
 from maneuver_automaton.refinement.fitting import fitted_plans
-from maneuver_automaton.refinement.improve import Schedule, words_of
+from maneuver_automaton.refinement.improve import WordSchedule, words_of
 from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -174,7 +174,7 @@ class OverManeuvers(StepSearch):
         query = lattice_query(problem, goals)
         best: StepPlan | None = None
         budget = replace(self.for_plans, expansions=problem.search.max_expansions)
-        for word in words_of(query, budget=budget, schedule=Schedule()):
+        for word in words_of(query, budget=budget, schedule=WordSchedule()):
             owner = query.goal_index[word.goal]
             for plan in fitted_plans(problem, plan_of_word(query, word), problem.goals[owner]):
                 one = self.now.candidate(self.now.whole(plan), owner, Origin.SEARCHED)

@@ -33,14 +33,6 @@ def broken_condition(problem: Problem, plan: Plan) -> str:
 
     These are the conditions that no collision check and no simulation can see: the horizon, the
     number of trims, the least time of a trim that moves, and the longest time of every trim.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Horizon, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
-    >>> problem = Problem(robot, [0, 0, 0], [5, 0, 0], horizon=Horizon(max_time=4.0))
-    >>> broken_condition(problem, Plan([0, 0, 0], robot.trims[:1], durations=[5.0]))
-    'it takes 5 s, at most 4 s are admitted'
     """
     horizon = problem.horizon
     duration = plan.duration
@@ -86,16 +78,6 @@ def fitted_plans(
     """Plans of the same word that keep to the horizon, the cheapest first; none if none is known.
 
     A moment after the time of a `budget` is over, those that were found by then.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Horizon, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0.0, 0.0), "ahead": (1.0, 0.0)})
-    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0], horizon=Horizon(time=5.0))
-    >>> rest, ahead = robot.trims
-    >>> plan = Plan([0, 0, 0], (ahead, rest), durations=[2.0, 0.0])
-    >>> [one.durations.tolist() for one in fitted_plans(problem, plan, problem.goals[0])]
-    [[2.0, 3.0]]
     """
     plan = padded(problem, plan)
     if not broken_condition(problem, plan):
@@ -223,16 +205,6 @@ def with_lasting_coasts(
     Such a trim is left out, or lasts so long; others change as little as they can: all of them,
     those near it, after it, or before it, whatever is free. Where the horizon states a least time,
     be it zero, the plan stays as it is.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> controls = {"ahead": (1.0, 0.0), "slower": (0.9, 0.0)}
-    >>> robot = Automaton.of_controls(Unicycle(), controls)
-    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0])
-    >>> plan = Plan([0, 0, 0], robot.trims, durations=[1.9991, 0.001])
-    >>> with_lasting_coasts(problem, plan, problem.goals[0], is_free=bool).durations.tolist()
-    [2.0]
     """
     if not has_short_coasts(problem, plan):
         return plan

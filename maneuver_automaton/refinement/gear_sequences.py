@@ -22,7 +22,7 @@ from maneuver_automaton.models import Car, Model, Unicycle
 from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.scene import Polished
 from maneuver_automaton.problem import STANDING, Problem
-from maneuver_automaton.refinement.improve import NO_WORD, Patience, Schedule, words_of
+from maneuver_automaton.refinement.improve import NO_WORD, Patience, WordSchedule, words_of
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -106,25 +106,12 @@ def gear_sequences(
 ) -> Iterator[TimedDrive]:
     """Kinematic plans that differ: a promising one soon, then those that take the least time.
 
-    Parameters
-    ----------
-    problem : Problem
-        Start, goal, obstacles and what places cost, beside its price of a second; its automaton is
-        replaced, and the prices of changes of direction.
-    libraries : sequence of Automaton
-        Kinematic ones, from `car_library` or `unicycle_library`.
-    estimate : callable
-        Duration of a plan; see `timed`.
-    budget : Budget
-        Its time is for all searches together; they are counted in expansions and attempts, so it
-        only cuts them short.
-    keep : int
-        How many plans there are at most.
-
-    Yields
-    ------
-    TimedDrive
-        The best of the first prices before the others are tried; then the others, by estimate.
+    `problem`: start, goal, obstacles and what places cost, beside its price of a second; its
+    automaton is replaced, and the prices of changes of direction. `libraries`: kinematic ones, from
+    `car_library` or `unicycle_library`. `estimate`: duration of a plan. `budget`: its
+    time is for all searches together; they are counted in expansions and attempts, so it only cuts
+    them short. `keep`: how many plans there are at most. Yields the best of the first prices before
+    the others are tried; then the others, by estimate.
     """
     terms = terms_of(problem.cost)
     second = terms.time if terms and terms.time else 1.0
@@ -155,7 +142,7 @@ def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem)
     most = min(MOST, problem.search.max_expansions or MOST)  # the clock decides nothing
-    schedule = Schedule(most=most, patience=BRIEF, table=table)
+    schedule = WordSchedule(most=most, patience=BRIEF, table=table)
     timed = replace(budget, expansions=None)
     found = words_of(query, budget=timed, schedule=schedule).to_the_end()
     words = (found.word, *found.others[:OTHERS]) if found.word is not NO_WORD else ()

@@ -143,7 +143,7 @@ NO_WORD = Word(trims=np.empty(0, dtype=np.int64), durations=np.empty(0), cost=ma
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Schedule:
+class WordSchedule:
     """How words of a query are looked for: a first one, then better ones."""
 
     most: int | None = None  # expansions of the first alone, if later ones are not counted
@@ -159,7 +159,7 @@ def words_of(
     query: LatticeQuery,
     *,
     budget: Budget = UNLIMITED,
-    schedule: Schedule,
+    schedule: WordSchedule,
     known: Word | None = None,
 ) -> WordSearch:
     """Ever cheaper words of a query, as they are found: the one driver of all that plan in it.
@@ -178,7 +178,7 @@ class WordSearch:
 
     query: LatticeQuery
     budget: Budget
-    schedule: Schedule
+    schedule: WordSchedule
     best: Word = NO_WORD  # of those whose trims the searches use
     whole: Whole | None = None
     first: FirstPlan | None = None  # of its own, with what it says where there is none

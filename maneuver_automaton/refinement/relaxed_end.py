@@ -38,34 +38,11 @@ def with_relaxed_end(
 ) -> Plan | None:
     """A plan's word with the cheapest coasting times that end within the tolerance of a goal.
 
-    Parameters
-    ----------
-    problem : Problem
-        Its cost and horizon hold; obstacles, bounds and zones are not looked at.
-    plan : Plan
-        A plan that ends within the tolerance; maneuvers stay as they are.
-    goal : Goal
-    share : float
-        Of the tolerance that may be used.
-    first : int
-        First trim whose time may change: the motion before it stays, and stays collision-free.
-    budget : Budget
-        None is found once its time is over.
-
-    Returns
-    -------
-    Plan or None
-        None where no cheaper times were found.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
-    >>> goal = Goal(pose=[2.0, 0.0, 0.0], tolerance_m=0.5)
-    >>> problem = Problem(robot, [0, 0, 0], goal)
-    >>> plan = Plan([0, 0, 0], robot.trims[:1], durations=[2.0])
-    >>> with_relaxed_end(problem, plan, goal).durations.round(6).tolist()
-    [1.5]
+    `problem`: its cost and horizon hold; obstacles, bounds and zones are not looked at. `plan`: a
+    plan that ends within the tolerance; maneuvers stay as they are. `share`: of the tolerance that
+    may be used. `first`: first trim whose time may change: the motion before it stays, and stays
+    collision-free. `budget`: none is found once its time is over. None where no cheaper
+    times were found.
     """
     if not plan.trims:
         return None

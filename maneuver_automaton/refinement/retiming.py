@@ -251,13 +251,6 @@ def shared_time(lengths: Array, *, least: Array, total: float) -> Array:
     are at their least, in the order in which they leave it.
 
     Source: Boyd, Vandenberghe (2004), *Convex Optimization*, Sec. 5.5.3.
-
-    Examples
-    --------
-    >>> shared_time(np.array([3.0, 1.0]), least=np.array([0.0, 0.0]), total=8.0).tolist()
-    [6.0, 2.0]
-    >>> shared_time(np.array([3.0, 1.0]), least=np.array([0.0, 5.0]), total=8.0).tolist()
-    [3.0, 5.0]
     """
     if not lengths.size:
         return np.zeros(0)

@@ -44,36 +44,9 @@ def stop_and_steer(model: StopsAndSteers, path: Plan, *, first: Trim, last: Trim
     Every trim of the path becomes a stroke from rest to rest: full acceleration, a coast at full
     speed where it is long enough, full braking. Between strokes the reduced state changes at rest.
 
-    Parameters
-    ----------
-    model : StopsAndSteers
-        The vehicle.
-    path : Plan
-        Of its kinematic vehicle.
-    first, last : Trim
-        Trims at rest in which it begins and ends.
-
-    Returns
-    -------
-    Plan
-        Along the same poses.
-
-    Raises
-    ------
-    ValueError
-        If the first or last trim moves.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderUnicycle
-    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=1.0,
-    ...                             max_angular_acceleration=1.0)
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0, 0], reduced_state=[0, 0])
-    >>> ahead = Trim(name="ahead", body_velocity=[0.5, 0, 0], control=[0.5, 0])
-    >>> path = Plan([0, 0, 0], (ahead,), durations=[8.0])
-    >>> plan = stop_and_steer(robot, path, first=rest, last=rest)
-    >>> plan.word, plan.duration  # 1 s to accelerate, 3 s at 1 m/s, 1 s to brake
-    (('accelerate to 1, 0', 'at 1, 0', 'brake from 1, 0'), 5.0)
+    `model`: the vehicle. `path`: of its kinematic vehicle. `first`, `last`: trims at rest in which
+    it begins and ends. Returns along the same poses. Raises ValueError if the first or last trim
+    moves.
     """
     for what, trim in (("first", first), ("last", last)):
         if not trim.is_rest:

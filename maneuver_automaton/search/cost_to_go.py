@@ -49,18 +49,7 @@ def cost_to_go_table(
     where nothing can be written it works without. ``value[k, j, i]`` belongs to the pose
     ``((i - half) cell, (j - half) cell, k 2 pi / n)`` seen from the goal.
 
-    Raises
-    ------
-    ValueError
-        If `reach` is not positive.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0), "left": (1, 1), "right": (1, -1)})
-    >>> table = cost_to_go_table(Problem(robot, [0, 0, 0], [1, 0, 0]), reach=3.0)
-    >>> bool(abs(table.value[0, table.half, 0] - 3.0) < 0.3)
-    True
+    Raises ValueError if `reach` is not positive.
     """
     library = lattice_library(problem, prepared=prepared)
     size = REACH * library.radius if reach is None else reach

@@ -148,11 +148,6 @@ def stride_of(area: float, cell: float) -> int:
     """Least odd number of field cells [m] a cell that parts an area [m^2] into few enough.
 
     Odd, so that centres of cells stay centres of field cells.
-
-    Examples
-    --------
-    >>> stride_of(1e6, 1.0), stride_of(1.1e6, 1.0), stride_of(1e20, 1.0)
-    (1, 3, 10000001)
     """
     least = math.ceil(math.sqrt(area / MOST_CELLS) / cell)
     stride = max(least - 2 + (least - 1) % 2, 1)  # one less than that, for what rounding has done

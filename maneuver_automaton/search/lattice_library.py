@@ -138,10 +138,7 @@ def lattice_library(
     Trims that lead to none of the goals of these numbers are left out: their speeds would make the
     estimates of cost too low. A vehicle that switches at will can use all of them.
 
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course, and so no known cost.
+    Raises ValueError if a maneuver has no course, and so no known cost.
     """
     automaton = problem.automaton
     if automaton.is_kinematic:
@@ -446,14 +443,6 @@ def altitude_ranges(
 
     `climbs` (k, 2) [m/s] in the trims before and after each maneuver; `begin` and `end` (n,) are
     the first and last sample of every piece, of all courses one after the other.
-
-    Examples
-    --------
-    >>> stroke = Maneuver(name="up", source="low", target="high", duration=2.0,
-    ...                   displacement=[1.0, 0.0, 0.0, 3.0])
-    >>> low, high = altitude_ranges([stroke], np.full((1, 2), 1.5), np.array([0]), np.array([1]))
-    >>> low.tolist(), high.tolist()
-    ([0.0], [3.0])
     """
     if not begin.size:
         return np.zeros(0), np.zeros(0)

@@ -157,10 +157,7 @@ def _with_prices(arrays: LibraryArrays, cost: StageCost) -> LibraryArrays:
 def priced_library(automaton: Automaton, cost: StageCost) -> Library:
     """All trims and maneuvers of an automaton, priced by a cost.
 
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course, and so no known cost.
+    Raises ValueError if a maneuver has no course, and so no known cost.
     """
     origin = origin_of(automaton, automaton.trims[0])
     rest = automaton.trims[0].name
@@ -209,13 +206,6 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     direction, then the fastest. Where nothing turns on the spot, the sharpest turns too, and the
     cheapest straight motions aside. Twists are (m, 3) or (m, 4), rates (m,) are costs per second,
     and the number of directions is a multiple of eight.
-
-    Examples
-    --------
-    >>> speeds, turns = (-1.0, -0.5, 0.5, 1.0), (-0.5, -0.2, 0.0, 0.2, 0.5)
-    >>> grid = np.array([(v, 0.0, w) for v in speeds for w in turns])
-    >>> grid[coarse_trims(grid, np.ones(20))].tolist()[:3]
-    [[-1.0, 0.0, -0.5], [-1.0, 0.0, 0.0], [-1.0, 0.0, 0.5]]
     """
     aside = twists[:, 1] != 0.0
     along = np.flatnonzero(~aside) if not aside.all() else np.arange(len(twists))
@@ -255,12 +245,6 @@ def paying_trims(twists: Array, rates: Array) -> IntArray:
     corners next to each other some may be left out. A trim that costs nothing always counts.
 
     Source: support functions; Boyd, Vandenberghe (2004), *Convex Optimization*, Sec. 2.5.2.
-
-    Examples
-    --------
-    >>> speeds = np.array([[0.5, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
-    >>> paying_trims(speeds, np.ones(4)).tolist()
-    [1, 2, 3]
     """
     if twists[:, 1].any() or twists[:, 3:].any() or not (rates > 0.0).all():
         return np.arange(len(twists))
@@ -299,13 +283,6 @@ def paced_trims(
     one at which the word, driven by those of its own directions, ends in time. The trims for the
     step below, and those for it: between the two paces words fill the time. `word` (n,) are the
     rows of the trims of a word that ends in time.
-
-    Examples
-    --------
-    >>> speeds = np.array([[v / 10, 0.0, 0.0] for v in range(1, 11)])
-    >>> slow, fast = paced_trims(speeds, speeds[:, 0] ** 2, np.array([9]), np.array([4.0]), 9.9)
-    >>> slow.tolist(), fast.tolist()
-    ([3], [4])
     """
     plane = _plane(twists)
     sizes = np.hypot(*plane.T)
@@ -349,13 +326,6 @@ def at_two_paces(
     Slow ahead as long as the time allows, then fast. Rows of trims and how long they last [s]; None
     where no trim of a pace leads along the path of one of the word, or the fast ones are too slow.
     `word` (n,) and the two `paces` (k,), the slow one first, are rows of trims.
-
-    Examples
-    --------
-    >>> speeds = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
-    >>> paces = np.array([0]), np.array([1])
-    >>> at_two_paces(speeds, np.array([2]), np.array([1.0]), paces, 3.0)
-    [(0, 2.0), (1, 1.0)]
     """
     size = np.linalg.norm(twists, axis=1)
     slow, fast = (nearest_trims(twists, word, rows) for rows in paces)

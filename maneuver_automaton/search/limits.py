@@ -101,18 +101,6 @@ def closed_bound(problem: Problem, goal: Goal) -> float:
     The last one is the paper's bound on the effort, with k = c1 lambda_min(R) for the unicycle.
 
     Source: the paper, Appendix; Cauchy-Schwarz.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.costs import Cost
-    >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.problem import Horizon
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (0.5, 0), "spin": (0, 2)})
-    >>> cost, horizon = Cost(effort=1.0), Horizon(time=8.0)
-    >>> problem = Problem(robot, [-2, 0, 0], [0, 0, 0], cost=cost, horizon=horizon)
-    >>> closed_bound(problem, problem.goals[0])
-    1.0
     """
     return max(closed_bounds(problem, goal).values())
 
@@ -154,15 +142,6 @@ def sole_bound(problem: Problem, goal: Goal) -> float:
     The distance at the best price per metre, or the turn at the best price per radian, where one
     trim alone has that price. A plan that costs no more drives straight to the goal, or turns on
     the spot, and uses no other trim; so none is cheaper, and no other as cheap.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (2, 0), "slow": (1, 0), "spin": (0, 1)})
-    >>> problem = Problem(robot, [-3, 0, 0], [0, 0, 0])
-    >>> sole_bound(problem, problem.goals[0])
-    1.5
     """
     limit, library = problem.horizon.time, moving_trims(problem.automaton, problem.cost)
     pads = limit is not None and library.rest is not None

@@ -114,19 +114,6 @@ def improve_linked_words(
     it, those of the least prices, is cheaper. With maneuvers of finite size no reduced cost
     certifies more than that. The `budget` limits the time; ``search.max_expansions`` of the problem
     limits the number of words that are solved for instead, the same at every call.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> controls = {"slow": (0.5, 0), "ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
-    >>> robot = Automaton.of_controls(Unicycle(), controls)
-    >>> goal = Goal(pose=[3.0, 0.0, 0.0], trim="slow")
-    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="slow")
-    >>> seed = Word(trims=[0], durations=[6.0])
-    >>> found = next(improve_linked_words(problem, goal, [seed])).solutions[0]
-    >>> [robot.trim_names[k] for k in found.trims], found.cost
-    (['ahead'], 3.0)
     """
     setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
     climb = _Climb(setup, budget, most_tries)

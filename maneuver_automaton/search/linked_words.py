@@ -49,18 +49,6 @@ def steer_linked_words(
 
     A first answer, and a bound for all that follows: it takes a hundredth of the time of a scan.
     Where more is asked of a word than to end at the goal, its times are a start to be solved from.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
-    >>> robot = Automaton.of_controls(Unicycle(), controls)
-    >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
-    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
-    >>> best = steer_linked_words(problem, goal).solutions[0]
-    >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
-    (['left', 'ahead', 'right'], 3.1754)
     """
     setup = word_setup(problem, goal, most_trims=alphabet, steers=True)
     # the times of so few trims follow from the pose: to meet a time exactly is left to the scan
@@ -99,18 +87,6 @@ def scan_linked_words(
     Most parameters are those of `search_words`; ``search.max_expansions`` of the problem limits the
     number of words instead of the time: the same at every call. `max_trims` are those that coast.
     Words are made of `alphabet` trims of the library, of a larger one of those that differ most.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
-    >>> robot = Automaton.of_controls(Unicycle(), controls)
-    >>> goal = Goal(pose=[3.0, 1.0, 0.0], trim="ahead")
-    >>> problem = Problem(robot, [0, 0, 0], goal, start_trim="ahead")
-    >>> best = scan_linked_words(problem, goal).solutions[0]
-    >>> [robot.trim_names[k] for k in best.trims], round(best.cost, 4)
-    (['left', 'ahead', 'right'], 3.1754)
     """
     setup = word_setup(problem, goal, most_trims=alphabet)
     expansions = problem.search.max_expansions

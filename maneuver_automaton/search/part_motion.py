@@ -52,10 +52,7 @@ def parts_of(
 ) -> tuple[Part, ...]:
     """The vehicle's own body, and its other parts where its model says, each in its own frame.
 
-    Raises
-    ------
-    ValueError
-        If the model carries another number of parts than `carried` has bodies.
+    Raises ValueError if the model carries another number of parts than `carried` has bodies.
     """
     model = automaton.model
     if len(carried) != len(model.part_names):

@@ -27,13 +27,6 @@ def conjugated(twists: Array, displacements: Array) -> tuple[Array, Array]:
     `displacements` are (n - 1, dof), one between each two trims, or (n, dof), one after each.
 
     Source: ``D exp(xi) = exp(Ad(D) xi) D``; Solà, Deray, Atchuthan (2018), Eq. (30).
-
-    Examples
-    --------
-    >>> quarter = np.array([[1.0, 0.0, np.pi / 2]])
-    >>> seen, product = conjugated(np.array([[1.0, 0, 0], [1.0, 0, 0]]), quarter)
-    >>> seen.round(9).tolist(), product.round(3).tolist()
-    ([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], [1.0, 0.0, 1.571])
     """
     n, dof = twists.shape
     before = chained(np.zeros(dof), displacements)
@@ -162,18 +155,6 @@ def closed_at(
 
     Source: the derivative of the end by a time, as a twist in its frame, is ``Ad(after^-1) xi``;
     maneuvers by conjugation, see `conjugated`.
-
-    Examples
-    --------
-    >>> ahead, left = [1.0, 0.0, 0.0], [1.0, 0.0, 1.0]
-    >>> twists = np.array([ahead, left, ahead])
-    >>> goal = np.array([2.0, 2.0, np.pi / 2])
-    >>> closed_at(np.zeros(3), twists, np.array([1.0, 1.57, 1.0]), goal).round(6).tolist()
-    [1.0, 1.570796, 1.0]
-    >>> stroke, aim = np.array([[0.5, 0.5, np.pi / 2]]), np.array([1.5, 2.5, np.pi / 2])
-    >>> near = np.array([0.99, 2.02])
-    >>> closed_at(np.zeros(3), twists[[0, 2]], near, aim, displacements=stroke).round(9).tolist()
-    [1.0, 2.0]
     """
     if not len(durations):
         return np.array(durations)

@@ -165,29 +165,10 @@ def library_of(
 ) -> Library:
     """All trims of an automaton, the transitions between them, and the words that are tried.
 
-    Parameters
-    ----------
-    automaton : Automaton
-    rates : (m,) array_like, optional
-        Cost per second of each trim; 1 if omitted, so that cost is time.
-    maneuver_costs : (M,) array_like, optional
-        Cost of each maneuver; its duration if omitted.
-    most_trims : int
-        Trims that words are made of; of a larger library those that differ most.
-    trims : sequence of int, optional
-        The trims that words are made of, instead.
-
-    Raises
-    ------
-    ValueError
-        If an array has the wrong length or a cost is negative.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> library_of(robot).arrays.tried.words.tolist()[:4]
-    [[-1, -1, -1], [0, -1, -1], [1, -1, -1], [0, 1, -1]]
+    `rates`: cost per second of each trim; 1 if omitted, so that cost is time. `maneuver_costs`:
+    cost of each maneuver; its duration if omitted. `most_trims`: trims that words are made of; of a
+    larger library those that differ most. `trims`: the trims that words are made of, instead.
+    Raises ValueError if an array has the wrong length or a cost is negative.
     """
     m = len(automaton)
     per_second = _costs("rates", np.ones(m) if rates is None else rates, m)

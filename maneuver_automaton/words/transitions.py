@@ -53,15 +53,7 @@ class Transitions:
 
 
 def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
-    """The transitions of an automaton whose maneuvers cost `prices` (M,).
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> transitions_of(robot, np.zeros(0)).cost.tolist()
-    [[0.0]]
-    """
+    """The transitions of an automaton whose maneuvers cost `prices` (M,)."""
     sources = np.array([automaton.index_of(one.source) for one in automaton.maneuvers], dtype=int)
     targets = np.array([automaton.index_of(one.target) for one in automaton.maneuvers], dtype=int)
     class_of = automaton.trim_classes

@@ -59,12 +59,6 @@ def word_of_steps(
 
     With a library it has its price. A trim that goes on is one trim; one that lasts no time stands
     only beside a maneuver, or at an end. The transition of the first step is none.
-
-    Examples
-    --------
-    >>> word = word_of_steps([(SWITCH, 0, 1.0), (SWITCH, 0, 0.5), (SWITCH, 1, 2.0)], goal=0)
-    >>> word.trims.tolist(), word.durations.tolist()
-    ([0, 1], [1.5, 2.0])
     """
     trims, durations, transitions = list[int](), list[float](), list[int]()
     for transition, trim, time in steps:
@@ -178,16 +172,7 @@ def plan_of(
 
 
 def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:
-    """A plan as a word of an automaton; None if it has trims or maneuvers of its own.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> plan = Plan([0, 0, 0], (robot.trims[1], robot.trims[0]), durations=[0.5, 2.0])
-    >>> word_of_plan(robot, plan).trims.tolist()
-    [1, 0]
-    """
+    """A plan as a word of an automaton; None if it has trims or maneuvers of its own."""
     numbers = {id(maneuver): k for k, maneuver in enumerate(automaton.maneuvers)}
     between = plan.maneuvers or (None,) * max(0, len(plan.trims) - 1)
     transitions = [SWITCH if one is None else numbers.get(id(one)) for one in between]

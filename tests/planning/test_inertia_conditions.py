@@ -16,7 +16,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.lattice_words import late_at_first
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.refinement.improve import Schedule, words_of
+from maneuver_automaton.refinement.improve import WordSchedule, words_of
 from maneuver_automaton.search import lattice, lattice_task
 from maneuver_automaton.search.lattice import forward_word, reversed_query
 from maneuver_automaton.search.lattice_pass import pass_of, plan_of_word
@@ -125,7 +125,7 @@ def test_no_trim_lasts_less_than_it_must_among_obstacles():
     automaton = unicycle_automaton()
     problem = posed(horizon=Horizon(min_coast=0.4))
     query = lattice_query(problem, (0,))
-    words = list(words_of(query, budget=counted(4000), schedule=Schedule()))
+    words = list(words_of(query, budget=counted(4000), schedule=WordSchedule()))
     assert words
     for word in words:
         for trim, time in zip(word.trims, word.durations.tolist(), strict=True):
@@ -149,7 +149,7 @@ def test_settings_of_the_lattice_are_read(monkeypatch):
     )
     stages = ((0, (Resolution(),)), (0, (Resolution(scale=0.5),)))
     monkeypatch.setattr(lattice_task, "LINKED", LINKED._replace(stages=stages, first_chunk=4))
-    next(iter(words_of(query, budget=counted(200), schedule=Schedule())))
+    next(iter(words_of(query, budget=counted(200), schedule=WordSchedule())))
     assert weights == [1.3, WEIGHT]
 
 
@@ -157,7 +157,7 @@ def test_a_search_from_the_goal_finds_plans_from_the_start():
     """Every word of the reversed query, turned round, is a free plan of the query."""
     query = lattice_query(posed(), (0,))
     back = reversed_query(query)
-    words = list(words_of(back, budget=counted(3000), schedule=Schedule()))
+    words = list(words_of(back, budget=counted(3000), schedule=WordSchedule()))
     assert words
     for word in words:
         one = plan_of_word(query, forward_word(word))
@@ -195,7 +195,7 @@ def test_a_fast_car_passes_a_box(along, aside):
         footprint=Box([4.5, 1.6]),
     )
     query = lattice_query(problem, (0,))
-    word = next(iter(words_of(query, budget=counted(5000), schedule=Schedule())))
+    word = next(iter(words_of(query, budget=counted(5000), schedule=WordSchedule())))
     assert word.duration < 6.5
 
 

@@ -15,7 +15,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
-from maneuver_automaton.refinement.improve import Patience, Schedule, words_of
+from maneuver_automaton.refinement.improve import Patience, WordSchedule, words_of
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -62,7 +62,7 @@ PATIENT = Patience()
 
 
 def improving(query, word, *, budget=UNLIMITED, patience=PATIENT, **more):
-    schedule = Schedule(patience=patience, **more)
+    schedule = WordSchedule(patience=patience, **more)
     return words_of(query, budget=budget, schedule=schedule, known=word)
 
 

@@ -12,7 +12,7 @@ import pytest
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
-from maneuver_automaton.refinement.improve import Patience, Schedule, words_of
+from maneuver_automaton.refinement.improve import Patience, WordSchedule, words_of
 from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import word_of_steps
@@ -27,11 +27,14 @@ pytestmark = compiled_only
 def first_word():
     """The first word past the walls, as the lattice finds it."""
     counted = replace(UNLIMITED, expansions=600)
-    return next(iter(words_of(query(), budget=counted, schedule=Schedule())))
+    return next(iter(words_of(query(), budget=counted, schedule=WordSchedule())))
 
 
 def improving(word, **changes):
-    counted, schedule = replace(UNLIMITED, expansions=0), Schedule(patience=Patience(), **changes)
+    counted, schedule = (
+        replace(UNLIMITED, expansions=0),
+        WordSchedule(patience=Patience(), **changes),
+    )
     return words_of(query(), budget=counted, schedule=schedule, known=word)
 
 

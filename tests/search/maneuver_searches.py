@@ -9,7 +9,7 @@ import numpy as np
 
 from maneuver_automaton._compile import bare_kernel
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.refinement.improve import Schedule, words_of
+from maneuver_automaton.refinement.improve import WordSchedule, words_of
 from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, coasted
 from maneuver_automaton.search._kernels_connection import edge_end, edge_free
 from maneuver_automaton.search.lattice_query import LatticeQuery
@@ -50,7 +50,9 @@ def search_maneuvers(
     """
     begun = time.monotonic()
     found: list[tuple[Word, int, float]] = []
-    search = words_of(query, budget=replace(budget, expansions=max_expansions), schedule=Schedule())
+    search = words_of(
+        query, budget=replace(budget, expansions=max_expansions), schedule=WordSchedule()
+    )
     for word in search:
         found.append((word, search.expansions, time.monotonic() - begun))
         if first_only:
