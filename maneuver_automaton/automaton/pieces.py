@@ -196,7 +196,16 @@ def _maneuver(entry: Piece, library: Automaton) -> Maneuver:
     """The maneuver of the library, or what was left of it when the step began."""
     one = _in_library(entry, library)
     if one is None:
-        return _written(entry, library)
+        # A maneuver whose course is written in the log.
+        if "course" not in entry:
+            raise ValueError(
+                f"maneuver {entry['name']!r}: the library has none of this name and ends"
+            )
+        columns = ("time", "pose", "reduced_state", "control")
+        samples = {name: np.array(entry["course"][name], dtype=np.float64) for name in columns}
+        course = Trajectory(**samples, model=library.model)
+        name, source, target = entry["name"], entry["source"], entry["target"]
+        return Maneuver.along(course, name=name, source=source, target=target)
     begun = one.duration - float(entry["duration_s"])
     if begun <= 0.0:
         return one
@@ -206,17 +215,6 @@ def _maneuver(entry: Piece, library: Automaton) -> Maneuver:
     rest = tail_of(with_samples_at(whole, [begun], library.model), begun)
     assert rest.maneuvers[0] is not None
     return rest.maneuvers[0]
-
-
-def _written(entry: Piece, library: Automaton) -> Maneuver:
-    """A maneuver whose course is written in the log."""
-    if "course" not in entry:
-        raise ValueError(f"maneuver {entry['name']!r}: the library has none of this name and ends")
-    columns = ("time", "pose", "reduced_state", "control")
-    samples = {name: np.array(entry["course"][name], dtype=np.float64) for name in columns}
-    course = Trajectory(**samples, model=library.model)
-    name, source, target = entry["name"], entry["source"], entry["target"]
-    return Maneuver.along(course, name=name, source=source, target=target)
 
 
 def _trim(entry: Piece, library: Automaton) -> Trim:

@@ -187,17 +187,13 @@ def _twists(plan: Sampled, samples: Trajectory, index: IntArray, model: Model | 
             states, controls = samples.reduced_state[here], samples.control[here]
             twists[here] = model.body_velocity(states, controls)
         elif here.size:
-            twists[here] = _mean_twists(plan, samples.time, here)
+            # Constant twist (m, dof) that leads from the pose of each row to that of the next.
+            begin = np.minimum(here, samples.time.size - 2)
+            group = group_of(plan.start.size)
+            poses, span = plan.pose_at(samples.time), samples.time[begin + 1] - samples.time[begin]
+            steps = (group(poses[begin]).inverse() @ group(poses[begin + 1])).log()
+            twists[here] = np.asarray(steps / np.where(span > 0.0, span, np.inf)[:, None])
     return twists
-
-
-def _mean_twists(plan: Sampled, times: Array, rows: IntArray) -> Array:
-    """Constant twist (m, dof) that leads from the pose of each row to that of the next."""
-    begin = np.minimum(rows, times.size - 2)
-    group = group_of(plan.start.size)
-    poses, span = plan.pose_at(times), times[begin + 1] - times[begin]
-    steps = (group(poses[begin]).inverse() @ group(poses[begin + 1])).log()
-    return np.asarray(steps / np.where(span > 0.0, span, np.inf)[:, None])
 
 
 def _names(known: tuple[str, ...] | None, n: int) -> tuple[str, ...]:

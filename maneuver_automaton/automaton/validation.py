@@ -117,11 +117,15 @@ def validate(automaton: Automaton) -> AutomatonReport:
     """
     components, dead_ends, unused = _reach(automaton)
     controllable, reason = _controllable(automaton, components)
+    same: defaultdict[tuple[int, bytes], list[str]] = defaultdict(list)
+    rows = automaton.body_velocities + 0.0  # -0.0 is 0.0
+    for name, where, row in zip(automaton.trim_names, automaton.trim_classes, rows, strict=True):
+        same[int(where), row.tobytes()].append(name)
     return AutomatonReport(
         components=components,
         dead_ends=dead_ends,
         unused=unused,
-        duplicates=_duplicates(automaton),
+        duplicates=tuple(tuple(names) for names in same.values() if len(names) > 1),
         controllable=controllable,
         reason=reason,
     )
@@ -158,14 +162,6 @@ def _reach(
 def _names_in(automaton: Automaton, classes: set[int]) -> tuple[str, ...]:
     inside = np.isin(automaton.trim_classes, list(classes))
     return tuple(automaton.trim_names[k] for k in np.flatnonzero(inside))
-
-
-def _duplicates(automaton: Automaton) -> tuple[tuple[str, ...], ...]:
-    same: defaultdict[tuple[int, bytes], list[str]] = defaultdict(list)
-    rows = automaton.body_velocities + 0.0  # -0.0 is 0.0
-    for name, where, row in zip(automaton.trim_names, automaton.trim_classes, rows, strict=True):
-        same[int(where), row.tobytes()].append(name)
-    return tuple(tuple(names) for names in same.values() if len(names) > 1)
 
 
 def _controllable(

@@ -121,12 +121,13 @@ def world_of(
     there = present or tuple(one.presence for one in moving)
     followed = [_moving_of(obstacle) for obstacle in moving]
     moving_arrays = _moving_obstacles(followed, pose, there, body.reach)
+    times = np.concatenate([moving_arrays.time, moving_arrays.present.ravel()])
     return World(
         frame=pose,
         body=body,
         arrays=WorldArrays(solids=solids, buckets=buckets, field=field, moving=moving_arrays),
         box=_box(solids.plates[:, :4], followed, pose),
-        last_event=_last_event(moving_arrays),
+        last_event=float(times[np.isfinite(times)].max(initial=-math.inf)),
     )
 
 
@@ -273,12 +274,15 @@ def _moving_obstacles(
     """All moving obstacles, for a body of some reach [m]."""
     knots = [one.motion.time.size for one in every]
     poses = np.concatenate([np.zeros((0, 3)), *(one.motion.pose for one in every)])
+    # Poses (n, 3) from a frame, their headings going on as they do.
+    there = SE2(np.array([-frame[0], -frame[1], 0.0])) @ SE2(poses)
+    turned = SE2(np.array([0.0, 0.0, -frame[2]])) @ there
     found = MovingObstacles(
         solids=solids_of([piece for one in every for piece in one.pieces]),
         first_piece=np.cumsum([0, *(len(one.pieces) for one in every)], dtype=np.int64),
         first_knot=np.cumsum([0, *knots], dtype=np.int64),
         time=np.concatenate([np.zeros(0), *(one.motion.time for one in every)]),
-        pose=_seen_poses(poses, frame),
+        pose=np.asarray(np.round(turned.pose, DIGITS)),
         speed=np.array([one.speed for one in every], dtype=np.float64),
         middle=np.array([one.middle for one in every], dtype=np.float64).reshape(-1, 2),
         reach=np.array([one.reach for one in every], dtype=np.float64),
@@ -312,19 +316,6 @@ def _moving_of(obstacle: Obstacle) -> _Moving:
         reach=max(float(np.hypot(*(ring - middle).T).max()) + r for ring, r in own),
         way=np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle)),
     )
-
-
-def _last_event(moving: MovingObstacles) -> float:
-    """When the last obstacle stops, or comes, or goes [s]."""
-    times = np.concatenate([moving.time, moving.present.ravel()])
-    return float(times[np.isfinite(times)].max(initial=-math.inf))
-
-
-def _seen_poses(poses: Array, frame: Array) -> Array:
-    """Poses (n, 3) from a frame, their headings going on as they do."""
-    there = SE2(np.array([-frame[0], -frame[1], 0.0])) @ SE2(poses)
-    turned = SE2(np.array([0.0, 0.0, -frame[2]])) @ there
-    return np.asarray(np.round(turned.pose, DIGITS))
 
 
 if TYPE_CHECKING:

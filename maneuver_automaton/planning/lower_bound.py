@@ -90,7 +90,13 @@ def lower_bound(
             problem, budget, max_work, most=max_direction_changes, incumbent=incumbent
         )
     if incumbent == math.inf:
-        incumbent = watch.cost = _cost_of_a_plan(problem, budget)
+        # Cost of a plan that a little work finds, the same at every call in time; inf for none.
+        workspace = workspace_of(problem.obstacles)
+        prepare_steps(problem, workspace)
+        brief = replace(problem, search=replace(problem.search, max_expansions=EXPANSIONS))
+        part = replace(budget.part(PLANNING), expansions=EXPANSIONS)
+        cost = answer(brief, part, workspace, alternatives=0).cost
+        incumbent = watch.cost = math.inf if cost is None else cost
     proving = Proving(problem, budget, watch, max_work=max_work)
     proving.run()
     return proving.bound(incumbent)
@@ -119,13 +125,3 @@ def _with_few_changes(
         if value > best.value:
             best = replace(one.best, value=min(value, incumbent), work=one.work)
     return best
-
-
-def _cost_of_a_plan(problem: Problem, budget: Budget) -> float:
-    """Cost of a plan that a little work finds, the same at every call in time; inf for none."""
-    workspace = workspace_of(problem.obstacles)
-    prepare_steps(problem, workspace)
-    brief = replace(problem, search=replace(problem.search, max_expansions=EXPANSIONS))
-    part = replace(budget.part(PLANNING), expansions=EXPANSIONS)
-    cost = answer(brief, part, workspace, alternatives=0).cost
-    return math.inf if cost is None else cost

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, Box, Obstacle, Shape
 from maneuver_automaton.collision.convex import convex_pieces
@@ -345,12 +345,17 @@ def polish_plans(
     pose: list[float | None] = goal.pose.tolist()
     if goal.free_heading:
         pose[2] = None
+    # The reduced state of a last trim; None for what follows from the last pose.
+    follows = (
+        () if problem.automaton.translated is None else problem.automaton.translated.follows_pose
+    )
+    values = last.reduced_state.tolist()
     task = PolishTask(
         model=problem.automaton.model,
         start=problem.start,
         start_state=first.reduced_state,
         goal=tuple(pose),
-        goal_state=_end_state(problem.automaton, last),
+        goal_state=tuple(None if k in follows else value for k, value in enumerate(values)),
         parts=_body_parts(problem),
         obstacles=(
             *(shape for one in problem.obstacles if not moves(one) for shape in _shapes_of(one)),
@@ -403,13 +408,6 @@ def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:
     low, high = np.split(obstacle.resolution * blocked_rectangles(obstacle.blocked), 2, axis=1)
     middles, heading = SE2(obstacle.origin).act((low + high) / 2.0), float(obstacle.origin[2])
     return [Box(size, at, heading) for size, at in zip(high - low, middles, strict=True)]
-
-
-def _end_state(automaton: Automaton, last: Trim) -> tuple[float | None, ...]:
-    """The reduced state of a last trim; None for what follows from the last pose."""
-    follows = () if automaton.translated is None else automaton.translated.follows_pose
-    values = last.reduced_state.tolist()
-    return tuple(None if k in follows else value for k, value in enumerate(values))
 
 
 def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:

@@ -74,7 +74,11 @@ class EndConditions:
         columns = np.array(twists.T)
         columns[0] = c * twists[:, 0] - s * twists[:, 1] - twists[:, 2] * arm[:, 1]
         columns[1] = s * twists[:, 0] + c * twists[:, 1] + twists[:, 2] * arm[:, 0]
-        gap = self._aim(end) - end
+        aim = np.zeros(end.size)
+        aim[2] = self.goal[2]
+        if self.free_heading:  # the heading that the word has anyway
+            aim[2] = end[2] if self.product is None else end[2] + self.product[2]
+        gap = (aim if self.product is None else goal_before(aim, self.product)) - end
         gap[2] = math.remainder(float(gap[2]), 2.0 * math.pi)
         if self.free_heading:
             self._follow_the_heading(end, gap, columns)
@@ -84,14 +88,6 @@ class EndConditions:
             np.concatenate([gap, self.targets - self.rows @ times]),
             np.vstack([columns, self.rows]),
         )
-
-    def _aim(self, end: Array) -> Array:
-        """Where the conjugated word ends (dof,), seen from the place of the goal."""
-        aim = np.zeros(end.size)
-        aim[2] = self.goal[2]
-        if self.free_heading:  # the heading that the word has anyway
-            aim[2] = end[2] if self.product is None else end[2] + self.product[2]
-        return aim if self.product is None else goal_before(aim, self.product)
 
     def _follow_the_heading(self, end: Array, gap: Array, columns: Array) -> None:
         """Let the aim turn with the end, so that no condition is left on the heading."""

@@ -75,7 +75,14 @@ def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
         i, j, k, via = rows[known], columns[known], begin[known], middle[known]
         cost[i, j] = prices[k] + cost[via, j]
         time[i, j] = lasting[k] + time[via, j]
-        displacement[i, j] = _composed(gained[k], displacement[via, j])
+        # Displacements (n, 4), each of `after` done in the frame of `before`.
+        before = gained[k]
+        after = displacement[via, j]
+        c, s = np.cos(before[:, 2]), np.sin(before[:, 2])
+        done = before + after
+        done[:, 0] = before[:, 0] + c * after[:, 0] - s * after[:, 1]
+        done[:, 1] = before[:, 1] + s * after[:, 0] + c * after[:, 1]
+        displacement[i, j] = done
         rows, columns = rows[~known], columns[~known]
     return Transitions(
         class_of=class_of,
@@ -134,12 +141,3 @@ def _firsts(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntA
     rows, columns = np.nonzero(after.T >= 0)
     best[rows, columns] = edge[rows, after.T[rows, columns]]
     return best
-
-
-def _composed(before: Array, after: Array) -> Array:
-    """Displacements (n, 4), each of `after` done in the frame of `before`."""
-    c, s = np.cos(before[:, 2]), np.sin(before[:, 2])
-    done = before + after
-    done[:, 0] = before[:, 0] + c * after[:, 0] - s * after[:, 1]
-    done[:, 1] = before[:, 1] + s * after[:, 0] + c * after[:, 1]
-    return done
