@@ -161,8 +161,7 @@ def test_the_plan_comes_back_from_its_file(planned, tmp_path):
     ma.save_plan(result, tmp_path / "plan.json")
     read = ma.load_plan(tmp_path / "plan.json", model=scenario.problem.automaton.model)
     assert read.word == result.plan.word
-    durations = [np.trim_zeros(one.durations).tolist() for one in (read, result.plan)]
-    assert durations[0] == durations[1]  # a first plan may begin and end with a rest of no time
+    assert read.durations.tolist() == result.plan.durations.tolist()
     assert read.start.tolist() == result.plan.start.tolist()
     times = np.linspace(0.0, read.duration, 40)
     np.testing.assert_allclose(read.pose_at(times), result.plan.pose_at(times), atol=1e-9)

@@ -76,7 +76,7 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
         return scenario.name, [*found, *_on_the_way(loop)]
     plan = load_plan(path, model=scenario.problem.automaton.model)
     with announced(), _of_this(path):
-        verdict = verify(scenario.problem, plan, leave=leave)
+        verdict = verify(scenario.problem, plan, leave=leave or None)
     return scenario.name, [_plan("plan", verdict, file.document.get("cost"))]
 
 
@@ -153,6 +153,7 @@ def _plan(what: str, verdict: Verdict, stated: Any) -> Finding:
     same = _agrees(stated, verdict.cost)
     clearance = None if verdict.audit is None else verdict.audit.min_clearance_m
     words = f"cost {verdict.cost:.9g}" + ("" if same else f", but the file says {stated}")
+    words = "; ".join([words, *verdict.notes])
     return Finding(what=what, holds=same, worst=clearance, words=words)
 
 

@@ -42,7 +42,7 @@ from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_pass import plan_of_word, with_cost
-from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.scene import Ends
 from maneuver_automaton.search.waiting import with_waits
@@ -163,8 +163,12 @@ class LatticeWords(PlanningStep):
             first = self.first_plan(query, limit, most=QUICK)
             word = first.word
             if word is None:
-                path = self.first_plan(_among_static(query), limit)
-                word = None if path.word is None else with_waits(query, path.word)
+                static = _among_static(query)
+                aside = along_free_path(static, self.table)
+                path = self.first_plan(static, limit, aside=aside)
+                if path.word is not None:
+                    close = replace(query, around=query.scene(LEAST_MARGIN))  # through narrow bends
+                    word = with_waits(query, path.word) or with_waits(close, path.word)
         if word is None:
             aside = along_free_path(query, self.table)
             proven = functools.partial(proven_apart, problem)

@@ -24,6 +24,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.search.limits import outside
 
+LEFT = "left the start, which touches "  # how the note of such a plan begins
 LEAST = 1e-3  # [s] that are left to plan in, or to drive
 EVERY = 5  # samples of a first trim after which a second one is tried
 MOST_WAYS, MOST_MIDDLES, MOST_SECONDS = 4, 60, 12  # planned from; first coasts; trims after them
@@ -70,15 +71,15 @@ def plan_leaving(
             continue
         names = [one.name or f"obstacle {k}" for k, one in touched.items()]
         note = (
-            f"left the start, which touches {' and '.join(names)} ({contact.depth:.3g} m deep, the "
-            f"margin included), by {length:.3g} m of {' - '.join(first.word)} in "
+            f"{LEFT}{' and '.join(names)} ({contact.depth:.3g} m deep, the margin included), "
+            f"by {length:.3g} m of {' - '.join(first.word)} in "
             f"{first.duration:.3g} s: never deeper, clear of all else; the audit admits this "
             "contact alone, and clearance counts from there"
         )
         return replace(
             last,
             problem=problem,
-            plan=whole,
+            plan=replace(whole, notes=(note,)),
             cost=problem.cost_of(whole),
             lower_bound=None,
             gap=None,
@@ -104,6 +105,11 @@ def _touched_at_start(problem: Problem) -> dict[int, AnyObstacle]:
         for k, one in enumerate(problem.obstacles)
         if where_touched(replace(problem, obstacles=(one,)), problem.start, problem.start_time)
     }
+
+
+def says_left(plan: Plan) -> str:
+    """The note of a plan that leaves a start in contact; empty of any other."""
+    return next((note for note in plan.notes if note.startswith(LEFT)), "")
 
 
 def check_leaving(problem: Problem, plan: Plan, goal: Goal) -> Checked:

@@ -10,10 +10,9 @@ Source: Laumond, Jacobs, Taïx, Murray (1994), *A motion planner for nonholonomi
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -124,7 +123,7 @@ def too_long(problem: Problem, budget: Budget) -> str:
 WIDE = 25.0  # times the lattice's distance before contact, that the path keeps if there is room
 KEPT = 0.6  # share of what the path keeps that its chords keep
 PROVEN = 0.05  # share of that which words keep for certain
-SHARE = 0.5  # of the time left
+SHARE = 0.5  # of the time left, for a proof while a search goes on
 STEP = Resolution(scale=0.24, durations=0.25, truncated=True)
 EXPANSIONS = 16  # from a pose to the next, at most
 AROUND = 2.0  # length scales that such a search looks around
@@ -135,12 +134,13 @@ FIRST_SAMPLES, MOST_SAMPLES = 16, 1 << 16  # of a chord
 def along_free_path(query: LatticeQuery, table: CostTable) -> Callable[[Budget], FirstPlan] | None:
     """What follows a free path within a budget; None where the vehicle cannot follow any path.
 
-    The answer is `exhausted` if it is proven that there is no path.
+    The answer is `exhausted` if it is proven that there is no path. Asked once more it goes on from
+    where the time was over.
     """
     able = query.library.at_will and query.most_trims == 0
     if not able or query.moves or query.world.arrays.field.distance.size == 0:
         return None
-    return functools.partial(_followed, query, table)
+    return _Following(query, table)
 
 
 def proven_apart(problem: Problem, budget: Budget) -> bool:
@@ -155,33 +155,88 @@ def proven_apart(problem: Problem, budget: Budget) -> bool:
     return left > 0.0 and are_apart(problem, most_boxes=SOON_BOXES, deadline=deadline)
 
 
-def _followed(query: LatticeQuery, table: CostTable, budget: Budget) -> FirstPlan:
-    """The word along the widest path of boxes, or none."""
-    from maneuver_automaton.bounds import Reachability, widest_path
+@dataclass(slots=True, eq=False)
+class _Following:
+    """The word along the widest path of boxes, as far as it is known."""
 
-    left = SHARE * budget.left
-    load_kernels("separation")  # the compiler's time is not the budget's
-    budget = replace(budget, deadline=budget.clock() + left)
-    answer, poses, apart = widest_path(
-        query.problem,
-        first=WIDE * back_off_of(query.library),
-        most_boxes=MOST_BOXES,
-        deadline=budget.deadline,
-    )
-    word, expansions, queries = None, 0, 0
-    if answer is Reachability.CONNECTED:
-        path, goal = _path_of(query, poses, KEPT * apart)
-        steps, expansions, queries = _steps_along(query, table, path, KEPT * apart, budget)
-        word = query.word_of(steps, goal) if steps else None
-    late = word is not None and word.duration > query.most_time
-    return FirstPlan(
-        word=None if late else word,
-        expansions=expansions,
-        queries=queries,
-        exhausted=answer is Reachability.SEPARATED,
-        enclosed="",
-        nearest=(math.inf, math.inf),
-    )
+    query: LatticeQuery
+    table: CostTable
+    path: Array = field(default_factory=lambda: np.zeros((0, 3)))
+    goal: int = 0  # that it leads to
+    apart: float = 0.0  # [m] that its chords keep
+    steps: list[tuple[int, int, float]] = field(default_factory=list)
+    here: float = 0.0  # [m] along the path that they lead
+    at: Array = field(init=False)  # (4,) the pose there
+    step: float = math.inf  # [m] to the next that is tried
+
+    def __call__(self, budget: Budget) -> FirstPlan:
+        """The whole word, or none."""
+        from maneuver_automaton.bounds import Reachability, widest_path
+
+        left, query, answer = budget.left, self.query, Reachability.CONNECTED
+        load_kernels("separation")  # the compiler's time is not the budget's
+        budget = replace(budget, deadline=budget.clock() + left)
+        if not len(self.path):
+            answer, poses, apart = widest_path(
+                query.problem,
+                first=WIDE * back_off_of(query.library),
+                most_boxes=MOST_BOXES,
+                deadline=budget.deadline,
+            )
+            if answer is Reachability.CONNECTED and not budget.is_over:
+                self.apart, self.at = KEPT * apart, query.start
+                self.path, self.goal = _path_of(query, poses, self.apart)
+        word, expansions, queries = None, 0, 0
+        if len(self.path):
+            is_whole, expansions, queries = self._go_on(budget)
+            word = query.word_of(self.steps, self.goal) if is_whole else None
+        late = word is not None and word.duration > query.most_time
+        return FirstPlan(
+            word=None if late else word,
+            expansions=expansions,
+            queries=queries,
+            exhausted=answer is Reachability.SEPARATED,
+            enclosed="",
+            nearest=(math.inf, math.inf),
+        )
+
+    def _go_on(self, budget: Budget) -> tuple[bool, int, int]:
+        """Whether steps lead to the end of the path now; expansions, and collision queries."""
+        query = self.query
+        places = np.append(0.0, np.cumsum(_lengths(query, self.path)))
+        scene = query.scene(max(min(query.margin, PROVEN * self.apart), LEAST_MARGIN))
+        length, expansions, queries = float(places[-1]), 0, 0
+        while self.here < length:
+            most = EXPANSIONS if budget.expansions is None else budget.expansions - expansions
+            if budget.is_over or most <= 0 or self.step < SHORTEST * length:
+                return False, expansions, queries
+            there = min(self.here + self.step, length)
+            to = np.append([np.interp(there, places, one) for one in self.path.T], query.start[3])
+            ends = np.array([self.at, to])[:, :2]
+            around = AROUND * query.library.radius
+            leg = replace(
+                query,
+                around=scene,
+                start=self.at,
+                goals=to[None],
+                goal_trims=query.goal_trims[:1],
+                free_heading=np.zeros(1, dtype=np.bool_),
+                box=np.append(ends.min(axis=0) - around, ends.max(axis=0) + around),
+            )
+            grid = distance_grid(
+                leg.plane, leg.box, leg.goals, leg.start, coarse=True, prepared=leg.prepared
+            )
+            search = pass_of(leg, STEP, grid=grid, table=self.table)
+            word = search.run(min(EXPANSIONS, most), math.inf, budget=budget)
+            expansions, queries = expansions + search.expansions, queries + search.queries
+            give_back(leg.prepared, leg.library, search.arrays)
+            if word is None:
+                self.step = 0.5 * min(self.step, length - self.here)
+                continue
+            pairs = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
+            self.steps += [(SWITCH, trim, duration) for trim, duration in pairs]
+            self.here, self.at, self.step = there, to, 2.0 * self.step
+        return True, expansions, queries
 
 
 def _path_of(query: LatticeQuery, poses: Array, apart: float) -> tuple[Array, int]:
@@ -224,44 +279,3 @@ def _lengths(query: LatticeQuery, path: Array) -> Array:
     body, steps = query.world.body, np.diff(path, axis=0)
     arm = math.hypot(body.middle_x, body.middle_y) + body.reach
     return np.asarray(np.hypot(steps[:, 0], steps[:, 1]) + arm * np.abs(steps[:, 2]))
-
-
-def _steps_along(
-    query: LatticeQuery, table: CostTable, path: Array, apart: float, budget: Budget
-) -> tuple[list[tuple[int, int, float]], int, int]:
-    """Steps of a word along a path, none if it gets stuck; expansions, and collision queries."""
-    places = np.append(0.0, np.cumsum(_lengths(query, path)))
-    scene = query.scene(max(min(query.margin, PROVEN * apart), LEAST_MARGIN))
-    length = step = float(places[-1])
-    steps, expansions, queries, here, at = list[tuple[int, int, float]](), 0, 0, 0.0, query.start
-    while here < length:
-        most = EXPANSIONS if budget.expansions is None else budget.expansions - expansions
-        if budget.is_over or most <= 0 or step < SHORTEST * length:
-            return [], expansions, queries
-        there = min(here + step, length)
-        to = np.append([np.interp(there, places, column) for column in path.T], query.start[3])
-        ends = np.array([at, to])[:, :2]
-        around = AROUND * query.library.radius
-        leg = replace(
-            query,
-            around=scene,
-            start=at,
-            goals=to[None],
-            goal_trims=query.goal_trims[:1],
-            free_heading=np.zeros(1, dtype=np.bool_),
-            box=np.append(ends.min(axis=0) - around, ends.max(axis=0) + around),
-        )
-        grid = distance_grid(
-            leg.plane, leg.box, leg.goals, leg.start, coarse=True, prepared=leg.prepared
-        )
-        search = pass_of(leg, STEP, grid=grid, table=table)
-        word = search.run(min(EXPANSIONS, most), math.inf, budget=budget)
-        expansions, queries = expansions + search.expansions, queries + search.queries
-        give_back(leg.prepared, leg.library, search.arrays)
-        if word is None:
-            step = 0.5 * min(step, length - here)
-            continue
-        pairs = zip(word.trims.tolist(), word.durations.tolist(), strict=True)
-        steps += [(SWITCH, trim, duration) for trim, duration in pairs]
-        here, at, step = there, to, 2.0 * step
-    return steps, expansions, queries

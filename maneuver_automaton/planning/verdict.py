@@ -11,7 +11,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import Audit, terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.planning.leaving import check_leaving
+from maneuver_automaton.planning.leaving import check_leaving, says_left
 from maneuver_automaton.problem import Problem
 
 START_TOLERANCE = 1e-9  # [m, rad] between the first pose of the plan and the start, as the audit's
@@ -26,11 +26,12 @@ class Verdict:
     cost: float  # by the cost of the problem, whether it passed or not
     goal_index: int  # of the goal that it was held against: the one it reaches, or the nearest
     audit: Audit | None  # None if a check before it failed
+    notes: tuple[str, ...] = ()  # what was admitted, as the plan says it was
 
     __repr__ = brief
 
 
-def verify(problem: Problem, plan: Plan, *, leave: bool = False) -> Verdict:
+def verify(problem: Problem, plan: Plan, *, leave: bool | None = None) -> Verdict:
     """Check a plan, say of another planner, as `plan` checks its own before it returns one.
 
     In this order, and the first that fails ends it: the start, the horizon and the number of trims,
@@ -44,9 +45,10 @@ def verify(problem: Problem, plan: Plan, *, leave: bool = False) -> Verdict:
         Start, goals, body, obstacles, margin, limits, cost.
     plan : Plan
         A word of trims and maneuvers with their durations [s].
-    leave : bool
+    leave : bool, optional
         Whether what the start touches may be touched until the body is out of it, never deeper;
-        clearance counts from there. For plans of ``plan(problem, leave=True)``.
+        clearance counts from there. By default that is so where the notes of the plan say it, as
+        those of ``plan(problem, leave=True)`` do, and of their files; the verdict then says so too.
 
     Returns
     -------
@@ -87,7 +89,8 @@ def verify(problem: Problem, plan: Plan, *, leave: bool = False) -> Verdict:
             f"{problem.start.round(6).tolist()}"
         )
         return Verdict(passed=False, reason=reason, cost=cost, goal_index=nearest[0], audit=None)
-    check = check_leaving if leave else check_plan
+    said = "" if leave is False else says_left(plan)
+    check = check_leaving if leave or said else check_plan
     verdicts = []
     for index in nearest:
         checked = check(problem, plan, problem.goals[index])
@@ -97,6 +100,7 @@ def verify(problem: Problem, plan: Plan, *, leave: bool = False) -> Verdict:
             cost=cost,
             goal_index=index,
             audit=checked.audit,
+            notes=(said,) if said and checked.passed else (),
         )
         if verdict.passed:
             return verdict

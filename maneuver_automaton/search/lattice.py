@@ -44,6 +44,7 @@ from maneuver_automaton.words.word import Word
 
 PROOF = 8_000  # expansions until it is asked once whether it is proven that there is no word
 ASIDE = 50_000  # expansions until something else is tried, whose words are longer
+ASIDE_SHARE = 0.5  # of the time left, for that
 
 Grids = tuple[DistanceGrid, DistanceGrid]  # distances to the goals and to the start
 
@@ -74,8 +75,9 @@ def first_plan(
 
     The library of the query says which resolutions are tried, and when; expansions of the `budget`
     are those of all searches together. `begun` is the first search of the schedule, if it is known.
-    What finds words otherwise is asked `aside`, once, where this takes long or ends without one; if
-    that is exhausted, so is all. Whether it `is_proven` that there is none is asked once, before.
+    What finds words otherwise is asked `aside` where this takes long, for a share of the time, and
+    again where it ends without one; if that is exhausted, so is all. Whether it `is_proven` that
+    there is none is asked once, before that.
     """
     schedule = schedule_of(query.library)
     guides = _Guides(query, table)
@@ -86,9 +88,9 @@ def first_plan(
         turns[0].begun = begun.search_of(query)
         if not begun.is_found:
             guides.coarse_grids[turns[0].sign] = turns[0].begun.search.grid
-    word, proof, total, left_out, other, none = None, "", 0, False, None, False
+    word, proof, total, queries, left_out, other, none = None, "", 0, 0, False, None, False
     while word is None:
-        due = room if aside is None else min(room, ASIDE)
+        due = min(room, ASIDE) if aside and other is None else room
         for one in turns:
             if not one.may_expand or total >= due or budget.is_over:
                 continue
@@ -106,14 +108,16 @@ def first_plan(
         closed = not alive or any(one.is_closed for one in turns)
         proof = _enclosed(query, guides.fine) if word is None and closed else ""
         late = alive and not any(one.may_expand for one in turns)
-        asks = total >= due or not (alive or stages)
+        ends = not (alive or stages)
         if is_proven and word is None and not proof and total >= PROOF:
             none, is_proven = is_proven(budget), None
             if none:
                 break
-        if aside and asks and word is None and not proof and total < room:
-            other, aside = aside(replace(budget, expansions=room - total)), None
+        if aside and (ends or total >= due) and word is None and not proof and total < room:
+            until = budget.clock() + (1.0 if ends else ASIDE_SHARE) * budget.left
+            other = aside(replace(budget, deadline=until, expansions=room - total))
             word, total = other.word, total + other.expansions
+            queries += other.queries
             if other.exhausted:
                 break
         if word is not None or total >= room or budget.is_over or proof or late:
@@ -134,7 +138,7 @@ def first_plan(
     found = FirstPlan(
         word=word,
         expansions=total,
-        queries=sum(one.queries for one in passes) + (other.queries if other else 0),
+        queries=sum(one.queries for one in passes) + queries,
         exhausted=none or (word is None and not alive and not left_out),
         enclosed=proof,
         nearest=min(ahead, default=(math.inf, math.inf)),

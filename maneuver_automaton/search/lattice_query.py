@@ -278,8 +278,9 @@ def _ends(problem: Problem, goals: Sequence[int], library: LatticeLibrary, world
         numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
         trims = np.asarray(library.number_of[numbers], dtype=np.int64)
     clear = _end_clearances(problem, library, worlds, seen, trims, level)
-    # The clearance at one heading says nothing of a goal at which the vehicle may turn.
-    if not turns and (clear[1:] > 0.0).any():
+    # The clearance at one heading says nothing of a goal at which the vehicle may turn; nor that
+    # after the last event of one that is reached before.
+    if not (turns or problem.moves) and (clear[1:] > 0.0).any():
         kept = np.append(0, 1 + np.flatnonzero(clear[1:] > 0.0))
         clear, seen, trims, poses = clear[kept], seen[kept], trims[kept], poses[kept]
         index, free = index[kept[1:] - 1], free[kept[1:] - 1]

@@ -16,7 +16,7 @@ from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 MOST_PIECES = 60  # joints at which it may wait
-MOST_STATES = 4096  # of joints, each for a stretch of time
+MOST_STATES = 4096  # of joints, each for a stretch of time; in long words four a joint
 TICK = 0.1  # [s] between departures that are tried
 SHORT_TURN = 0.2  # [rad] of the pieces whose bulge is bounded
 
@@ -92,9 +92,10 @@ def _drives(query: LatticeQuery, trims: IntArray, durations: Array) -> bool:
 
 
 def _path_of(
-    query: LatticeQuery, trims: IntArray, durations: Array, *, states: int = MOST_STATES
+    query: LatticeQuery, trims: IntArray, durations: Array, *, states: int = 0
 ) -> PathArrays:
     """A path in pieces from the start of a query, and room for the states along it."""
+    states = states or max(MOST_STATES, 4 * len(trims))
     twists = query.library.arrays.library.twists
     poses = np.zeros((len(trims) + 1, 4))
     poses[:, :3] = coasted(query.start[:3], twists[trims, :3], durations)

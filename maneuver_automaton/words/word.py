@@ -147,7 +147,8 @@ def plan_of(
 ) -> Plan:
     """The word as a plan from `start` (dof,), its times corrected to end at `goal` (dof,).
 
-    Without a goal the times are taken as they are.
+    Without a goal the times are taken as they are. Beside maneuvers, trims at its ends that last no
+    time are left out: a file of the plan does not hold them.
     """
     trims = [automaton.trims[k] for k in word.trims]
     durations = word.durations
@@ -162,11 +163,18 @@ def plan_of(
             free_heading=free_heading,
         )
     maneuvers = [None if k == SWITCH else automaton.maneuvers[k] for k in word.transitions]
+    if not any(maneuvers):
+        return Plan(start, tuple(trims), durations=durations, start_time=start_time)
+    first, last = 0, len(trims) - 1
+    while maneuvers[first] is None and durations[first] == 0.0:
+        first += 1
+    while maneuvers[last - 1] is None and durations[last] == 0.0:
+        last -= 1
     return Plan(
         start,
-        tuple(trims),
-        durations=durations,
-        maneuvers=tuple(maneuvers) if any(maneuvers) else (),
+        tuple(trims[first : last + 1]),
+        durations=durations[first : last + 1],
+        maneuvers=tuple(maneuvers[first:last]),
         start_time=start_time,
     )
 

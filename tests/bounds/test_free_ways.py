@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks.free_ways import drawn, planned, wrong
 from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Problem, Unicycle, plan
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.bounds import goals_blocked, separation
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import UserModel
@@ -19,7 +20,7 @@ FIELD = Path(__file__).parents[3] / "shared" / "data" / "field"
 ROBOT = Automaton.of_controls(
     Unicycle(), {"ahead": (0.4, 0.0), "left": (0.3, 0.6), "right": (0.3, -0.6), "spin": (0.0, 0.6)}
 )
-QUICKLY = range(0, 5000, 334)
+QUICKLY = [150, *range(0, 5000, 334)]  # the first: a goal that something comes to later
 
 
 def batches(all_of_them, *, quick):
@@ -129,3 +130,20 @@ def test_a_goal_is_blocked_only_if_all_of_its_tolerance_is():
 
     assert goals_blocked(within(1.5), most_boxes=50_000)
     assert not goals_blocked(within(0.8), most_boxes=50_000)
+
+
+def test_a_goal_that_something_comes_to_later_is_not_left_out():
+    """Of two goals the other lies behind walls; the vehicle is there long before the disc."""
+    walls = [Box([4.0, 0.2], [0.0, 30.0 + 2.0 * side]) for side in (1, -1)]
+    walls += [Box([0.2, 4.2], [2.0 * side, 30.0]) for side in (1, -1)]
+    there = Obstacle(Disc(0.3, [6.0, 0.0]), present_s=(50.0, 60.0))
+    problem = Problem(
+        load_stock_library("hovercraft"),
+        [0, 0, 0],
+        [Goal([6, 0, 0]), Goal([0, 30, 0])],
+        obstacles=[there, *walls],
+        footprint=Box([0.5, 0.3]),
+        search=SearchSettings(max_expansions=2000, improve=False),
+    )
+    found = plan(problem, time_limit=60.0)
+    assert (found.status, found.goal_index) == (PlanStatus.FOUND, 0)

@@ -9,9 +9,10 @@ import pytest
 import shapely
 
 from benchmarks.unreachable import FAMILIES
-from maneuver_automaton import Automaton, Box, Car, plan
+from maneuver_automaton import Automaton, Box, Car, Disc, Obstacle, plan, verify
 from maneuver_automaton.bounds import Reachability, widest_path
 from maneuver_automaton.bounds.separation import connectivity
+from maneuver_automaton.collision import Motion
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import SearchSettings
@@ -66,6 +67,24 @@ def test_a_bend_hardly_wider_than_it_has_to_be(width):
     found = plan(with_library(bend(width)), time_limit=300.0)
     assert found.status is PlanStatus.FOUND
     assert is_driven(found)
+
+
+def test_a_path_that_was_broken_off_is_followed_to_its_end(monkeypatch):
+    """Where the time is short the search gets its share first; then the path has what is left."""
+    monkeypatch.setattr("maneuver_automaton.search.lattice.ASIDE_SHARE", 1e-9)
+    problem = dataclasses.replace(with_library(bend(3.12)), search=SearchSettings(improve=False))
+    assert is_driven(plan(problem, time_limit=300.0))
+
+
+def test_a_bend_beside_which_something_moves():
+    """Far away, and across the way: the path is followed all the same."""
+    for way in ([[0, -5, 0], [10, -5, 0]], [[14.4, 3, 0], [14.4, 30, 0]]):
+        mover = Obstacle(Disc(0.3), motion=Motion([0.0, 6.0], np.array(way, dtype=float)))
+        problem = with_library(bend(3.12))
+        among = dataclasses.replace(problem, obstacles=(*problem.obstacles, mover))
+        found = plan(among, time_limit=300.0)
+        assert found.status is PlanStatus.FOUND
+        assert verify(among, found.plan).passed
 
 
 def test_a_moved_bend_has_the_moved_plan():

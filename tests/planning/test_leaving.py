@@ -55,11 +55,14 @@ def test_a_start_in_contact_is_left_backwards():
     result = ma.plan(problem, leave=True)
     assert result.status is PlanStatus.FOUND
     assert result.plan.word[0] == "back"
-    assert not ma.verify(problem, result.plan).passed
-    verdict = ma.verify(problem, result.plan, leave=True)
-    assert verdict.passed
-    assert verdict.audit.min_clearance_m == result.clearance_m
-    (note,) = result.notes
+    assert not ma.verify(problem, result.plan, leave=False).passed
+    unsaid = dataclasses.replace(result.plan, notes=())
+    assert not ma.verify(problem, unsaid).passed
+    for verdict in (ma.verify(problem, result.plan), ma.verify(problem, unsaid, leave=True)):
+        assert verdict.passed
+        assert verdict.audit.min_clearance_m == result.clearance_m
+    (note,) = ma.verify(problem, result.plan).notes
+    assert result.notes == (note,)
     assert note.startswith("left the start, which touches post (0.1 m deep, the margin included), ")
     assert result.audit.passed
     assert result.clearance_m > 0.0
@@ -208,6 +211,10 @@ def test_a_start_in_a_keep_out_mask_on_the_command_line(tmp_path, capsys):
     assert [one["name"] for one in document["primitives"]] == ["back"]
     assert document["audit"]["passed"] is True
     check = ["check", str(tmp_path / "out" / "plan.json"), "--with", str(tmp_path / "scene.yaml")]
+    assert run(check) == 0
+    assert note in " ".join(capsys.readouterr().out.split())
+    document["notes"] = []
+    (tmp_path / "out" / "plan.json").write_text(json.dumps(document))
     assert (run(check), run([*check, "--leave"])) == (1, 0)
 
 
