@@ -18,20 +18,7 @@ DEEPEST = 2  # dataclasses within dataclasses
 
 
 def brief(self: Any) -> str:
-    """Text of a dataclass for `__repr__`: at most ten lines; fields at their defaults left out.
-
-    Examples
-    --------
-    >>> @dataclasses.dataclass
-    ... class Grid:
-    ...     cells: np.ndarray
-    ...     name: str = ""
-    ...     __repr__ = brief
-    >>> Grid(np.zeros((300, 200)), name="hall")
-    Grid(cells=<(300, 200) array>, name='hall')
-    >>> Grid(np.zeros(2))
-    Grid(cells=[0.0, 0.0])
-    """
+    """Text of a dataclass for `__repr__`: at most ten lines; fields at their defaults left out."""
     lines = textwrap.wrap(
         _fields(self, 0),
         WIDTH,

@@ -66,15 +66,7 @@ def unit_of(coordinate: str) -> str:
 
 
 def listed(motions: Sequence[str]) -> str:
-    """Motions in a row, with 'translation' for all planar ones together.
-
-    Examples
-    --------
-    >>> listed(["rotation", "translation in x", "translation in y"])
-    'rotation and translation'
-    >>> listed(["translation in y"])
-    'translation in y'
-    """
+    """Motions in a row, with 'translation' for all planar ones together."""
     planar = {"translation in x", "translation in y"}
     if planar <= set(motions):
         motions = [*(motion for motion in motions if motion not in planar), "translation"]

@@ -17,32 +17,7 @@ DISC_CORNERS = 48
 
 
 def footprint_polygons(footprint: Any) -> list[Array]:
-    """Outlines of a footprint in the body frame; none if `footprint` is None.
-
-    Parameters
-    ----------
-    footprint : None, shape, (n, 2) array, mapping, or a sequence of these
-        A `Polygon`, `Disc` or `Box`; corners [m]; or a mapping of a scenario file:
-        ``{"polygon_m": corners}``, ``{"disc_m": radius}``,
-        ``{"rectangle_m": [length, width], "reference_m": [x, y]}``.
-        `reference_m` says where the pose sits, measured from the centre of the rectangle: the
-        body spans ``[-length / 2 - x, length / 2 - x]`` ahead; (0, 0) if left out.
-
-    Returns
-    -------
-    list of (n, 2) array
-        Corners of every outline [m], x ahead and y to the left, the first not repeated.
-
-    Raises
-    ------
-    ValueError
-        If it is none of these, a polygon has fewer than three corners, or a size is not positive.
-
-    Examples
-    --------
-    >>> footprint_polygons({"rectangle_m": [4.0, 2.0], "reference_m": [-1.0, 0.0]})[0].tolist()
-    [[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]
-    """
+    """Outlines of a footprint in the body frame; none if `footprint` is None."""
     if footprint is None:
         return []
     if isinstance(footprint, Polygon | Box):
@@ -123,16 +98,6 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
     Between two samples, which are a few hundredths of a radian apart, each convex piece of the
     body is taken to fill the hull of its two places: on a circle of radius r that is off by
     ``r * angle**2 / 8``, a millimetre for a car.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Plan
-    >>> from maneuver_automaton.plotting.track import track_of_plan
-    >>> from maneuver_automaton.primitives import Trim
-    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
-    >>> track = track_of_plan(Plan([0.0, 0.0, 0.0], (ahead,), durations=[3.0]))
-    >>> [part.area for part in swept_region(track, [np.array([[0, 0], [1, 0], [1, 2], [0, 2]])])]
-    [8.0]
     """
     import shapely
 

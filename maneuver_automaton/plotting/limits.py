@@ -161,16 +161,7 @@ CELLS_PER_PATH = 500  # rectangles; the renderer holds so much of one path at a 
 
 
 def shape_path(shape: Shape) -> Path:
-    """The path around a shape.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Polygon
-    >>> square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
-    >>> path = shape_path(Polygon(square, holes=[square / 2 + 1]))
-    >>> path.contains_point((0.5, 0.5)), len(path.to_polygons())
-    (True, 2)
-    """
+    """The path around a shape."""
     if isinstance(shape, Disc):
         return Path.circle((float(shape.center[0]), float(shape.center[1])), shape.radius)
     return region_path(outlines(shape))

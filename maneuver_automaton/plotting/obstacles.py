@@ -179,11 +179,6 @@ def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
     """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
 
     There are at most so many steps between them, and one more.
-
-    Examples
-    --------
-    >>> round_times(0.0, 17.3).tolist()
-    [0.0, 5.0, 10.0, 15.0, 17.3]
     """
     if not end > begin:
         return np.array([begin])

@@ -251,15 +251,7 @@ def settled(figure: Figure) -> Figure:
 
 
 def write_figure(figure: Figure, path: str | Path) -> None:
-    """Write `figure` to `path`, by its ending (.png, .pdf, .svg; .png if there is none).
-
-    Raises
-    ------
-    ValueError
-        If Matplotlib does not know the ending.
-    OSError
-        If the file cannot be written; an old one stays as it was.
-    """
+    """Write `figure` to `path`, by its ending (.png, .pdf, .svg; .png if there is none)."""
     target = Path(path)
     ending = target.suffix.lstrip(".").lower() or "png"
     stream = io.BytesIO()

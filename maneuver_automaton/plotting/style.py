@@ -168,13 +168,7 @@ POLISHED = "polished"  # what planning calls a motion by optimal control
 
 
 def control_labels(names: Sequence[str]) -> list[str]:
-    """Axis labels of controls: words, with the unit of those whose name says what they are.
-
-    Examples
-    --------
-    >>> control_labels(["turn_rate", "thrust"])
-    ['turn rate [rad/s]', 'thrust']
-    """
+    """Axis labels of controls: words, with the unit of those whose name says what they are."""
     return [
         name.replace("_", " ") + (f" [{UNITS[name]}]" if name in UNITS else "") for name in names
     ]

@@ -32,14 +32,6 @@ def rest_of(
     rests there.
 
     Source: the paper, Sec. 4, after Algorithm 14.
-
-    Examples
-    --------
-    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[1, 0])
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0, 0])
-    >>> left = rest_of(Plan([0, 0, 0], (ahead,), durations=[2.0]), 0.5, pad=rest)
-    >>> left.word, left.durations.tolist(), left.end.tolist()
-    (('ahead', 'rest'), [1.5, 0.5], [2.0, 0.0, 0.0])
     """
     left = without_nothing(tail_of(plan, after, start=start))
     return left if pad is None else rested(left, pad, after)
@@ -143,15 +135,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
 
 
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
-    """Whether two twists commute: their Lie bracket is zero.
-
-    Examples
-    --------
-    >>> commute([1.0, 0.0, 0.0], [-2.0, 0.0, 0.0])
-    True
-    >>> commute([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-    False
-    """
+    """Whether two twists commute: their Lie bracket is zero."""
     bracket = max(
         abs(one[2] * other[0] - other[2] * one[0]), abs(one[2] * other[1] - other[2] * one[1])
     )

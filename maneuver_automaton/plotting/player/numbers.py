@@ -57,13 +57,7 @@ def rounded(values: Array | Sequence[float], digits: int = VALUE_DIGITS) -> list
 
 
 def hex_color(color: Sequence[float]) -> str:
-    """A colour as the browser reads it.
-
-    Examples
-    --------
-    >>> hex_color((1.0, 0.5, 0.0))
-    '#ff8000'
-    """
+    """A colour as the browser reads it."""
     return "#" + "".join(f"{round(255 * channel):02x}" for channel in color)
 
 
