@@ -79,7 +79,8 @@ def reached(automaton: Automaton, *, start: str | None = None, settings: ReachSe
     """
     if automaton.model.group is not SE2:
         raise ValueError(f"reach: {automaton.model.name} is no vehicle in the plane")
-    first = _start_class(automaton, start)
+    index = automaton.rest if start is None else automaton.index_of(start)
+    first = int(automaton.trim_classes[index or 0])
     steps = _steps(automaton, settings)
     return _searched(first, steps, settings)
 
@@ -97,11 +98,6 @@ def path_length(maneuver: Maneuver) -> float:
     if poses is None:
         return float(np.linalg.norm(maneuver.displacement[:2]))
     return float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
-
-
-def _start_class(automaton: Automaton, start: str | None) -> int:
-    index = automaton.rest if start is None else automaton.index_of(start)
-    return int(automaton.trim_classes[index or 0])
 
 
 def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Steps]:

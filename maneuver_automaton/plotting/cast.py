@@ -168,7 +168,7 @@ class Actor:
     @property
     def body(self) -> list[Array]:
         """Outlines (n, 2) of its body in its own frame [m]; none if it is not known."""
-        return footprint_polygons(list(self.mover.bodies.get("", ())))
+        return footprint_polygons(self.mover.bodies.get("", ()))
 
     @property
     def reach(self) -> float:
@@ -225,7 +225,7 @@ class Actor:
             [
                 ring
                 for part in self.parts
-                for ring in placed(footprint_polygons(list(part.bodies[""])), part.pose_at(times))
+                for ring in placed(footprint_polygons(part.bodies[""]), part.pose_at(times))
             ]
             if self.body
             else []
@@ -355,7 +355,7 @@ def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
 
 
 def _carried(part: Mover) -> Carried:
-    body = tuple(footprint_polygons(list(part.bodies[""])))
+    body = tuple(footprint_polygons(part.bodies[""]))
     return Carried(name=part.name, body=body, track=joined_track(part.start, part.pieces))
 
 

@@ -35,7 +35,9 @@ def draw_ends(
     pale = [reached is not None and k != reached for k in range(len(goals))]
     colors = [GREY if others else INK for others in pale]
     headed = [k for k, goal in enumerate(goals) if not goal.free_heading]
-    artists: dict[str, Any] = {"start": draw_start(ax, start)}
+    artists: dict[str, Any] = {
+        "start": ax.scatter(start[0], start[1], s=26.0, color=[INK], linewidths=0.0, zorder=5.1)
+    }
     for k, (goal, color) in enumerate(zip(goals, colors, strict=True)):
         artists[f"goal {k}"] = draw_goal(ax, goal.pose, color=color)
         if goal.free_heading:
@@ -83,11 +85,6 @@ def _draw_via(ax: Axes, via: Sequence[Via]) -> dict[str, Any]:
             zorder=5.3, annotation_clip=True,
         )  # fmt: skip
     return artists
-
-
-def draw_start(ax: Axes, pose: Array) -> PathCollection:
-    """A dot for a start."""
-    return ax.scatter(pose[0], pose[1], s=26.0, color=[INK], linewidths=0.0, zorder=5.1)
 
 
 def draw_goal(ax: Axes, pose: Array, *, color: Color = INK) -> PathCollection:

@@ -122,10 +122,13 @@ def draw_obstacles(
             [] if fleeting else [one.track(float(times[0]), float(times[-1])) for one in moving]
         )
         colors = [color for *_, color in rows]
+    # Moving shapes, each in its colour, and whether each is there.
+    drawn = PathCollection(shown, linewidths=0.7, zorder=1.9)
+    show_presence(drawn, colors, there)
     artists = ObstacleArtists(
         static=_solid([shape_path(one.shape) for one in static_shapes(known)]),
         maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
-        moving=moving_collection(shown, colors, there),
+        moving=drawn,
         tracks=LineCollection(
             tracks, colors=[(*MOVING, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
         ),
@@ -153,15 +156,6 @@ def moving_shapes(obstacles: Sequence[AnyObstacle], *, fleeting: bool = False) -
         for one in obstacles
         if isinstance(one, Obstacle) and one.motion is not None
     ]
-
-
-def moving_collection(
-    paths: Sequence[Path], colors: Sequence[Color], there: Sequence[bool]
-) -> PathCollection:
-    """Moving shapes, each in its colour, and whether each is there."""
-    drawn = PathCollection(paths, linewidths=0.7, zorder=1.9)
-    show_presence(drawn, colors, there)
-    return drawn
 
 
 def show_presence(drawn: PathCollection, colors: Sequence[Color], there: Sequence[bool]) -> None:

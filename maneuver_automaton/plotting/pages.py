@@ -47,13 +47,6 @@ def new_figure(width: float, height: float) -> Figure:
     return figure
 
 
-def hide_times(column: Sequence[Axes]) -> None:
-    """Leave the times to the axes below."""
-    for ax in column:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
-
-
 def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
     """Lines of (text, size [pt], weight): the title, then `others`, the first bold without one."""
     said = [look.title, *([] if look.is_paper else others)]
@@ -83,7 +76,11 @@ class Page:
     def share_times(self) -> None:
         """Leave the times to the lowest of panels that stand above each other."""
         if self.is_stacked:
-            hide_times(self.panels[:-1])
+            # Leave the times to the axes below.
+            column = self.panels[:-1]
+            for ax in column:
+                ax.set_xlabel("")
+                ax.tick_params(labelbottom=False)
 
 
 def page_of(
@@ -203,18 +200,13 @@ def _headed(look: Look, lines: Sequence[str], width: float) -> tuple[Figure, flo
 
 def _settle(figure: Figure, height: float, top: float) -> None:
     """Give a figure its height [in], of which the axes have what is below the heading."""
-    height = even_height(height)
+    height = 2.0 * round(height * DPI / 2.0) / DPI
     figure.set_figheight(height)
     left, low = EDGE / figure.get_figwidth(), EDGE / height
     rect = (left, low, 1.0 - 2.0 * left, 1.0 - low - top / height)
     figure.set_layout_engine("constrained", rect=rect)
     for text in figure.texts:  # they were placed from the upper edge of another height
         text.set_y(1.0 - (1.0 - text.get_position()[1]) * FIRST / height)
-
-
-def even_height(inches: float) -> float:
-    """A height that is an even number of pixels, as films need it."""
-    return 2.0 * round(inches * DPI / 2.0) / DPI
 
 
 def _legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> float:

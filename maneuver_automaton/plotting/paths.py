@@ -276,7 +276,7 @@ def _step_bodies(one: Actor, *, size: float) -> PolyCollection:
     outlines = placed(body, poses[shown])
     for part in one.parts[1:]:
         at = np.array([*(piece.start for piece in part.pieces), part.end])
-        outlines += placed(footprint_polygons(list(part.bodies[""])), at[shown])
+        outlines += placed(footprint_polygons(part.bodies[""]), at[shown])
     return PolyCollection(
         outlines, facecolors=[(*GREY, 0.06 if one.body else 0.35)], edgecolors=[(*INK, 0.55)],
         linewidths=0.7, zorder=2.0,

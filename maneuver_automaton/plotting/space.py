@@ -83,11 +83,21 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
             inner.append(shaded(BUILDING, shade))
             rims.append((*shaded(BUILDING, -0.25), 0.5))
     for places, color, width in _strokes(cast, ground=float(low[2])):
-        faces.append(_ribbon(places, width * size))
+        # A stroke (2, 3) as a face (4, 3) that is seen from the front.
+        azimuth, elevation = math.radians(AZIMUTH), math.radians(ELEVATION)
+        level = math.cos(elevation)
+        seen = [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)]
+        aside = np.cross(places[1] - places[0], seen)
+        length = float(np.linalg.norm(aside))
+        aside = 0.5 * (width * size) * aside / length if length > 0.0 else np.zeros(3)
+        faces.append(
+            np.array([places[0] - aside, places[1] - aside, places[1] + aside, places[0] + aside])
+        )
         inner.append(color)
         rims.append((*color, 1.0))
+    longest = max((len(face) for face in faces), default=0)
     collection = Poly3DCollection(
-        _as_long_as_the_longest(faces),
+        [np.pad(face, ((0, longest - len(face)), (0, 0)), mode="edge") for face in faces],
         facecolors=inner,
         edgecolors=rims,
         linewidths=RIM,
@@ -108,7 +118,14 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(tuple(high - low), zoom=1.32)
     ax.view_init(elev=ELEVATION, azim=AZIMUTH)
-    _bare_axes(ax)
+    # Faint panes and small numbers.
+    for axis, name in ((ax.xaxis, "x [m]"), (ax.yaxis, "y [m]"), (ax.zaxis, "altitude [m]")):
+        axis.set_label_text(name, fontsize=TEXT_PT, color=INK)
+        axis.set_tick_params(labelsize=SMALL_PT, labelcolor=INK, pad=0.0)
+        axis.pane.set_facecolor((0.965, 0.97, 0.975, 1.0))
+        axis.pane.set_edgecolor((*GREY, 0.4))
+        axis._axinfo["grid"].update(color=(*GREY, 0.25), linewidth=0.5)
+    ax.locator_params(axis="z", nbins=4)
     for part in ax.get_children():  # what stands out of its box makes it no smaller
         part.set_in_layout(False)
     return collection
@@ -189,23 +206,6 @@ def _parts(places: Array) -> list[Array]:
     at = np.linspace(0.0, driven[-1], count)
     even = np.stack([np.interp(at, driven, column) for column in places.T], axis=1)
     return [even[k : k + 2] for k in range(count - 1)]
-
-
-def _ribbon(places: Array, width: float) -> Array:
-    """A stroke (2, 3) as a face (4, 3) that is seen from the front."""
-    azimuth, elevation = math.radians(AZIMUTH), math.radians(ELEVATION)
-    level = math.cos(elevation)
-    seen = [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)]
-    aside = np.cross(places[1] - places[0], seen)
-    length = float(np.linalg.norm(aside))
-    aside = 0.5 * width * aside / length if length > 0.0 else np.zeros(3)
-    return np.array([places[0] - aside, places[1] - aside, places[1] + aside, places[0] + aside])
-
-
-def _as_long_as_the_longest(faces: list[Array]) -> list[Array]:
-    """Faces (k, 3) with as many corners each; a shorter one stays in its last corner."""
-    longest = max((len(face) for face in faces), default=0)
-    return [np.pad(face, ((0, longest - len(face)), (0, 0)), mode="edge") for face in faces]
 
 
 def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, float]]:
@@ -295,14 +295,3 @@ def _mark(ax: Axes3D, pose: Array, color: Color, marker: str) -> Line2D:
         zorder=10, clip_on=False,
     )  # fmt: skip
     return mark
-
-
-def _bare_axes(ax: Axes3D) -> None:
-    """Faint panes and small numbers."""
-    for axis, name in ((ax.xaxis, "x [m]"), (ax.yaxis, "y [m]"), (ax.zaxis, "altitude [m]")):
-        axis.set_label_text(name, fontsize=TEXT_PT, color=INK)
-        axis.set_tick_params(labelsize=SMALL_PT, labelcolor=INK, pad=0.0)
-        axis.pane.set_facecolor((0.965, 0.97, 0.975, 1.0))
-        axis.pane.set_edgecolor((*GREY, 0.4))
-        axis._axinfo["grid"].update(color=(*GREY, 0.25), linewidth=0.5)
-    ax.locator_params(axis="z", nbins=4)

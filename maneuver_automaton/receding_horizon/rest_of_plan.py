@@ -171,7 +171,15 @@ def reanchored(
         yield from rejoining(problem, plan, goal, pad=pad)
     elif goal.tolerance_m or goal.tolerance_rad:
         from_here = replace(plan, start=problem.start)
-        eased = _eased(goal, from_here.end)
+        # The goal moved, within its tolerance, towards where a plan ends.
+        places = [0, 1, *range(3, from_here.end.size)]
+        off = from_here.end - goal.pose
+        off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
+        distance_m, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
+        pose = np.array(goal.pose)
+        pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
+        pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
+        eased = replace(goal, pose=pose)
         near = same_word(problem, plan, eased, pad=pad, under_way=under_way)
         if near is not None:
             yield near
@@ -226,18 +234,6 @@ def same_word(
     if missed(again, goal) > NEAR * (1.0 + float(np.abs(again.start).max())):
         return None
     return without_nothing(again)
-
-
-def _eased(goal: Goal, end: Array) -> Goal:
-    """The goal moved, within its tolerance, towards where a plan ends."""
-    places = [0, 1, *range(3, end.size)]
-    off = end - goal.pose
-    off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
-    distance_m, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
-    pose = np.array(goal.pose)
-    pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
-    pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
-    return replace(goal, pose=pose)
 
 
 def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Iterator[Plan]:

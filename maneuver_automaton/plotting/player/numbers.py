@@ -149,7 +149,12 @@ def _curve(curve: Array) -> dict[str, list[float]]:
 def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: bool) -> list[Any]:
     """Static and moving obstacles; with `leave`, a moving one is there for its motion only."""
     return [
-        _map_entry(one, local)
+        {
+            "name": one.name,
+            "origin": local.poses(one.origin),
+            "cell": one.resolution,
+            "cells": blocked_rectangles(one.blocked).ravel().tolist(),
+        }
         if isinstance(one, OccupancyMap)
         else _obstacle_entry(one, local, leave=leave)
         for one in obstacles
@@ -188,7 +193,7 @@ def body_entries(bodies: Mapping[str, Sequence[Shape]]) -> list[Any]:
     outlines = [
         (k, ring)
         for k, shapes in enumerate(bodies.values())
-        for ring in footprint_polygons(list(shapes))
+        for ring in footprint_polygons(shapes)
     ]
     return [
         {
@@ -205,7 +210,7 @@ def body_entries(bodies: Mapping[str, Sequence[Shape]]) -> list[Any]:
 def shape_rings(shape: Shape) -> list[Array]:
     """Rings (n, 2) around a shape and its holes; a disc has many corners."""
     if isinstance(shape, Disc):
-        return footprint_polygons(shape)
+        return footprint_polygons([shape])
     return [ring for part in outlines(shape) for ring in rings_of(part)]
 
 
@@ -224,16 +229,6 @@ def _obstacle_entry(one: Obstacle, local: Local, *, leave: bool) -> dict[str, An
         "t": rounded(times, POSE_DIGITS),
         "pose": local.poses(one.motion.at(times)),
         "leaves": leave,
-    }
-
-
-def _map_entry(cells: OccupancyMap, local: Local) -> dict[str, Any]:
-    """Blocked cells as rectangles [low column, low row, high column, high row]."""
-    return {
-        "name": cells.name,
-        "origin": local.poses(cells.origin),
-        "cell": cells.resolution,
-        "cells": blocked_rectangles(cells.blocked).ravel().tolist(),
     }
 
 
