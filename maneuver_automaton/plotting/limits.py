@@ -21,7 +21,7 @@ from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.places import Ground
 from maneuver_automaton.plotting.colors import GREY, Color
-from maneuver_automaton.plotting.style import line_handle
+from maneuver_automaton.plotting.style import Entries, dashed_handle
 from maneuver_automaton.problem import Bounds
 
 ZONE: Color = (0.76, 0.56, 0.02)
@@ -107,8 +107,8 @@ def draw_ground(ax: Axes, grounds: Sequence[Ground]) -> list[Artist]:
     return artists
 
 
-def ground_handles(grounds: Sequence[Ground]) -> tuple[list[Artist], list[str]]:
-    """Legend handles of ground that has a price: what each costs, and one for all rasters."""
+def ground_entries(grounds: Sequence[Ground]) -> Entries:
+    """Legend entries of ground that has a price: what each costs, and one for all rasters."""
     most = max((one.price for one in grounds if one.areas), default=1.0) or 1.0
     shades: dict[str, float] = {}
     for one in grounds:
@@ -116,22 +116,19 @@ def ground_handles(grounds: Sequence[Ground]) -> tuple[list[Artist], list[str]]:
             shades[f"ground: {one.price:g} per {one.per}"] = MOST_SHADE * one.price / most
         else:
             shades["hills" if one.raster.are_heights else "ground by a raster"] = MOST_SHADE
-    return [Patch(color=(*GROUND, shade)) for shade in shades.values()], [*shades]
+    return [(Patch(color=(*GROUND, shade)), name) for name, shade in shades.items()]
 
 
-def limit_handles(zones: Sequence[Zone], bounds: Bounds) -> tuple[list[Artist], list[str]]:
-    """Legend handles: what each kind of zone asks for, and the bounds."""
-    handles: list[Artist] = [
-        Patch(facecolor=(*ZONE, 0.10), edgecolor=(*ZONE, 0.65), hatch=2 * HATCHES[k % len(HATCHES)])
-        for k in range(len(_alike(zones)))
-    ]
-    names = [f"zone: {asks}" for asks in _alike(zones)]
+def limit_entries(zones: Sequence[Zone], bounds: Bounds) -> Entries:
+    """Legend entries: what each kind of zone asks for, and the bounds."""
+    entries: list[tuple[Artist, str]] = []
+    for k, asks in enumerate(_alike(zones)):
+        hatch = 2 * HATCHES[k % len(HATCHES)]
+        zone = Patch(facecolor=(*ZONE, 0.10), edgecolor=(*ZONE, 0.65), hatch=hatch)
+        entries.append((zone, f"zone: {asks}"))
     if bound_lines(bounds):
-        line = line_handle(GREY, width=1.1)
-        line.set_linestyle(DASHES)
-        handles.append(line)
-        names.append("bounds of the pose")
-    return handles, names
+        entries.append((dashed_handle(GREY, DASHES, width=1.1), "bounds of the pose"))
+    return entries
 
 
 def bound_lines(bounds: Bounds) -> list[Array]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.patches import Patch
@@ -18,6 +19,7 @@ from maneuver_automaton.collision.shapes import as_obstacles
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import Color, shaded
 from maneuver_automaton.plotting.limits import map_paths, moved_path, shape_path
+from maneuver_automaton.plotting.style import Entries
 
 SOLID: Color = (0.36, 0.38, 0.42)
 MOVING: Color = (0.44, 0.22, 0.58)
@@ -191,26 +193,24 @@ def moment_colors(count: int, *, color: Color = MOVING) -> list[Color]:
     return [shaded(color, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
 
 
-def obstacle_handles(
-    obstacles: Sequence[AnyObstacle], times: Array
-) -> tuple[list[Patch], list[str]]:
-    """Legend handles: obstacles, and moving ones at each of the `times` (n,) [s]."""
-    handles, names = [], []
+def obstacle_entries(obstacles: Sequence[AnyObstacle], times: Array) -> Entries:
+    """Legend entries: obstacles, and moving ones at each of the `times` (n,) [s]."""
+    entries: list[tuple[Artist, str]] = []
     moving = [one for one in obstacles if isinstance(one, Obstacle) and one.motion is not None]
     if len(moving) < len(obstacles):
-        handles.append(Patch(facecolor=SOLID))
-        names.append("obstacle")
+        entries.append((Patch(facecolor=SOLID), "obstacle"))
     if moving:
-        colors = moment_colors(len(times))
-        handles += [Patch(facecolor=(*c, THERE_ALPHA), edgecolor=shaded(c, -0.25)) for c in colors]
         later = [f"at {t:.3g} s" for t in times[1:].tolist()]
-        names += [f"moving, at {times[0]:.3g} s", *later] if later else ["moving"]
+        names = [f"moving, at {times[0]:.3g} s", *later] if later else ["moving"]
+        entries += [
+            (Patch(facecolor=(*color, THERE_ALPHA), edgecolor=shaded(color, -0.25)), name)
+            for color, name in zip(moment_colors(len(times)), names, strict=True)
+        ]
     if any(one.present_s is not None for one in moving):
-        handles.append(
-            Patch(facecolor=(*MOVING, GONE_ALPHA), edgecolor=(*MOVING, 0.6), linestyle="dashed")
-        )
-        names.append("not there at that time")
-    return handles, names
+        faint = (*MOVING, GONE_ALPHA)
+        gone = Patch(facecolor=faint, edgecolor=(*MOVING, 0.6), linestyle="dashed")
+        entries.append((gone, "not there at that time"))
+    return entries
 
 
 def _solid(paths: Sequence[Path]) -> PathCollection:

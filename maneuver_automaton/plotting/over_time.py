@@ -22,6 +22,7 @@ from maneuver_automaton.plotting.distances import distance_times, nearest_others
 from maneuver_automaton.plotting.paths import JUMP
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
+    Entries,
     control_labels,
     dashed_handle,
     line_handle,
@@ -44,7 +45,6 @@ MOST_ROWS = 13  # that have a number each
 ROW, LEAST_ROWS, MOST_ROWS_HIGH = 0.17, 0.6, 2.4  # heights of bars, compared with other panels
 SHORTEST_S = 1e-6  # what a clock may have missed, for the logarithm
 OWN_PANEL = ("value", "spent", "lower bound", "solve time")  # labels of curves
-Entries = list[tuple[Artist, str]]
 
 
 class Panel(NamedTuple):
@@ -52,7 +52,7 @@ class Panel(NamedTuple):
 
     draw: Callable[[Axes], object]
     height: float = 1.0
-    entries: Sequence[tuple[Artist, str]] = ()
+    entries: Entries = ()
 
 
 def panels_of(cast: Cast) -> list[Panel]:
@@ -147,7 +147,7 @@ def _labels(one: Actor) -> tuple[list[str], list[str]]:
 
 def _values(cast: Cast) -> Panel:
     """What is left to pay, one vehicle's upon another's, what was spent, and the sum of both."""
-    entries: Entries = [
+    entries: list[tuple[Artist, str]] = [
         (Patch(facecolor=shaded(GREY, LEFT_TO_PAY)), "left to pay (value)"),
         (line_handle(GREY, width=1.6), "spent"),
         (dashed_handle(INK, (0, (4, 2)), width=1.0), "sum"),
@@ -214,7 +214,7 @@ def _draw_solve_times(ax: Axes, cast: Cast, curve: Curve) -> None:
 
 def _bars(cast: Cast) -> Panel:
     """A bar for each vehicle from when it may leave until it arrives; rests are light."""
-    entries: Entries = []
+    entries: list[tuple[Artist, str]] = []
     if any(rests for one in cast.actors for *_, rests in one.spans):
         entries.append((Patch(facecolor=shaded(GREY, RESTS - 0.1)), "rests (light)"))
     kinds = {event.kind for event in cast.recording.events}
@@ -292,7 +292,7 @@ def _name_rows(ax: Axes, cast: Cast) -> None:
 def _distances(cast: Cast) -> Panel:
     """The least distance of any two bodies, measured by shapely every 0.05 s, and the margin."""
     margin = cast.recording.world.margin
-    entries: Entries = [
+    entries: list[tuple[Artist, str]] = [
         (line_handle(INK, width=1.3), "nearest two bodies"),
         (line_handle(MARGIN, width=1.0), f"margin, {margin:g} m"),
     ]

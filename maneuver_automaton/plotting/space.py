@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
@@ -25,8 +24,8 @@ from maneuver_automaton.plotting.ends import WAY
 from maneuver_automaton.plotting.limits import shape_path
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import space_page
-from maneuver_automaton.plotting.paths import trim_handles
-from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, line_handle, tidy
+from maneuver_automaton.plotting.paths import trim_entries
+from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, Entries, line_handle, tidy
 from maneuver_automaton.recording import recording_of
 
 ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
@@ -250,22 +249,18 @@ def _standing(cast: Cast) -> list[Obstacle]:
     return [one for one in cast.scene.obstacles if isinstance(one, Obstacle)]
 
 
-def _entries(cast: Cast) -> tuple[list[Artist], list[str]]:
-    handles: list[Artist]
-    if cast.is_alone:
-        handles, names = trim_handles(cast.actors[0].track, cast.colors)  # type: ignore[assignment]
-    else:
-        named = [] if cast.is_many else cast.actors
-        handles, names = [line_handle(one.color) for one in named], [one.name for one in named]
-    for color, marker in ((START, "o"), (GOAL, "*")):
-        handle = line_handle(color if cast.is_alone else INK, marker=marker)
-        handle.set_markerfacecolor(color if cast.is_alone else INK)
-        handles.append(handle)
+def _entries(cast: Cast) -> Entries:
+    alone = cast.is_alone
+    named = [] if cast.is_many or alone else cast.actors
+    entries = [*trim_entries(cast.actors[0].track, cast.colors)] if alone else []
+    entries += [(line_handle(one.color), one.name) for one in named]
+    for color, marker, name in ((START, "o", "start"), (GOAL, "*", "goal")):
+        handle = line_handle(color if alone else INK, marker=marker)
+        handle.set_markerfacecolor(color if alone else INK)
+        entries.append((handle, name))
     if any(one.mover.via for one in cast.actors):
-        handles.append(line_handle(WAY, marker="s"))
-        names = [*names, "start", "goal", "on the way"]
-        return handles, names
-    return handles, [*names, "start", "goal"]
+        entries.append((line_handle(WAY, marker="s"), "on the way"))
+    return entries
 
 
 def _box(cast: Cast) -> tuple[Array, Array]:

@@ -191,9 +191,7 @@ def goal_entries(goals: Sequence[Goal], local: Local, reached: int | None) -> li
 def body_entries(bodies: Mapping[str, Sequence[Shape]]) -> list[Any]:
     """Outlines of the body, in frame 0, and of what it carries, in frames from 1 on."""
     outlines = [
-        (k, ring)
-        for k, shapes in enumerate(bodies.values())
-        for ring in footprint_polygons(shapes)
+        (k, ring) for k, shapes in enumerate(bodies.values()) for ring in footprint_polygons(shapes)
     ]
     return [
         {
