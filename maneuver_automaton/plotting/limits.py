@@ -167,7 +167,7 @@ def shape_path(shape: Shape) -> Path:
 def region_path(polygons: Sequence[Any]) -> Path:
     """The path around valid shapely polygons: outer rings to the left, holes to the right."""
     rings = [
-        _turning(ring, left=k == 0)
+        turning(ring, left=k == 0)
         for polygon in polygons
         for k, ring in enumerate(rings_of(polygon))
     ]
@@ -193,7 +193,7 @@ def moved_path(path: Path, pose: Array) -> Path:
     return Path(SE2(pose).act(np.asarray(path.vertices)), path.codes)
 
 
-def _turning(ring: Array, *, left: bool) -> Array:
+def turning(ring: Array, *, left: bool) -> Array:
     """The ring (n, 2) in the direction asked for."""
     to = ring - ring[0]
     after = np.roll(to, -1, axis=0)

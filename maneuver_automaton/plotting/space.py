@@ -21,7 +21,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.ends import WAY
-from maneuver_automaton.plotting.limits import shape_path
+from maneuver_automaton.plotting.limits import shape_path, turning
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import space_page
 from maneuver_automaton.plotting.paths import trim_entries
@@ -236,9 +236,7 @@ def _ring(obstacle: Obstacle) -> Array:
     ring = np.asarray(shape_path(obstacle.shape).to_polygons()[0])[:-1]
     if obstacle.motion is not None:
         ring = np.asarray(SE2(obstacle.motion.pose[0]).act(ring))
-    after = np.roll(ring, -1, axis=0)
-    area = float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum())
-    return ring if area > 0.0 else ring[::-1]
+    return turning(ring, left=True)
 
 
 def _height(obstacle: Any) -> tuple[float, float] | None:

@@ -23,7 +23,7 @@ from maneuver_automaton.plotting.controls import step_curves
 from maneuver_automaton.plotting.distances import thinned
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.limits import bound_lines, map_paths
-from maneuver_automaton.plotting.style import control_labels
+from maneuver_automaton.plotting.over_time import labels_of
 from maneuver_automaton.plotting.track import Track, TrackPiece
 from maneuver_automaton.problem import Bounds, Goal
 from maneuver_automaton.recording import Mover
@@ -91,19 +91,14 @@ def curve_entries(track: Track, mover: Mover) -> list[dict[str, Any]]:
     """Reduced state and controls of a `track` over time, each with its label."""
     if not track.pieces:
         return []
-    states, controls = track.pieces[0].state.shape[1], track.pieces[0].control.shape[1]
-    model = mover.model
-    known = mover.names if model is None else (model.reduced_names, model.control_names)
-    labels = []
-    for names, count, what in zip(known, (states, controls), ("state", "control"), strict=True):
-        counted = [f"{what} {k + 1}" for k in range(count)]
-        labels += control_labels(names) if len(names) == count else counted
+    states, controls = labels_of(mover, track.pieces[0])
     curves = [
         np.concatenate([np.stack([one.time, one.state[:, k]], axis=-1) for one in track.pieces])
-        for k in range(states)
+        for k in range(len(states))
     ]
-    curves += [np.concatenate(step_curves(track, k)) for k in range(controls)]
-    return [{"label": label, **_curve(curve)} for label, curve in zip(labels, curves, strict=True)]
+    curves += [np.concatenate(step_curves(track, k)) for k in range(len(controls))]
+    rows = zip([*states, *controls], curves, strict=True)
+    return [{"label": label, **_curve(curve)} for label, curve in rows]
 
 
 def part_entries(track: Track, model: Model, names: Sequence[str]) -> list[dict[str, Any]]:
