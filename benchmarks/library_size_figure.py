@@ -113,7 +113,7 @@ def draw_library_sizes(cost_axes: Axes, time_axes: Axes, sizes: LibrarySizes) ->
         _number_trims(ax, sizes.trims)
     _number_costs(cost_axes, sizes.costs)
     _whole_decades(time_axes, np.concatenate([sizes.medians_s, sizes.slowest_s]))
-    outer_legend(time_axes, [slowest, medians], ["99th percentile", "median"], above=True)
+    outer_legend(time_axes, [(slowest, "99th percentile"), (medians, "median")], above=True)
     return LibrarySizeArtists(costs=costs, medians=medians, slowest=slowest)
 
 

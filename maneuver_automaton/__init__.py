@@ -13,7 +13,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from maneuver_automaton import _display
-from maneuver_automaton._lazy import lazily
+from maneuver_automaton._lazy import homes, lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton import plotting as plotting
@@ -114,102 +114,42 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_HOMES = {
-    "ArticulatedVehicle": "models",
-    "Automaton": "automaton",
-    "Bounds": "problem",
-    "Box": "collision",
-    "Car": "models",
-    "CarWithTrailer": "models",
-    "Clearance": "places",
-    "Cost": "costs",
-    "DaskWorkers": "fleet",
-    "DesignedLibrary": "design",
-    "Disc": "collision",
-    "DispersedLibrary": "design",
-    "Disturbance": "receding_horizon",
-    "FieldProblem": "field",
-    "FieldResult": "field",
-    "FleetHorizon": "fleet",
-    "FleetLog": "fleet",
-    "FleetProblem": "fleet",
-    "FleetResult": "fleet",
-    "FleetScenario": "scenario",
-    "FourWheelSteeringCar": "models",
-    "Goal": "problem",
-    "Ground": "places",
-    "Helicopter": "models",
-    "Horizon": "problem",
-    "Hovercraft": "models",
-    "LowerBound": "planning",
-    "Maneuver": "primitives",
-    "Motion": "collision",
-    "Obstacle": "collision",
-    "OccupancyMap": "collision",
-    "Omnidirectional": "models",
-    "PlaceCost": "places",
-    "Plan": "automaton",
-    "Planner": "planning",
-    "PlanResult": "planning",
-    "PlanStatus": "planning",
-    "Polygon": "collision",
-    "Problem": "problem",
-    "RearSteeredCar": "models",
-    "RecedingHorizon": "receding_horizon",
-    "RoadScenario": "scenario",
-    "RoadScene": "roads",
-    "RoadVehicle": "roads",
-    "SE2": "groups",
-    "SE2xR": "groups",
-    "Scenario": "scenario",
-    "SearchSettings": "problem",
-    "SecondOrderCar": "models",
-    "SecondOrderUnicycle": "models",
-    "SingleTrack": "models",
-    "TractorWithTrailers": "models",
-    "Trajectory": "primitives",
-    "Trim": "primitives",
-    "Unicycle": "models",
-    "UserModel": "models",
-    "Verdict": "planning.verdict",
-    "Via": "problem",
-    "Zone": "collision",
-    "build_library": "automaton.building",
-    "cover": "field",
-    "design_library": "design",
-    "disperse_library": "design",
-    "drive_road": "roads",
-    "drive_roads": "roads",
-    "load_library": "automaton.library",
-    "load_map": "formats.registry",
-    "load_plan": "formats.plan_json",
-    "load_plans": "formats.plan_json",
-    "load_scenario": "scenario",
-    "load_stock_library": "automaton.library",
-    "lower_bound": "planning.lower_bound",
-    "plan": "planning",
-    "plan_road": "roads",
-    "plan_roads": "roads",
-    "plan_fleet": "fleet",
-    "plan_many": "planning",
-    "plans": "planning",
-    "ros_messages": "exports",
-    "save_commonroad_solution": "exports",
-    "save_csv": "exports",
-    "save_fleet": "formats.fleet_json",
-    "save_geojson": "exports",
-    "save_library": "automaton.library",
-    "save_plan": "formats.plan_json",
-    "save_rerun": "exports",
-    "save_ros2_bag": "exports",
-    "simulate": "receding_horizon",
-    "simulate_fleet": "fleet",
-    "translations": "groups",
-    "trims_of": "primitives",
-    "verify": "planning.verdict",
-    "verify_driven": "fleet",
-    "verify_fleet": "fleet",
-}
+_HOMES = homes(
+    {
+        "automaton": "Automaton Plan",
+        "automaton.building": "build_library",
+        "automaton.library": "load_library load_stock_library save_library",
+        "collision": "Box Disc Motion Obstacle OccupancyMap Polygon Zone",
+        "costs": "Cost",
+        "design": "DesignedLibrary DispersedLibrary design_library disperse_library",
+        "exports": (
+            "ros_messages save_commonroad_solution save_csv save_geojson save_rerun save_ros2_bag"
+        ),
+        "field": "FieldProblem FieldResult cover",
+        "fleet": (
+            "DaskWorkers FleetHorizon FleetLog FleetProblem FleetResult plan_fleet simulate_fleet "
+            "verify_driven verify_fleet"
+        ),
+        "formats.fleet_json": "save_fleet",
+        "formats.plan_json": "load_plan load_plans save_plan",
+        "formats.registry": "load_map",
+        "groups": "SE2 SE2xR translations",
+        "models": (
+            "ArticulatedVehicle Car CarWithTrailer FourWheelSteeringCar Helicopter Hovercraft "
+            "Omnidirectional RearSteeredCar SecondOrderCar SecondOrderUnicycle SingleTrack "
+            "TractorWithTrailers Unicycle UserModel"
+        ),
+        "places": "Clearance Ground PlaceCost",
+        "planning": "LowerBound Planner PlanResult PlanStatus plan plan_many plans",
+        "planning.lower_bound": "lower_bound",
+        "planning.verdict": "Verdict verify",
+        "primitives": "Maneuver Trajectory Trim trims_of",
+        "problem": "Bounds Goal Horizon Problem SearchSettings Via",
+        "receding_horizon": "Disturbance RecedingHorizon simulate",
+        "roads": "RoadScene RoadVehicle drive_road drive_roads plan_road plan_roads",
+        "scenario": "FleetScenario RoadScenario Scenario load_scenario",
+    }
+)
 
 __all__ = [*_HOMES, "plotting"]
 

@@ -77,11 +77,6 @@ def plain_numbers(instance: Any) -> None:
     Kernels are compiled for float64 and int64: for any other type, be it float32 or an integer
     where a float is stated, they would be compiled anew, and round otherwise. Fields that state
     arrays are for `freeze`.
-
-    Raises
-    ------
-    ValueError
-        If a field holds anything else.
     """
     for name, (convert, need) in _numbers_of(instance.__class__):
         value = getattr(instance, name)
@@ -120,13 +115,7 @@ def _floats(values: Any) -> tuple[float, ...]:
 
 
 def as_number(name: str, value: Any) -> float:
-    """A number that is handed in, as Python's own, whatever type it is written in.
-
-    Raises
-    ------
-    ValueError
-        If it is none: the `name` says which.
-    """
+    """A number that is handed in, as Python's own, whatever type it is written in."""
     try:
         return _float(value)
     except (TypeError, ValueError, OverflowError) as error:
@@ -150,13 +139,7 @@ NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
 
 
 def wrapped(angle: ArrayLike) -> Array:
-    """Angles [rad] modulo a full turn, in [-pi, pi].
-
-    Examples
-    --------
-    >>> float(wrapped(2 * np.pi + 0.25))
-    0.25
-    """
+    """Angles [rad] modulo a full turn, in [-pi, pi]."""
     return np.asarray(np.remainder(np.asarray(angle) + np.pi, 2 * np.pi) - np.pi, dtype=np.float64)
 
 

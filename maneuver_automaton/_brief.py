@@ -18,20 +18,7 @@ DEEPEST = 2  # dataclasses within dataclasses
 
 
 def brief(self: Any) -> str:
-    """Text of a dataclass for `__repr__`: at most ten lines; fields at their defaults left out.
-
-    Examples
-    --------
-    >>> @dataclasses.dataclass
-    ... class Grid:
-    ...     cells: np.ndarray
-    ...     name: str = ""
-    ...     __repr__ = brief
-    >>> Grid(np.zeros((300, 200)), name="hall")
-    Grid(cells=<(300, 200) array>, name='hall')
-    >>> Grid(np.zeros(2))
-    Grid(cells=[0.0, 0.0])
-    """
+    """Text of a dataclass for `__repr__`: at most ten lines; fields at their defaults left out."""
     lines = textwrap.wrap(
         _fields(self, 0),
         WIDTH,
@@ -69,7 +56,10 @@ def _shown(value: Any, depth: int) -> str:
     if isinstance(value, enum.Enum):
         return f"{type(value).__name__}.{value.name}"
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return _nested(value, depth)
+        named = any(one.name == "name" for one in dataclasses.fields(value))
+        if named and (name := getattr(value, "name", "")):
+            return f"<{type(value).__name__} {name!r}>"
+        return _fields(value, depth) if depth < DEEPEST else f"<{type(value).__name__}>"
     if isinstance(value, Mapping):
         pairs = [f"{k!r}: {_shown(one, depth)}" for k, one in list(value.items())[:MOST_ITEMS]]
         return f"{{{_joined(pairs, len(value))}}}"
@@ -83,13 +73,6 @@ def _shown(value: Any, depth: int) -> str:
         return f"{text[: MOST_CHARACTERS - 4]}...{text[-1]}"
     short = len(text) <= MOST_CHARACTERS and "\n" not in text
     return text if short else f"<{type(value).__name__}>"
-
-
-def _nested(value: Any, depth: int) -> str:
-    named = any(one.name == "name" for one in dataclasses.fields(value))
-    if named and (name := getattr(value, "name", "")):
-        return f"<{type(value).__name__} {name!r}>"
-    return _fields(value, depth) if depth < DEEPEST else f"<{type(value).__name__}>"
 
 
 def _joined(items: list[str], n: int) -> str:

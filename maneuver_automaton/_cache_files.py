@@ -29,13 +29,6 @@ def read_checked(path: Path, *, trusted: bool = False) -> bytes | None:
     """The content of a file of `write_checked`; None if there is none.
 
     `trusted` is for content that is code: the file must be the user's or the installer's.
-
-    Raises
-    ------
-    ValueError
-        If the content is not what was written, or not to be trusted.
-    OSError
-        If the file cannot be read.
     """
     try:
         with path.open("rb") as stream:
@@ -50,13 +43,7 @@ def read_checked(path: Path, *, trusted: bool = False) -> bytes | None:
 
 
 def write_checked(path: Path, content: bytes) -> None:
-    """Write `content` behind its checksum, in one step; nobody but the owner may write the file.
-
-    Raises
-    ------
-    OSError
-        If it cannot be written; nothing is left then.
-    """
+    """Write `content` behind its checksum, in one step; nobody but the owner may write the file."""
     beside = path.with_name(f".part-{uuid.uuid4().hex}")
     handle = os.open(
         beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o644

@@ -16,13 +16,7 @@ OLD = 3600.0  # [s] since a part was written: whoever wrote it was killed
 
 
 def open_input(path: Path) -> BinaryIO:
-    """Open a file to read it; a pipe or a device, which may never end, is none.
-
-    Raises
-    ------
-    OSError
-        If it is none, or cannot be opened.
-    """
+    """Open a file to read it; a pipe or a device, which may never end, is none."""
     mode = path.stat().st_mode
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise OSError(errno.EINVAL, "it is a pipe or a device, need a file", str(path))
@@ -33,11 +27,6 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
     """Replace the file `path` by `content` in one step; missing folders are made.
 
     A reader sees the old file or the new one, never a part; on failure the old one stays.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be made or written.
     """
     target = path.resolve()  # a link keeps pointing where it points
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -53,11 +53,6 @@ def patient(tell: Callable[[], None] | None = None) -> Iterator[None]:
     """A block that asks `stopped`, or a time limit, often: the first signal does not break it off.
 
     That signal calls `tell`, for those that work for this process.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        If a signal came before any such block, comes again, or while a kernel is compiled.
     """
     if stopped() and not _STATE.patient:
         raise KeyboardInterrupt

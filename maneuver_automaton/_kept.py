@@ -70,17 +70,6 @@ def kept_by_first(
     """Call a function once for the same arguments; its first argument keeps the results.
 
     The arguments after it are values, and can be hashed.
-
-    Examples
-    --------
-    >>> class Library:
-    ...     trims = (3.0, 4.0)
-    >>> @kept_by_first
-    ... def rates(library: Library, price: float) -> list[float]:
-    ...     return [price * trim for trim in library.trims]
-    >>> one, other = Library(), Library()
-    >>> rates(one, 2.0) is rates(one, 2.0), rates(one, 2.0) is rates(other, 2.0)
-    (True, False)
     """
 
     @functools.wraps(make)
@@ -123,15 +112,6 @@ class Prepared:
         The system hands out fresh memory page by page, which for the arrays of a first plan takes
         longer than a millisecond. The memory is free again once the array and all views of it are
         gone. A number of its `kind` has 64 bits.
-
-        Examples
-        --------
-        >>> prepared = Prepared()
-        >>> one = prepared.room(1000, np.float64)
-        >>> where = one.ctypes.data
-        >>> del one
-        >>> prepared.room(500, np.int64).ctypes.data == where
-        True
         """
         try:
             block = self._blocks.pop()

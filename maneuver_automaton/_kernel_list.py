@@ -120,13 +120,7 @@ def _lines(signatures: list[list[Stated]]) -> str:
 
 
 def stated(kind: Any) -> Stated:
-    """A type of numba, as the list has it.
-
-    Raises
-    ------
-    ValueError
-        If the list has no word for it.
-    """
+    """A type of numba, as the list has it."""
     from numba import types
     from numba.core.types.containers import BaseNamedTuple, BaseTuple
     from numba.core.types.scalars import BooleanLiteral

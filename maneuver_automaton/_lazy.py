@@ -8,6 +8,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 
+def homes(names: Mapping[str, str]) -> dict[str, str]:
+    """The module of each name, from the names of each module, parted by spaces."""
+    return {name: module for module, many in names.items() for name in many.split()}
+
+
 def lazily(
     package: str, homes: Mapping[str, str]
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:

@@ -33,36 +33,7 @@ def in_parallel(
     order: Literal["as given", "as done"] = "as given",
     ends_early: bool = False,
 ) -> Iterator[Result]:
-    """Results of all pieces, one by one as they come.
-
-    Parameters
-    ----------
-    function : callable
-        What to do with a piece.
-    pieces : sequence
-        The work.
-    jobs : int
-        Processes at a time; 1 means none beside this one.
-    scheduler : str, optional
-        Address of a Dask scheduler ("tcp://host:8786"), or "local" for a cluster on this machine:
-        the same work is sent there. Needs the package ``distributed``.
-    order : str
-        Results in the order of the pieces, or as they are done.
-    ends_early : bool
-        `function` asks `stopped`, here and in other processes: after a signal it comes to an end
-        by itself, and all results are waited for.
-
-    Raises
-    ------
-    ValueError
-        If `jobs` is no positive number, Dask is asked for and not installed, or nothing answers
-        at its address.
-
-    Examples
-    --------
-    >>> list(in_parallel(abs, [-1, 2]))
-    [1, 2]
-    """
+    """Results of all pieces, one by one as they come."""
     if jobs < 1:
         raise ValueError(f"jobs must be at least 1, got {jobs}")
     if scheduler is None:
@@ -127,13 +98,7 @@ def _tell_children() -> None:
 
 
 def check_scheduler(scheduler: str) -> None:
-    """Say at once that Dask is not installed, or that nothing answers at an address.
-
-    Raises
-    ------
-    ValueError
-        If so.
-    """
+    """Say at once that Dask is not installed, or that nothing answers at an address."""
     if importlib.util.find_spec("distributed") is None:
         raise ValueError(
             f"scheduler: got {scheduler!r}, but Dask is not installed; need "
@@ -175,11 +140,6 @@ def gathered(*, jobs: int = 1, scheduler: str | None = None) -> Iterator[Gathere
 
     The block is handed a function of a function and its pieces, which returns all results in
     the order of the pieces. After a signal, functions are to come to an end by themselves.
-
-    Raises
-    ------
-    ValueError
-        As `in_parallel`.
 
     Examples
     --------

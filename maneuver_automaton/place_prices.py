@@ -64,11 +64,6 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
     something else are halved again, until what they differ by in all is small enough. Where a rate
     jumps, at the border of an area, that finds the border.
 
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course, or a rate is negative or not finite.
-
     Examples
     --------
     >>> from maneuver_automaton import Box, Ground, Unicycle
@@ -111,16 +106,6 @@ class TimedPrices:
     Gauss's rule with as many points as suit the times it begins with, so that the price changes
     smoothly with them. A trim that lasts longer moves all that follows about where it ends; so the
     gradients of rates add up, backwards over the word, to the derivatives of the price.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Ground, Unicycle
-    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
-    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[1.0])
-    >>> slope = Ground.of_raster([[0.0, 8.0]], resolution=8.0, origin=[-4.0, -4.0, 0.0])
-    >>> price, by_time = TimedPrices((slope,), plan, Unicycle()).at(np.array([3.0]))
-    >>> round(price, 6), by_time.round(6).tolist()
-    (4.5, [3.0])
     """
 
     def __init__(self, costs: Sequence[PlaceCost], plan: Plan, model: Model) -> None:

@@ -523,11 +523,6 @@ class _Moved:
 def check_place_costs(value: Any) -> tuple[PlaceCost, ...]:
     """Costs of places from one or several.
 
-    Raises
-    ------
-    ValueError
-        If one has no rates, or says not of what.
-
     Examples
     --------
     >>> len(check_place_costs(Clearance(1.0, 0.5)))

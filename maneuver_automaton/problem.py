@@ -806,11 +806,6 @@ def settled_state(
 ) -> tuple[Array | None, str | None]:
     """A reduced state at an end, or else the name of the trim that has it, rather one at rest.
 
-    Raises
-    ------
-    ValueError
-        If a `trim` is named too, or the state is none of the vehicle.
-
     Examples
     --------
     >>> from maneuver_automaton import load_stock_library
@@ -835,13 +830,7 @@ def settled_state(
 
 
 def apart(one: Array, other: Array) -> tuple[float, float]:
-    """How far two poses (dof,) are from each other: distance [m], and turn [rad] up to pi.
-
-    Examples
-    --------
-    >>> apart(np.zeros(3), np.array([3.0, 4.0, 2 * np.pi]))
-    (5.0, 0.0)
-    """
+    """How far two poses (dof,) are from each other: distance [m], and turn [rad] up to pi."""
     places = slice(2) if one.size == 3 else [0, 1, *range(3, one.size)]
     way = other[places] - one[places]
     return math.sqrt(way.dot(way)), abs(math.remainder(float(other[2] - one[2]), 2.0 * math.pi))

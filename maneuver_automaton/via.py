@@ -216,29 +216,7 @@ def passages(
     *,
     in_order: bool,
 ) -> list[float | None]:
-    """When [s] each pose on the way is passed, as early as can be; None: it is missed.
-
-    Parameters
-    ----------
-    vias : sequence of Via
-    times : (n,) array
-        [s] between which the motion goes on smoothly, in small steps.
-    pose_at : callable
-        Poses (n, dof) at times (n,).
-    rests : callable
-        Whether the vehicle is at rest at a time, or may be.
-    in_order : bool
-        Whether they are to be passed one after the other.
-
-    Examples
-    --------
-    >>> along = lambda times: np.column_stack([times, 0 * times, 0 * times])
-    >>> ways = [Via([2, 0, 0]), Via(gate=[[0.5, -1], [0.5, 1]])]
-    >>> passages(ways, np.linspace(0, 3, 10), along, lambda time: False, in_order=False)
-    [2.0, 0.5]
-    >>> passages(ways, np.linspace(0, 3, 10), along, lambda time: False, in_order=True)
-    [2.0, None]
-    """
+    """When [s] each pose on the way is passed, as early as can be; None: it is missed."""
     found: list[float | None] = []
     earliest = -math.inf
     for via in vias:

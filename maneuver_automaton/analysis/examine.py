@@ -66,15 +66,7 @@ def unit_of(coordinate: str) -> str:
 
 
 def listed(motions: Sequence[str]) -> str:
-    """Motions in a row, with 'translation' for all planar ones together.
-
-    Examples
-    --------
-    >>> listed(["rotation", "translation in x", "translation in y"])
-    'rotation and translation'
-    >>> listed(["translation in y"])
-    'translation in y'
-    """
+    """Motions in a row, with 'translation' for all planar ones together."""
     planar = {"translation in x", "translation in y"}
     if planar <= set(motions):
         motions = [*(motion for motion in motions if motion not in planar), "translation"]
@@ -274,33 +266,17 @@ def examine(
     if not tolerance > 0.0:
         raise ValueError(f"tolerance: got {tolerance}, need a positive number")
     rng = np.random.default_rng(0) if rng is None else rng
+
+    def tried(axis: int) -> Worst:
+        by = region.element(rng, axis=axis)
+        state, control = draw(rng)
+        change, size = defect(by, state, control)
+        return Worst(change, tolerance * max(1.0, size), state, control, by)
+
     by_motion = {
-        motion_of(name): max(
-            (_try(defect, region, draw, rng, axis, tolerance) for _ in range(samples)),
-            key=lambda worst: worst.excess,
-        )
+        motion_of(name): max((tried(axis) for _ in range(samples)), key=lambda worst: worst.excess)
         for axis, name in enumerate(region.group.coordinates)
     }
-    return _report(question, by_motion, tolerance, samples)
-
-
-def _try(
-    defect: Defect,
-    region: Region,
-    draw: Draw,
-    rng: np.random.Generator,
-    axis: int,
-    tolerance: float,
-) -> Worst:
-    by = region.element(rng, axis=axis)
-    state, control = draw(rng)
-    change, size = defect(by, state, control)
-    return Worst(change, tolerance * max(1.0, size), state, control, by)
-
-
-def _report(
-    question: Question, by_motion: dict[str, Worst], tolerance: float, samples: int
-) -> SymmetryReport:
     ranked = sorted(by_motion, key=lambda motion: -by_motion[motion].excess)
     broken = tuple(motion for motion in ranked if by_motion[motion].excess > 1.0)
     intact = tuple(motion for motion in by_motion if motion not in broken)

@@ -22,26 +22,15 @@ NODES = 5  # of the Gauss-Legendre rule on a segment: exact for polynomials of d
 HEADINGS = np.pi / 2 * 2.0 ** (-0.5 * np.arange(11))  # [rad] tried for the first drive
 
 
-class PoseCost(Protocol):
+class _PoseCost(Protocol):
     """A stage cost of the pose seen from the goal plus one of the control."""
 
     @property
-    def pose_weights(self) -> Array:
-        """Weights (3,) of x, y and heading."""
-        ...
-
+    def pose_weights(self) -> Array: ...
     @property
-    def pose_orders(self) -> Array:
-        """Exponents (3,) of x, y and heading."""
-        ...
-
-    def pose_rates(self, poses: ArrayLike) -> Array:
-        """Cost per second (...,) of being at poses (..., 3)."""
-        ...
-
-    def control_rates(self, controls: ArrayLike) -> Array:
-        """Cost per second (...,) of controls (..., n_u)."""
-        ...
+    def pose_orders(self) -> Array: ...
+    def pose_rates(self, poses: ArrayLike) -> Array: ...
+    def control_rates(self, controls: ArrayLike) -> Array: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,7 +60,7 @@ class GrowthBound:
 
 
 def ring_poses(
-    cost: PoseCost, *, levels: ArrayLike, parts: int = 4, max_heading: float = np.pi
+    cost: _PoseCost, *, levels: ArrayLike, parts: int = 4, max_heading: float = np.pi
 ) -> Array:
     """Poses (n, 3) seen from the goal that cost `levels` per second, shared among x, y, heading.
 
@@ -81,8 +70,8 @@ def ring_poses(
 
     Parameters
     ----------
-    cost : PoseCost
-        The stage cost.
+    cost : MixedOrderCost, or alike
+        The stage cost, of the pose seen from the goal plus one of the control.
     levels : (k,) array_like
         Positive costs per second.
     parts : int
@@ -112,7 +101,7 @@ def ring_poses(
 
 
 def growth_bound(
-    automaton: Automaton, cost: PoseCost, *, poses: ArrayLike, times: ArrayLike
+    automaton: Automaton, cost: _PoseCost, *, poses: ArrayLike, times: ArrayLike
 ) -> GrowthBound:
     """B(t) from words turn, move, turn, move: the best of a family at each pose, the worst pose.
 
@@ -130,8 +119,8 @@ def growth_bound(
     ----------
     automaton : Automaton
         A library of the plane with rest, straights and spins of both signs.
-    cost : PoseCost
-        The stage cost.
+    cost : MixedOrderCost, or alike
+        The stage cost, of the pose seen from the goal plus one of the control.
     poses : (n, 3) array_like
         Poses seen from the goal at which the bound is taken [m, m, rad]; not the goal itself.
     times : (k,) array_like
@@ -210,7 +199,7 @@ class _Paces:
     rest_rate: float  # what resting costs per second
 
 
-def _paces(automaton: Automaton, cost: PoseCost) -> _Paces:
+def _paces(automaton: Automaton, cost: _PoseCost) -> _Paces:
     twists, controls = automaton.body_velocities, automaton.controls
     spins = _both_signs(twists, controls, axis=2)
     straights = _both_signs(twists, controls, axis=0)
@@ -245,7 +234,7 @@ def _both_signs(
     return [(size, (row[-size], row[size])) for size in sorted(row) if size > 0.0 and -size in row]
 
 
-def _values(pose: Array, paces: _Paces, cost: PoseCost, times: Array) -> Array:
+def _values(pose: Array, paces: _Paces, cost: _PoseCost, times: Array) -> Array:
     """Least cost (k,) of the family from a pose over each of the times."""
     segments = _segments(pose)
     least: Array = times * (cost.pose_rates(pose) + paces.rest_rate)
@@ -261,7 +250,7 @@ def _values(pose: Array, paces: _Paces, cost: PoseCost, times: Array) -> Array:
 
 
 def _word_costs(
-    segments: tuple[Array, Array, Array], pace: Array, control: Array, cost: PoseCost, times: Array
+    segments: tuple[Array, Array, Array], pace: Array, control: Array, cost: _PoseCost, times: Array
 ) -> Array:
     """Costs (k, f) of words with speeds (4,) over each of the times, without rest."""
     starts, directions, lengths = segments

@@ -52,15 +52,6 @@ class Reached:
     complete: bool  # whether the search ended before `most_nodes` were found
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Steps:
-    """What can be done in one class of trims."""
-
-    displacements: Array  # (k, 3)
-    costs: Array  # (k,)
-    targets: IntArray  # (k,) classes
-
-
 def reached(automaton: Automaton, *, start: str | None = None, settings: ReachSettings) -> Reached:
     """The poses that words from the origin reach, cheapest first; in the trim `start`, or at rest.
 
@@ -79,7 +70,8 @@ def reached(automaton: Automaton, *, start: str | None = None, settings: ReachSe
     """
     if automaton.model.group is not SE2:
         raise ValueError(f"reach: {automaton.model.name} is no vehicle in the plane")
-    first = _start_class(automaton, start)
+    index = automaton.rest if start is None else automaton.index_of(start)
+    first = int(automaton.trim_classes[index or 0])
     steps = _steps(automaton, settings)
     return _searched(first, steps, settings)
 
@@ -99,13 +91,8 @@ def path_length(maneuver: Maneuver) -> float:
     return float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
 
 
-def _start_class(automaton: Automaton, start: str | None) -> int:
-    index = automaton.rest if start is None else automaton.index_of(start)
-    return int(automaton.trim_classes[index or 0])
-
-
-def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Steps]:
-    """Maneuvers, and every trim for one edge, by class."""
+def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Nodes]:
+    """Maneuvers, and every trim for one edge, by class: where they lead, from 0."""
     rows: defaultdict[int, list[tuple[Array, float, int]]] = defaultdict(list)
     for trim, where in zip(automaton.trims, automaton.trim_classes.tolist(), strict=True):
         seconds = _edge_duration(trim, settings)
@@ -121,7 +108,9 @@ def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Steps]:
         cost = maneuver.duration if settings.measure == "time" else path_length(maneuver)
         if maneuver.displacement.any() or source != target:
             rows[source].append((maneuver.displacement, cost, target))
-    return {where: _table(entries) for where, entries in rows.items()}
+    return {
+        where: _Nodes(*map(np.array, zip(*entries, strict=True))) for where, entries in rows.items()
+    }
 
 
 def _edge_duration(trim: Trim, settings: ReachSettings) -> float | None:
@@ -132,15 +121,7 @@ def _edge_duration(trim: Trim, settings: ReachSettings) -> float | None:
     return min(settings.edge_cost / rate, trim.max_duration)
 
 
-def _table(entries: Sequence[tuple[Array, float, int]]) -> _Steps:
-    return _Steps(
-        displacements=np.array([entry[0] for entry in entries]),
-        costs=np.array([entry[1] for entry in entries]),
-        targets=np.array([entry[2] for entry in entries], dtype=np.int64),
-    )
-
-
-def _searched(first: int, steps: dict[int, _Steps], settings: ReachSettings) -> Reached:
+def _searched(first: int, steps: dict[int, _Nodes], settings: ReachSettings) -> Reached:
     least = min(
         (float(table.costs[table.costs > 0.0].min(initial=math.inf)) for table in steps.values()),
         default=math.inf,
@@ -213,15 +194,15 @@ def _unknown(nodes: _Nodes, known: dict[int, float], settings: ReachSettings) ->
     return nodes.chosen(fresh)
 
 
-def _followers(nodes: _Nodes, steps: dict[int, _Steps], settings: ReachSettings) -> list[_Nodes]:
+def _followers(nodes: _Nodes, steps: dict[int, _Nodes], settings: ReachSettings) -> list[_Nodes]:
     parts = []
     for where in np.unique(nodes.classes).tolist():
         table = steps.get(where)
         if table is None:
             continue
         here = nodes.chosen(nodes.classes == where)
-        poses = (SE2(here.poses[:, None]) @ SE2(table.displacements)).pose.reshape(-1, 3)
+        poses = (SE2(here.poses[:, None]) @ SE2(table.poses)).pose.reshape(-1, 3)
         costs = (here.costs[:, None] + table.costs).ravel()
-        targets = np.broadcast_to(table.targets, (here.costs.size, table.costs.size)).ravel()
+        targets = np.broadcast_to(table.classes, (here.costs.size, table.costs.size)).ravel()
         parts.append(_Nodes(poses, costs, targets).chosen(costs <= settings.most))
     return parts

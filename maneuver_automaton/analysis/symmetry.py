@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.analysis.examine import (
     NOWHERE,
+    Draw,
     Question,
     Region,
     SymmetryReport,
@@ -305,21 +306,14 @@ def check_boundary_condition(
     >>> check_boundary_condition(distance, region=region).holds
     True
     """
-
-    def defect(by: LieGroup, state: Array, control: Array) -> tuple[Array, float]:
-        here = values_of("r(x_0, x_T)", boundary_condition(state[0], state[1]))
-        first, last = moved_state(by, state)
-        change = values_of("r(x_0, x_T)", boundary_condition(first, last)) - here
-        return change, float(np.abs(here).max(initial=0.0))
-
-    return examine(
-        _cost_question("boundary condition"),
-        defect,
-        region=region,
+    return _check(
+        "boundary condition",
+        lambda ends, _: boundary_condition(*ends),
+        region,
+        rng,
+        samples,
+        tolerance,
         draw=lambda rng: (np.array([region.state(rng), region.state(rng)]), NOWHERE),
-        rng=rng,
-        samples=samples,
-        tolerance=tolerance,
     )
 
 
@@ -330,34 +324,34 @@ def _check(
     rng: np.random.Generator | None,
     samples: int,
     tolerance: float,
+    draw: Draw | None = None,
 ) -> SymmetryReport:
+    said = "r(x_0, x_T)" if draw else what
+
     def defect(by: LieGroup, state: Array, control: Array) -> tuple[Array, float]:
-        here = values_of(what, function(state, control))
-        change = values_of(what, function(moved_state(by, state), control)) - here
+        here = values_of(said, function(state, control))
+        change = values_of(said, function(moved_state(by, state), control)) - here
         return change, float(np.abs(here).max(initial=0.0))
 
-    return examine(
-        _cost_question(what),
-        defect,
-        region=region,
-        draw=lambda rng: (region.state(rng), region.control(rng)),
-        rng=rng,
-        samples=samples,
-        tolerance=tolerance,
-    )
-
-
-def _cost_question(what: str) -> Question:
     def cause(broken: tuple[str, ...], violated: tuple[int, ...]) -> str:
         place = any(motion.startswith(("translation", "climb")) for motion in broken)
         depends = "the place" if place else "a direction of the world"
         return f"it depends on {depends}: shift its references along with the problem"
 
-    return Question(
+    question = Question(
         what=what,
         names=lambda i: "value" if what == "stage cost" else f"{what} {i + 1}",
         units=lambda i: "",
         cause=cause,
+    )
+    return examine(
+        question,
+        defect,
+        region=region,
+        draw=draw or (lambda rng: (region.state(rng), region.control(rng))),
+        rng=rng,
+        samples=samples,
+        tolerance=tolerance,
     )
 
 

@@ -111,6 +111,9 @@ def turnpike(
     for coast in coasts:
         word = _trajectory_of(model, source, up, trim, down, coast=float(coast))
         optimum = _optimum(model, word, target, stage_cost, step=step, settings=settings)
+        # Time [s] for which a component of the reduced state is farther from the trim's.
+        off = np.abs(optimum.state[:, model.group.dof :] - trim.reduced_state).max(axis=1)
+        far = np.maximum(off[:-1], off[1:]) > distance
         cases.append(
             TurnpikeCase(
                 coast=float(coast),
@@ -118,7 +121,7 @@ def turnpike(
                 goal=word.pose[-1],
                 automaton_cost=ends + float(coast) * unit_cost,
                 optimum=optimum,
-                away=time_away(optimum, trim, dof=model.group.dof, distance=distance),
+                away=float(np.diff(optimum.time)[far].sum()),
             )
         )
     return Turnpike(
@@ -128,13 +131,6 @@ def turnpike(
         distance=distance,
         cases=tuple(cases),
     )
-
-
-def time_away(solution: OptimalControlSolution, trim: Trim, *, dof: int, distance: float) -> float:
-    """Time [s] for which a component of the reduced state is farther from the trim's."""
-    off = np.abs(solution.state[:, dof:] - trim.reduced_state).max(axis=1)
-    far = np.maximum(off[:-1], off[1:]) > distance
-    return float(np.diff(solution.time)[far].sum())
 
 
 def _trajectory_of(

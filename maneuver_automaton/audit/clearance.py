@@ -55,25 +55,7 @@ def least_clearance(
     enough: float = 0.0,
     ask: Callable[[], None] = lambda: None,
 ) -> Least:
-    """The least clearance of a body over stretches of time.
-
-    Parameters
-    ----------
-    body : AuditedBody
-    around : Surroundings
-    spans : Spans
-        In order of time.
-    enough : float
-        Clearance [m] that decides: the bound is made sharp enough to tell on which side it is.
-    ask : callable
-        Called before each part of the work; it may raise to give it up.
-
-    Returns
-    -------
-    Least
-        No instant has less than `distance`, which is at most 1 mm or 1 % below `measured`, unless
-        that takes more than `MOST` stretches at once.
-    """
+    """The least clearance of a body over stretches of time."""
     if not around.owners.size or not spans.element.size:
         return NEVER
     places, least = places_of(body, spans), NEVER

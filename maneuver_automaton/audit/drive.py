@@ -111,11 +111,6 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     below 1e-12, so the motion is as exact between the nodes as at them.
 
     Source: Hairer, Lubich, Wanner (2006), *Geometric Numerical Integration*, Sec. II.1.3.
-
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course.
     """
     stated = stated_by(plan)
     if not stated.lengths.size:
@@ -248,13 +243,7 @@ class Stated(NamedTuple):
 
 
 def stated_by(plan: Plan) -> Stated:
-    """The stretches of a plan: trims whole, maneuvers from sample to sample.
-
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course.
-    """
+    """The stretches of a plan: trims whole, maneuvers from sample to sample."""
     poses, lengths = plan.switching_poses, plan.primitive_durations
     rows: list[Stated] = []
     # Trims that follow each other are one run; every maneuver stands alone.

@@ -91,13 +91,7 @@ def frames_through(poses: Array, like: FrameMotion) -> FrameMotion:
 
 
 def placed(frames: Array, seen: Array) -> Array:
-    """Poses (..., dof) that are `seen` (..., 3 or more) from frames (..., dof), in the world.
-
-    Examples
-    --------
-    >>> placed(np.array([1.0, 2.0, np.pi / 2]), np.array([3.0, 0.0, 0.5])).round(3).tolist()
-    [1.0, 5.0, 2.071]
-    """
+    """Poses (..., dof) that are `seen` (..., 3 or more) from frames (..., dof), in the world."""
     cosine, sine = np.cos(frames[..., 2]), np.sin(frames[..., 2])
     x, y = seen[..., 0], seen[..., 1]
     planar = [cosine * x - sine * y, sine * x + cosine * y, seen[..., 2]]

@@ -61,14 +61,7 @@ class Outline(NamedTuple):
         return turns
 
     def holds(self, points: Points) -> Any:
-        """Whether points (m,) are in each solid (s, m): the rings run around them.
-
-        Examples
-        --------
-        >>> square = outline_of((Box([2.0, 2.0]), Disc(1.0, [5.0, 0.0])))
-        >>> square.holds(np.array([0.5 + 0.0j, 4.5 + 0.0j])).tolist()
-        [[True, False], [False, True]]
-        """
+        """Whether points (m,) are in each solid (s, m): the rings run around them."""
         if not self.radius.size:
             return np.zeros((0, points.size), dtype=np.bool_)
         return np.asarray(np.add.reduceat(self.turns_about(points), self.firsts, axis=0) != 0)
@@ -88,13 +81,7 @@ class BodyOutline:
 
 
 def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)) -> Outline:
-    """The outline of shapes counted from an origin [m]; of none a point.
-
-    Raises
-    ------
-    ValueError
-        If a polygon has no area.
-    """
+    """The outline of shapes counted from an origin [m]; of none a point."""
     if not shapes:
         point = np.zeros(1, dtype=np.complex128)
         return Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
@@ -274,13 +261,7 @@ LEAST = 1e-300  # a squared length that is none
 
 
 def points_of(places: Array) -> Points:
-    """Places (..., 2 or more) [m] as points (...,).
-
-    Examples
-    --------
-    >>> points_of(np.array([[1.0, 2.0], [0.0, -1.0]])).tolist()
-    [(1+2j), -1j]
-    """
+    """Places (..., 2 or more) [m] as points (...,)."""
     points = np.empty(places.shape[:-1], dtype=np.complex128)
     points.real, points.imag = places[..., 0], places[..., 1]
     return points
@@ -301,13 +282,7 @@ def directions(angles: Array) -> Points:
 
 
 def squared(vectors: Points) -> Array:
-    """Squared lengths of vectors.
-
-    Examples
-    --------
-    >>> squared(np.array([3.0 + 4.0j])).tolist()
-    [25.0]
-    """
+    """Squared lengths of vectors."""
     return np.asarray((vectors * vectors.conj()).real)
 
 

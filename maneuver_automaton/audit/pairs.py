@@ -168,7 +168,10 @@ class StillEdges:
     def near(cls, body: AuditedBody, around: Surroundings, places: SpanPlaces) -> StillEdges:
         """Those of some surroundings."""
         pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
-        boxes, own = _Boxes.around(places.corners), _Boxes.around(_from_begins(places))
+        boxes, own = (
+            _Boxes.around(places.corners),
+            _Boxes.around(np.asarray((places.corners - places.place[0]) * places.turn[0].conj())),
+        )
         return cls(body, around, places, pad, boxes, own)
 
     def within(self, distance: float) -> EdgePairs:
@@ -238,11 +241,6 @@ class _Boxes(NamedTuple):
     def grown(self, by: Array) -> _Boxes:
         """The boxes, larger by a length (s, 1) [m] on every side."""
         return _Boxes(self.low - by, self.high + by)
-
-
-def _from_begins(places: SpanPlaces) -> Points:
-    """Corners (2, n, s) of a body over stretches, seen from its frame as they begin."""
-    return np.asarray((places.corners - places.place[0]) * places.turn[0].conj())
 
 
 def _meets(

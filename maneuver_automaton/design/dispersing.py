@@ -85,7 +85,12 @@ def disperse_library(
         raise ValueError(f"disperse: metres_per_radian must be positive, got {metres_per_radian}")
     sources, targets = _classes(library)
     apart = _distances(library, sources, metres_per_radian)
-    first = _connecting(library, sources, targets)
+    # The maneuvers of the quickest ways from rest to all trims, and of those back.
+    root = int(library.trim_classes[library.rest or 0])
+    durations = np.array([maneuver.duration for maneuver in library.maneuvers])
+    there = _quickest_ways(root, sources, targets, durations)
+    back = _quickest_ways(root, targets, sources, durations)
+    first = np.union1d(there, back)
     if most < max(len(first), 1):
         raise ValueError(
             f"disperse: {most} maneuvers cannot lead from rest to every trim and back, need at "
@@ -129,15 +134,6 @@ def _distances(library: Automaton, sources: IntArray, metres_per_radian: float |
     turn = wrapped(moved[:, None, HEADING] - moved[None, :, HEADING])
     squares = ((rows[:, None] - rows[None]) ** 2).sum(axis=2) + (length * turn) ** 2
     return np.where(sources[:, None] == sources[None], np.sqrt(squares), np.inf)
-
-
-def _connecting(library: Automaton, sources: IntArray, targets: IntArray) -> IntArray:
-    """The maneuvers of the quickest ways from rest to all trims, and of those back."""
-    root = int(library.trim_classes[library.rest or 0])
-    durations = np.array([maneuver.duration for maneuver in library.maneuvers])
-    there = _quickest_ways(root, sources, targets, durations)
-    back = _quickest_ways(root, targets, sources, durations)
-    return np.union1d(there, back)
 
 
 def _quickest_ways(root: int, sources: IntArray, targets: IntArray, durations: Array) -> IntArray:

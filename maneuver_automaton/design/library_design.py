@@ -336,12 +336,6 @@ def design_of_file(
 
     Values of `within`, `most`, `max_trims` and `radius_m` in `instead` hold instead of those
     stated.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read or used: one line with file, line, field, the value met, and
-        what would be right.
     """
     return design_of_text(read_text(Path(path)), name=str(path), instead=instead)
 

@@ -106,7 +106,10 @@ def proven_factor(
         if looked + HALVES * len(corners) > most_boxes:  # what is open counts as it was bounded
             proven = max(proven, float(ratios.max(initial=1.0)))
             break
-        corners, size = _halved(corners, size, reach)
+        # The eight halves of every box.
+        half = 0.5 * size
+        steps = np.array(list(product((0.0, 1.0), repeat=3))) * half
+        corners, size = _inside((corners[:, None] + steps).reshape(-1, 3), reach), half
     return WordsProof(
         max_trims=max_trims,
         turning_radius=turning_radius,
@@ -192,13 +195,6 @@ def _first_boxes(reach: float) -> tuple[Array, Array]:
     places = (range(across), range(across), range(around))
     corners = np.array(list(product(*places))) * size - np.array([0.0, 0.0, math.pi])
     return _inside(corners, reach), size
-
-
-def _halved(corners: Array, size: Array, reach: float) -> tuple[Array, Array]:
-    """The eight halves of every box."""
-    half = 0.5 * size
-    steps = np.array(list(product((0.0, 1.0), repeat=3))) * half
-    return _inside((corners[:, None] + steps).reshape(-1, 3), reach), half
 
 
 def _inside(corners: Array, reach: float) -> Array:

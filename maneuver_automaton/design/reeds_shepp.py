@@ -280,7 +280,10 @@ def _opposite(x: RealInterval, y: RealInterval, heading: RealInterval) -> Iterat
     middle = RealInterval(
         *(np.arccos(np.clip(1.25 - end**2 / 16.0, -1.0, 1.0)) for end in far.ends)
     )
-    first = at - HALF - _lag(middle)
+    # Angle of ``sin u + i (2 - cos u)``, which is least, pi / 3, at u = pi / 3.
+    ends = [np.arctan2(2.0 - np.cos(u), np.sin(u)) for u in middle.ends]
+    least = np.where((middle.low <= HALF / 3) & (middle.high >= HALF / 3), HALF / 3, np.inf)
+    first = at - HALF - RealInterval(np.minimum(least, np.minimum(*ends)), np.maximum(*ends))
     yield Family(  # L R(u) L(u) R, the middle two in either gear (8.8); for u beyond pi/2 too
         trims=4,
         angles=((first, FORWARD), (first - heading, FORWARD)),
@@ -289,13 +292,6 @@ def _opposite(x: RealInterval, y: RealInterval, heading: RealInterval) -> Iterat
         somewhere=(far.high >= 2.0) & (far.low <= np.sqrt(20.0)),
         everywhere=(far.low >= 2.0) & (far.high <= 6.0),
     )
-
-
-def _lag(middle: RealInterval) -> RealInterval:
-    """Angle of ``sin u + i (2 - cos u)``, which is least, pi / 3, at u = pi / 3."""
-    ends = [np.arctan2(2.0 - np.cos(u), np.sin(u)) for u in middle.ends]
-    least = np.where((middle.low <= HALF / 3) & (middle.high >= HALF / 3), HALF / 3, np.inf)
-    return RealInterval(np.minimum(least, np.minimum(*ends)), np.maximum(*ends))
 
 
 def _tangent(far: RealInterval) -> RealInterval:

@@ -46,7 +46,7 @@ def shown_of(mover: Mover) -> Shown:
     carried = mover.parts[1:] if mover.duration > 0.0 else ()
     names = ["vehicle", *(one.name for one in carried)]
     rows = [
-        (name, tuple(footprint_polygons(list(one.bodies.get("", ())))),
+        (name, tuple(footprint_polygons(one.bodies.get("", ()))),
          joined_track(one.start, one.pieces))
         for name, one in zip(names, (mover, *carried), strict=True)
     ]  # fmt: skip
@@ -65,7 +65,7 @@ def solid(shape: Shape) -> Any:
     import shapely
 
     if isinstance(shape, Disc):
-        return shapely.Polygon(footprint_polygons(shape)[0])
+        return shapely.Polygon(footprint_polygons([shape])[0])
     return united(outlines(shape))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._lazy import lazily
+from maneuver_automaton._lazy import homes, lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.fleet.agreement import Message as Message
@@ -27,25 +27,19 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet.workers import DaskWorkers as DaskWorkers
     from maneuver_automaton.fleet.workers import Workers as Workers
 
-_HOMES = {
-    "Message": "agreement",
-    "DrivenVerdict": "driven",
-    "verify_driven": "driven",
-    "FleetHorizon": "horizon",
-    "plan_fleet": "planning",
-    "FleetProblem": "problem",
-    "Closest": "result",
-    "FleetGuarantee": "result",
-    "FleetLog": "result",
-    "FleetResult": "result",
-    "FleetStatus": "result",
-    "FleetStep": "result",
-    "FleetViolation": "result",
-    "Swap": "result",
-    "simulate_fleet": "simulation",
-    "FleetVerdict": "verdict",
-    "verify_fleet": "verdict",
-    "DaskWorkers": "workers",
-    "Workers": "workers",
-}
+_HOMES = homes(
+    {
+        "agreement": "Message",
+        "driven": "DrivenVerdict verify_driven",
+        "horizon": "FleetHorizon",
+        "planning": "plan_fleet",
+        "problem": "FleetProblem",
+        "result": (
+            "Closest FleetGuarantee FleetLog FleetResult FleetStatus FleetStep FleetViolation Swap"
+        ),
+        "simulation": "simulate_fleet",
+        "verdict": "FleetVerdict verify_fleet",
+        "workers": "DaskWorkers Workers",
+    }
+)
 __getattr__, __dir__ = lazily(__name__, _HOMES)

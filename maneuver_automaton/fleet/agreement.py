@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 from maneuver_automaton.fleet.vehicle import OwnPlan
 
@@ -27,39 +27,6 @@ class Message(NamedTuple):
 
 
 Lost = Callable[[Message], bool]
-
-
-class Knowledge(Protocol):
-    """What every vehicle expects of every other one: the plans that it may drive."""
-
-    sent: int  # messages
-
-    def start(self, held: Mapping[int, OwnPlan]) -> None:
-        """All know the plans that are driven at first."""
-
-    def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
-        """A step begins: everybody says which plan it holds."""
-
-    def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
-        """Let a vehicle in that holds a plan, if all others say that they know of it."""
-
-    def everything(self) -> Iterator[tuple[int, OwnPlan]]:
-        """All plans that somebody expects of a vehicle, with its number."""
-
-    def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
-        """Whether all others agree that a vehicle drives another plan than the one it holds."""
-
-    def announce(self, k: int, found: OwnPlan) -> None:
-        """A vehicle drives another plan, whether the others agree or not."""
-
-    def knows(self, j: int, k: int, found: OwnPlan) -> bool:
-        """Whether a vehicle expects a plan of another one."""
-
-    def others_of(self, k: int) -> Mapping[int, Sequence[OwnPlan]]:
-        """The plans that a vehicle expects of each of the others."""
-
-    def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
-        """Pairs of which the first does not expect of the second what that drives."""
 
 
 @dataclass(slots=True, eq=False)
@@ -116,9 +83,11 @@ class _Agreement:
     sent: int = 0
 
     def start(self, held: Mapping[int, OwnPlan]) -> None:
+        """All know the plans that are driven at first."""
         self.expected = {j: {k: [one] for k, one in held.items() if k != j} for j in held}
 
     def begin(self, step: int, held: Mapping[int, OwnPlan]) -> None:
+        """A step begins: everybody says which plan it holds."""
         self.step = step
         for k in [*self.expected]:
             if k not in held:
@@ -127,6 +96,7 @@ class _Agreement:
             self._tell(sender, held[sender], "holds")
 
     def enter(self, k: int, found: OwnPlan, held: Mapping[int, OwnPlan]) -> bool:
+        """Let a vehicle in that holds a plan, if all others say that they know of it."""
         others = [j for j in self.expected if j != k]
         known = [j for j in others if self._say(k, j, "asks")]
         for j in known:
@@ -137,6 +107,7 @@ class _Agreement:
         return True
 
     def everything(self) -> Iterator[tuple[int, OwnPlan]]:
+        """All plans that somebody expects of a vehicle, with its number."""
         for known in self.expected.values():
             yield from ((j, one) for j, some in known.items() for one in some)
 
@@ -147,7 +118,7 @@ class _Agreement:
         self.unacknowledged = {pair for pair in self.unacknowledged if k not in pair}
 
     def agree(self, k: int, found: OwnPlan, holds: OwnPlan, refuses: Callable[[int], bool]) -> bool:
-        """Who holds a plan that the other one is not proven past refuses."""
+        """Whether all agree to another plan; who holds one that it is not proven past refuses."""
         others = [j for j in self.expected if j != k]
         agreed = all(self._agrees(j, k, found, holds, refuses) for j in others)
         if agreed:
@@ -173,7 +144,7 @@ class _Agreement:
         return False
 
     def announce(self, k: int, found: OwnPlan) -> None:
-        """It is repeated some times, until each acknowledges it.
+        """A vehicle drives another plan, agreed or not; it is repeated until each acknowledges it.
 
         Who has not received it asks in vain for another plan of its own: the vehicle refuses, as
         that is proven past its old one.
@@ -190,6 +161,7 @@ class _Agreement:
                     break
 
     def knows(self, j: int, k: int, found: OwnPlan) -> bool:
+        """Whether a vehicle expects a plan of another one."""
         return any(one.course is found.course for one in self.expected[j].get(k, ()))
 
     def _expect(self, j: int, k: int, found: OwnPlan) -> None:
@@ -197,11 +169,12 @@ class _Agreement:
         self.expected[j][k] = [found]
         self.unacknowledged.discard((k, j))
 
-    def others_of(self, k: int) -> dict[int, list[OwnPlan]]:
+    def others_of(self, k: int) -> Mapping[int, Sequence[OwnPlan]]:
+        """The plans that a vehicle expects of each of the others."""
         return self.expected[k]
 
     def unknown(self, held: Mapping[int, OwnPlan]) -> list[tuple[int, int]]:
-        """Those that have not acknowledged an emergency are left out."""
+        """Pairs of which the first does not expect what the second drives, emergencies left out."""
         return [
             (j, k)
             for j in self.expected
@@ -221,6 +194,10 @@ class _Agreement:
         if self.lost is None:
             return True
         return not self.lost(Message(self.step, self.names[sender], self.names[receiver], kind))
+
+
+Knowledge = _Lossless | _Agreement
+"""What every vehicle expects of every other one: the plans that it may drive."""
 
 
 def knowledge_of(

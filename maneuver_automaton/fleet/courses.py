@@ -40,14 +40,7 @@ ALWAYS = (HeightBand(-math.inf, math.inf, -math.inf, math.inf),)  # of what has 
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """The altitude of a vehicle in time, linear between, and how far its body reaches about it.
-
-    Examples
-    --------
-    >>> climb = Levels([0.0, 2.0], [10.0, 18.0], (-1.0, 2.0))
-    >>> [(one.begin, round(one.low, 3), round(one.high, 3)) for one in climb.bands]
-    [(-inf, 9.0, 14.667), (0.6666666666666666, 11.667, 17.333), (1.3333333333333333, 14.333, 20.0)]
-    """
+    """The altitude of a vehicle in time, linear between, and how far its body reaches about it."""
 
     time: Array  # (n,) [s]
     altitude: Array  # (n,) [m], held before and after

@@ -19,7 +19,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.automaton import same_state
 from maneuver_automaton.automaton.cutting import begin_state, carried, end_state
 from maneuver_automaton.collision.motion import Motion
@@ -201,7 +201,11 @@ def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
     """Why what was driven is none of the model's motions; trims of others are not looked at."""
     before: Plan | None = None
     for piece in pieces:
-        if piece.trims and _is_nominal(piece, problem.automaton):
+        if piece.trims and all(
+            trim.name not in problem.automaton.trim_names
+            or np.array_equal(trim.body_velocity, problem.automaton[trim.name].body_velocity)
+            for trim in piece.trims
+        ):
             goal = Goal(pose=piece.end)
             audit = audit_plan(piece, goal, problem.automaton.model, footprint=(), obstacles=())
             if not audit.passed:
@@ -213,15 +217,6 @@ def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
                 at, states = piece.start_time, (vector_text(was), vector_text(now))
                 return f"at {at:.6g} s: its reduced state jumps from {states[0]} to {states[1]}"
     return ""
-
-
-def _is_nominal(piece: Plan, automaton: Automaton) -> bool:
-    """Whether the trims have the velocities of the library: a disturbed vehicle has others."""
-    return all(
-        trim.name not in automaton.trim_names
-        or np.array_equal(trim.body_velocity, automaton[trim.name].body_velocity)
-        for trim in piece.trims
-    )
 
 
 # -- pairs

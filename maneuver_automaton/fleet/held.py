@@ -50,15 +50,6 @@ def with_room(problem: Problem, tube_m: float) -> Problem:
 
     A plan that ends at the edge of a tolerance arrives only where nothing disturbs it; one that
     ends within these arrives from anywhere in its tube [m]. At least half of a tolerance is left.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0)})
-    >>> goal = Goal([4, 0, 0], tolerance_m=0.15, tolerance_rad=0.3)
-    >>> there = with_room(Problem(robot, [0, 0, 0], goal, footprint=Disc(0.5)), 0.05)
-    >>> [(round(one.tolerance_m, 3), round(one.tolerance_rad, 3)) for one in there.goals]
-    [(0.1, 0.2)]
     """
     body = body_of(problem.footprint)
     reach = math.hypot(body.middle_x, body.middle_y) + body.reach

@@ -34,19 +34,7 @@ SETTINGS = 64  # bytes of the other numbers of a request
 
 
 def encoded(vehicle: FleetMember, found: OwnPlan) -> bytes:
-    """A plan in some 200 bytes: start, word, durations; all of it if not of the library alone.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, FleetProblem, Problem, Unicycle
-    >>> from maneuver_automaton.fleet.held import resting
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0)})
-    >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
-    >>> (vehicle,) = vehicles_of(FleetProblem([there]))
-    >>> said = encoded(vehicle, resting(vehicle, [1.0, 2.0, 3.0], 0.5))
-    >>> len(said) < 100, decoded(vehicle, said).plan.start.tolist()
-    (True, [1.0, 2.0, 3.0])
-    """
+    """A plan in some 200 bytes: start, word, durations; all of it if not of the library alone."""
     stays = found.course.until == math.inf
     sent = (packed(found.plan, vehicle.problem.automaton), found.cost, found.goal_index, stays)
     return pickle.dumps(sent, pickle.HIGHEST_PROTOCOL)

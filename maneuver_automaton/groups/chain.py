@@ -17,12 +17,6 @@ def chained(start: Array, steps: Array) -> Array:
     """Poses (n + 1, dof) from `start` (dof,) on, each one of `steps` (n, dof) after the last.
 
     The products ``start @ steps[0] @ ... @ steps[k - 1]``, all at once.
-
-    Examples
-    --------
-    >>> forward_then_left = np.array([[1.0, 0.0, np.pi / 2], [1.0, 0.0, 0.0]])
-    >>> chained(np.zeros(3), forward_then_left)[-1].round(3).tolist()
-    [1.0, 1.0, 1.571]
     """
     poses = np.empty((len(steps) + 1, start.size))
     poses[0] = start
@@ -38,21 +32,6 @@ def coasted(start: Array, twists: Array, durations: Array) -> Array:
 
     To the last bit ``chained(start, exp(durations * twists))``: on plain numbers for a word of a
     few trims, which takes a tenth of the time that arrays take.
-
-    Parameters
-    ----------
-    start : (dof,) array
-        [m, m, rad(, m)].
-    twists : (n, dof) array
-        [m/s, m/s, rad/s(, m/s)].
-    durations : (n,) array
-        [s].
-
-    Examples
-    --------
-    >>> quarter = np.array([[np.pi / 2, 0.0, np.pi / 2]])
-    >>> coasted(np.zeros(3), quarter, np.array([1.0]))[-1].round(3).tolist()
-    [1.0, 1.0, 1.571]
     """
     if len(durations) > FEW:
         return chained(start, _steps(twists, durations))
@@ -79,13 +58,7 @@ def _steps(twists: Array, durations: Array) -> Array:
 
 
 def end_of_coasting(start: Array, twists: Iterable[Array], durations: Iterable[float]) -> Array:
-    """Pose (dof,) from `start` (dof,) after all trims: the last one of `coasted`.
-
-    Examples
-    --------
-    >>> end_of_coasting(np.zeros(3), [np.array([2.0, 0.0, 0.0])], [1.5]).tolist()
-    [3.0, 0.0, 0.0]
-    """
+    """Pose (dof,) from `start` (dof,) after all trims: the last one of `coasted`."""
     pose: list[float] = start.tolist()
     for twist, duration in zip(twists, durations, strict=False):
         pose = _after(pose, twist.tolist(), duration)
@@ -96,11 +69,6 @@ def seen_from(start: Array, pose: Array) -> Array:
     """A pose (dof,) seen from another: places are subtracted first, so that no digit is lost.
 
     To the last bit ``start.inverse() @ pose`` of poses that are moved to where `start` is 0.
-
-    Examples
-    --------
-    >>> seen_from(np.array([1.0, 2.0, np.pi / 2]), np.array([0.0, 5.0, np.pi])).round(3).tolist()
-    [3.0, 1.0, 1.571]
     """
     here, there = start.tolist(), pose.tolist()
     x, y = there[0] - here[0], there[1] - here[1]

@@ -55,10 +55,6 @@ class Translations:
         """Ad (..., n, n): the identity, because translations commute."""
         return np.broadcast_to(np.eye(self.dof), (*self.pose.shape, self.dof)).copy()
 
-    def coadjoint(self) -> Array:
-        """Ad* (..., n, n): the identity, because translations commute."""
-        return self.adjoint()
-
     def act(self, points: ArrayLike) -> Array:
         """Points (..., n) [m], moved."""
         return self.pose + as_array("points", points, last=self.space)
@@ -154,10 +150,6 @@ class Product:
         matrix[..., :n, :n] = self.first.adjoint()
         matrix[..., n:, n:] = self.second.adjoint()
         return matrix
-
-    def coadjoint(self) -> Array:
-        """Ad* (..., dof, dof), which moves momenta: ``<Ad* p, Ad xi> == <p, xi>``."""
-        return np.swapaxes(self.inverse().adjoint(), -1, -2)
 
     def act(self, points: ArrayLike) -> Array:
         """Points (..., space) [m] of the joint space, each part moved by its own group."""

@@ -64,14 +64,6 @@ class LieGroup(Protocol):
         """Ad (..., dof, dof): ``g @ exp(xi) @ g.inverse() == exp(Ad xi)``."""
         ...
 
-    def coadjoint(self) -> Array:
-        """Ad* (..., dof, dof), which moves momenta as `adjoint` moves twists.
-
-        It is the inverse transpose of Ad, so ``<Ad* p, Ad xi> == <p, xi>``; equally
-        ``<Ad*(g) p, xi> == <p, Ad(g^-1) xi>``, and ``Ad*(g h) == Ad*(g) Ad*(h)``.
-        """
-        ...
-
     def act(self, points: ArrayLike) -> Array:
         """Points (..., space) [m] given in the body frame, seen from the world."""
         ...

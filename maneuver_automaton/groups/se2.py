@@ -140,18 +140,6 @@ twist is back at the start; need another heading
         matrix[..., 0, 2], matrix[..., 1, 2] = self.pose[..., 1], -self.pose[..., 0]
         return matrix
 
-    def coadjoint(self) -> Array:
-        """Ad* (..., 3, 3), which moves momenta: ``<Ad* p, Ad xi> == <p, xi>``.
-
-        Source: Marsden, Ratiu (1999), *Introduction to Mechanics and Symmetry*, Sec. 9.3.
-
-        Examples
-        --------
-        >>> (SE2([1.0, 2.0, 0.0]).coadjoint() @ [1.0, 0.0, 0.0]).tolist()
-        [1.0, 0.0, -2.0]
-        """
-        return np.swapaxes(self.inverse().adjoint(), -1, -2)
-
     def act(self, points: ArrayLike) -> Array:
         """Points (..., 2) [m] given in the body frame, seen from the world.
 

@@ -9,14 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.models.vehicle import (
-    Components,
-    Vehicle,
-    check_at_rest,
-    check_parameters,
-    rows_of_limits,
-    speed_limits,
-)
+from maneuver_automaton.models.vehicle import Components, Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,11 +53,6 @@ class RearSteeredCar(Vehicle):
         """Radius of the tightest circle of the front axle [m]."""
         return self.wheelbase / math.tan(self.max_steering)
 
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed [m/s] and angle of the rear wheels [rad]: (2, 2)."""
-        return rows_of_limits(self.max_speed, self.max_steering)
-
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, -speed tan(rear_steering) / wheelbase)."""
         return u[0], 0.0, -u[0] * np.tan(u[1]) / self.wheelbase
@@ -105,11 +93,6 @@ class FourWheelSteeringCar(Vehicle):
     max_speed: float | None = None  # [m/s]
     name: ClassVar[str] = "four_wheel_steering_car"
     control_names: ClassVar[tuple[str, ...]] = ("speed", "front_steering", "rear_steering")
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed [m/s] and angle of the wheels of both axles [rad]: (3, 2)."""
-        return rows_of_limits(self.max_speed, self.max_steering, self.max_steering)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: speed (cos(beta), sin(beta)), and the turn rate."""
@@ -171,15 +154,6 @@ class ArticulatedVehicle(Vehicle):
     reduced_names: ClassVar[tuple[str, ...]] = ("articulation",)
     part_names: ClassVar[tuple[str, ...]] = ("rear_part",)
 
-    def __post_init__(self) -> None:
-        check_parameters(self, but=("steering_at_rest",))
-        check_at_rest(self)
-        if not self.max_articulation < math.pi / 2:
-            raise ValueError(
-                f"{self.name}: max_articulation must be less than pi / 2, "
-                f"got {self.max_articulation} rad"
-            )
-
     def steered(self, states: Array, controls: Array) -> tuple[Array, Array]:
         """Speeds between samples (n - 1,), which the control holds, and angles at them (n,)."""
         return np.abs(controls[:-1, 0]), states[:, 0]
@@ -189,17 +163,6 @@ class ArticulatedVehicle(Vehicle):
         """Radius of the tightest circle of the front axle [m]."""
         bent = self.max_articulation
         return (self.front * math.cos(bent) + self.rear) / math.sin(bent)
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed [m/s] and rate of the articulation [rad/s]: (2, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(speeds, self.max_articulation_rate)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest articulation [rad]: (1, 2)."""
-        return rows_of_limits(self.max_articulation)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, turn rate of the front part)."""

@@ -9,14 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from maneuver_automaton._arrays import Array, as_array, plain_numbers
-from maneuver_automaton.models.vehicle import (
-    Components,
-    Vehicle,
-    check_at_rest,
-    check_parameters,
-    rows_of_limits,
-    speed_limits,
-)
+from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,8 +63,8 @@ class Car(Vehicle):
     @property
     def control_limits(self) -> Array:
         """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
-        steering = math.pi / 2 if self.max_steering is None else self.max_steering
-        return rows_of_limits(self.max_speed, steering)
+        limits = self._limits(self.control_names)
+        return np.clip(limits, [[-math.inf], [-math.pi / 2]], [[math.inf], [math.pi / 2]])
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
@@ -125,16 +118,6 @@ class AcceleratingCar(Vehicle):
     name: ClassVar[str] = "accelerating_car"
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering")
     reduced_names: ClassVar[tuple[str, ...]] = ("speed",)
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest acceleration [m/s^2] and steering angle [rad]: (2, 2)."""
-        return rows_of_limits(self.max_acceleration, self.max_steering)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest speed [m/s]: (1, 2)."""
-        return rows_of_limits(speed_limits(self.name, self.min_speed, self.max_speed))
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
@@ -197,10 +180,6 @@ class SecondOrderCar(Vehicle):
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "steering_rate")
     reduced_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
 
-    def __post_init__(self) -> None:
-        check_parameters(self, but=("steering_at_rest",))
-        check_at_rest(self)
-
     def steered(self, states: Array, controls: Array) -> tuple[Array, Array]:
         """Speeds between samples (n - 1,), the greater of both ends, and angles at them (n,)."""
         speeds = np.abs(states[:, 0])
@@ -210,17 +189,6 @@ class SecondOrderCar(Vehicle):
     def turning_radius(self) -> float:
         """Radius of the tightest circle of the rear axle [m]."""
         return self.wheelbase / math.tan(self.max_steering)
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest acceleration [m/s^2] and steering rate [rad/s]: (2, 2)."""
-        return rows_of_limits(self.max_acceleration, self.max_steering_rate)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(speeds, self.max_steering)
 
     @property
     def kinematic(self) -> Car:
@@ -294,17 +262,6 @@ class CarWithTrailer(Vehicle):
     control_names: ClassVar[tuple[str, ...]] = ("speed", "steering")
     reduced_names: ClassVar[tuple[str, ...]] = ("hitch",)
     part_names: ClassVar[tuple[str, ...]] = ("trailer",)
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(speeds, self.max_steering)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest angle at the hitch [rad]: (1, 2)."""
-        return rows_of_limits(self.max_hitch)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""

@@ -8,15 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import LieGroup, SE2xR
-from maneuver_automaton.models.vehicle import (
-    Components,
-    Vehicle,
-    check_parameters,
-    rows_of_limits,
-    speed_limits,
-)
+from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
 GRAVITY = 9.81  # [m/s^2]
 
@@ -98,17 +91,6 @@ class SingleTrack(Vehicle):
         """Distance of the axles [m]."""
         return self.front + self.rear
 
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest acceleration [m/s^2] and steering rate [rad/s]: (2, 2)."""
-        return rows_of_limits(self.max_acceleration, self.max_steering_rate)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest [speed, lateral_speed, turn_rate, steering]: (4, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(speeds, self.max_lateral_speed, self.max_turn_rate, self.max_steering)
-
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, lateral_speed, turn_rate)."""
         return z[0], z[1], z[2]
@@ -173,21 +155,6 @@ class Hovercraft(Vehicle):
     name: ClassVar[str] = "hovercraft"
     control_names: ClassVar[tuple[str, ...]] = ("force", "torque")
     reduced_names: ClassVar[tuple[str, ...]] = ("speed", "lateral_speed", "turn_rate")
-
-    def __post_init__(self) -> None:
-        check_parameters(self)
-        speed_limits(self.name, self.min_force, self.max_force, what="force", unit="N")
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest force [N] and torque [N m]: (2, 2)."""
-        forces = speed_limits(self.name, self.min_force, self.max_force, what="force", unit="N")
-        return rows_of_limits(forces, self.max_torque)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest speed [m/s], lateral speed [m/s] and turn rate [rad/s]: (3, 2)."""
-        return rows_of_limits(self.max_speed, self.max_lateral_speed, self.max_turn_rate)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, lateral_speed, turn_rate)."""
@@ -284,38 +251,11 @@ class Helicopter(Vehicle):
         check_parameters(self, but=("drag",))
         if not 0.0 <= self.drag < math.inf:
             raise ValueError(f"{self.name}: drag must not be negative, got {self.drag} 1/s")
-        if not self.max_tilt < math.pi / 2:
-            raise ValueError(
-                f"{self.name}: max_tilt must be less than pi / 2, got {self.max_tilt} rad"
-            )
         if not self.max_climb_acceleration < self.gravity:
             raise ValueError(
                 f"{self.name}: max_climb_acceleration must be less than gravity "
                 f"{self.gravity} m/s^2, got {self.max_climb_acceleration} m/s^2"
             )
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest tilt rates [rad/s] and accelerations [m/s^2, rad/s^2]: (4, 2)."""
-        return rows_of_limits(
-            self.max_tilt_rate,
-            self.max_tilt_rate,
-            self.max_climb_acceleration,
-            self.max_angular_acceleration,
-        )
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest speeds [m/s], turn rate [rad/s] and tilts [rad]: (6, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(
-            speeds,
-            self.max_lateral_speed,
-            self.max_climb,
-            self.max_turn_rate,
-            self.max_tilt,
-            self.max_tilt,
-        )
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, lateral_speed, turn_rate, climb)."""

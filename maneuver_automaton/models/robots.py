@@ -9,12 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.models.vehicle import (
-    Components,
-    Vehicle,
-    rows_of_limits,
-    speed_limits,
-)
+from maneuver_automaton.models.vehicle import Components, Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,11 +37,6 @@ class Unicycle(Vehicle):
     max_turn_rate: float | None = None  # [rad/s]
     name: ClassVar[str] = "unicycle"
     control_names: ClassVar[tuple[str, ...]] = ("speed", "turn_rate")
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed [m/s] and turn rate [rad/s]: (2, 2)."""
-        return rows_of_limits(self.max_speed, self.max_turn_rate)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, turn_rate)."""
@@ -90,17 +80,6 @@ class SecondOrderUnicycle(Vehicle):
     name: ClassVar[str] = "second_order_unicycle"
     control_names: ClassVar[tuple[str, ...]] = ("acceleration", "angular_acceleration")
     reduced_names: ClassVar[tuple[str, ...]] = ("speed", "turn_rate")
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest acceleration [m/s^2] and angular acceleration [rad/s^2]: (2, 2)."""
-        return rows_of_limits(self.max_acceleration, self.max_angular_acceleration)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest speed [m/s] and turn rate [rad/s]: (2, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(speeds, self.max_turn_rate)
 
     @property
     def kinematic(self) -> Unicycle:
@@ -150,11 +129,6 @@ class Omnidirectional(Vehicle):
     max_turn_rate: float | None = None  # [rad/s]
     name: ClassVar[str] = "omnidirectional"
     control_names: ClassVar[tuple[str, ...]] = ("speed", "lateral_speed", "turn_rate")
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed, lateral speed [m/s] and turn rate [rad/s]: (3, 2)."""
-        return rows_of_limits(self.max_speed, self.max_lateral_speed, self.max_turn_rate)
 
     def velocity(self, z: Components, u: Components, /) -> Components:
         """Components of the twist: the control."""

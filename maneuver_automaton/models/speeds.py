@@ -20,14 +20,6 @@ def standing_price(model: Model, states: Array, controls: Array) -> float:
     """Price of steering while it stands, along samples of state (n, n_z) and control; or inf.
 
     Zero for a vehicle that steers at rest at will, whose wheels turn at once, or that has none.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderCar
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5, steering_at_rest=3.0)
-    >>> standing_price(car, np.array([[0.0, 0.0], [0.0, 0.5], [1.0, 0.7]]), np.zeros((3, 2)))
-    1.5
     """
     price = getattr(model, "steering_at_rest", 0.0)
     if not price:
@@ -94,13 +86,6 @@ def greatest_speed(model: Model, *, axes: tuple[int, ...] = (0, 1, 3)) -> float:
 
     Source: Moore, Kearfott, Cloud (2009), *Introduction to Interval Analysis*, Ch. 5: the value of
     an expression on intervals contains all its values.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import CarWithTrailer
-    >>> greatest_speed(CarWithTrailer(wheelbase=2.5, hitch_length=3.0, max_steering=0.6,
-    ...                               max_speed=3.0, min_speed=-1.0))
-    3.0
     """
     if isinstance(model, OnlyTranslated):  # it is as fast seen from the world as from its body
         model = model.stated

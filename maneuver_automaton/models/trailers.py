@@ -8,14 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
-from maneuver_automaton.models.vehicle import (
-    Components,
-    Vehicle,
-    check_parameters,
-    rows_of_limits,
-    speed_limits,
-)
+from maneuver_automaton.models.vehicle import Components, Vehicle, check_parameters
 
 OFFSETS = ("hitch_offset", "hitch_offset_2", "hitch_offset_3")
 
@@ -103,17 +96,6 @@ class TractorWithTrailers(Vehicle):
         """From each hitch to the axle of its trailer [m], one for each trailer."""
         lengths = (self.hitch_length, self.hitch_length_2, self.hitch_length_3)
         return tuple(length for length in lengths if length is not None)
-
-    @property
-    def control_limits(self) -> Array:
-        """Least and greatest speed [m/s] and steering angle [rad]: (2, 2)."""
-        speeds = speed_limits(self.name, self.min_speed, self.max_speed)
-        return rows_of_limits(speeds, self.max_steering)
-
-    @property
-    def reduced_limits(self) -> Array:
-        """Least and greatest angle at each hitch [rad]: (n, 2)."""
-        return rows_of_limits(*(self.max_hitch for _ in self.lengths))
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""

@@ -20,6 +20,17 @@ ComponentFunction = Callable[[Components, Components], Components]
 """``f(z, u)``, component by component, in Python's arithmetic and NumPy's functions."""
 
 
+AT_REST = "steering_at_rest"
+LIKE = {  # whose limits hold for a component that has none of its own
+    "front_steering": "steering",
+    "rear_steering": "steering",
+    "lateral_tilt": "tilt",
+    "lateral_tilt_rate": "tilt_rate",
+    "hitch_2": "hitch",
+    "hitch_3": "hitch",
+}
+
+
 class Vehicle:
     """All that follows once `velocity` and `dynamics` are stated by components.
 
@@ -38,9 +49,24 @@ class Vehicle:
         check_parameters(self)
 
     @property
+    def control_limits(self) -> Array:
+        """Least and greatest value (n_u, 2) of each control, by the parameters of its name."""
+        return self._limits(self.control_names)
+
+    @property
     def reduced_limits(self) -> Array:
-        """No reduced state: (0, 2)."""
-        return np.zeros((0, 2))
+        """Least and greatest value (n_z, 2) of each component of the reduced state; likewise."""
+        return self._limits(self.reduced_names)
+
+    def _limits(self, names: Sequence[str]) -> Array:
+        """Limits (n, 2) by `max_NAME` and `min_NAME`, which is its negative if left out."""
+        limits = np.empty((len(names), 2))
+        for row, name in zip(limits, names, strict=True):
+            one = LIKE.get(name, name)
+            most, least = getattr(self, f"max_{one}"), getattr(self, f"min_{one}", None)
+            most = math.inf if most is None else most
+            row[:] = -most if least is None else least, most
+        return limits
 
     def velocity(self, z: Components, u: Components, /) -> Components:
         """Components of the twist xi(z, u), in the order of the pose."""
@@ -94,57 +120,30 @@ def no_parts(reduced_state: ArrayLike) -> Array:
     return np.zeros((*np.shape(reduced_state)[:-1], 0, 3))
 
 
-def check_at_rest(vehicle: Any) -> None:
-    """Refuse a price of steering at rest that is none; raises ValueError."""
-    if not vehicle.steering_at_rest >= 0.0:
-        raise ValueError(
-            f"{vehicle.name}: steering_at_rest must be at least 0, or inf, got "
-            f"{vehicle.steering_at_rest} 1/rad"
-        )
-
-
 def check_parameters(vehicle: Any, *, but: Sequence[str] = ()) -> None:
-    """Make the parameters plain numbers, all positive but least speeds and those in `but`.
+    """Make the parameters plain numbers, all positive but least ones, prices and those in `but`.
 
     Where None is allowed it is left as it is. Wheels that can be turned across are refused too,
-    and a least speed that is not below the greatest.
+    and a least speed or force that is not below the greatest.
     """
     plain_numbers(vehicle)
-    for name in (one.name for one in fields(vehicle)):
-        value = getattr(vehicle, name)
-        unsigned = name in but or name.startswith("min_")
+    name = vehicle.name
+    values = {one.name: getattr(vehicle, one.name) for one in fields(vehicle)}
+    for one, value in values.items():
+        unsigned = one in (*but, AT_REST) or one.startswith("min_")
         if value is not None and not unsigned and not 0.0 < value < math.inf:
-            raise ValueError(f"{vehicle.name}: {name} must be positive, got {value}")
-    steering = getattr(vehicle, "max_steering", None)
-    if steering is not None and not steering < math.pi / 2:
-        raise ValueError(
-            f"{vehicle.name}: max_steering must be less than pi / 2, got {steering} rad"
-        )
-    if hasattr(vehicle, "min_speed"):
-        speed_limits(vehicle.name, vehicle.min_speed, vehicle.max_speed)
-
-
-def speed_limits(
-    owner: str, least: float | None, greatest: float, *, what: str = "speed", unit: str = "m/s"
-) -> tuple[float, float]:
-    """Least and greatest speed; a least one of None is as fast in reverse."""
-    if least is None:
-        return -greatest, greatest
-    if not -math.inf < least < greatest:
-        raise ValueError(
-            f"{owner}: min_{what} must be less than max_{what} {greatest} {unit}, "
-            f"got {least} {unit}"
-        )
-    return least, greatest
-
-
-def rows_of_limits(*greatest: float | tuple[float, float] | None) -> Array:
-    """(n, 2): pairs as they are, of a number its negative and itself; None is no limit."""
-    pairs = [
-        one if isinstance(one, tuple) else (-one, one) if one is not None else UNLIMITED
-        for one in greatest
-    ]
-    return np.array(pairs, dtype=np.float64)
+            raise ValueError(f"{name}: {one} must be positive, got {value}")
+    for one in ("max_steering", "max_articulation", "max_tilt"):
+        if (angle := values.get(one)) is not None and not angle < math.pi / 2:
+            raise ValueError(f"{name}: {one} must be less than pi / 2, got {angle} rad")
+    for one, unit in (("speed", "m/s"), ("force", "N")):
+        least, most = values.get(f"min_{one}"), values.get(f"max_{one}", math.inf)
+        if least is not None and not -math.inf < least < most:
+            raise ValueError(
+                f"{name}: min_{one} must be less than max_{one} {most} {unit}, got {least} {unit}"
+            )
+    if not (price := values.get(AT_REST, 0.0)) >= 0.0:
+        raise ValueError(f"{name}: {AT_REST} must be at least 0, or inf, got {price} 1/rad")
 
 
 UNLIMITED = (-math.inf, math.inf)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._lazy import lazily
+from maneuver_automaton._lazy import homes, lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
@@ -35,28 +35,21 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.searches import save_progress_figure as save_progress_figure
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
 
-_HOMES = {
-    "draw_automaton": "automata",
-    "draw_motions": "automata",
-    "save_automaton_figure": "automata",
-    "trim_colors": "colors",
-    "draw_controls": "controls",
-    "draw_factor": "factors",
-    "save_factor_figure": "factors",
-    "film_of": "films",
-    "save_film": "films",
-    "Look": "look",
-    "draw_maneuvers": "maneuvers",
-    "save_maneuvers_figure": "maneuvers",
-    "draw_obstacles": "obstacles",
-    "figure_of": "pictures",
-    "save_picture": "pictures",
-    "draw_plane": "plane",
-    "Player": "player",
-    "player_of": "player",
-    "player_of_file": "player",
-    "draw_progress": "searches",
-    "save_progress_figure": "searches",
-    "flies_among_heights": "space",
-}
+_HOMES = homes(
+    {
+        "automata": "draw_automaton draw_motions save_automaton_figure",
+        "colors": "trim_colors",
+        "controls": "draw_controls",
+        "factors": "draw_factor save_factor_figure",
+        "films": "film_of save_film",
+        "look": "Look",
+        "maneuvers": "draw_maneuvers save_maneuvers_figure",
+        "obstacles": "draw_obstacles",
+        "pictures": "figure_of save_picture",
+        "plane": "draw_plane",
+        "player": "Player player_of player_of_file",
+        "searches": "draw_progress save_progress_figure",
+        "space": "flies_among_heights",
+    }
+)
 __getattr__, __dir__ = lazily(__name__, _HOMES)

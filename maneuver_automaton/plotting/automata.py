@@ -118,7 +118,12 @@ def save_automaton_figure(
         high = RING + 2.0 * CHARACTER * longest  # names stick out like rays
     stated = look.is_paper or look.size is not None
     width = look.width if stated else high + MOTIONS + 1.0
-    lines, sides = [_summary(automaton)], (max(width - MOTIONS, MOTIONS), MOTIONS)
+    name = automaton.name or automaton.model.name.replace("_", " ")
+    counts = f"{len(automaton)} trim{'s' if len(automaton) > 1 else ''}"
+    if automaton.maneuvers:
+        many = len(automaton.maneuvers)
+        counts += f", {many} maneuver{'s' if many > 1 else ''}"
+    lines, sides = [f"{shortened(name, 60)}: {counts}"], (max(width - MOTIONS, MOTIONS), MOTIONS)
     if look.is_narrow:
         high = min(high, width)
         figure, axes = plain_page(
@@ -143,15 +148,6 @@ def save_automaton_figure(
         settled(figure)  # the names have room by the size of the axes
     draw_automaton(graph, automaton)
     write_figure(figure, path)
-
-
-def _summary(automaton: Automaton) -> str:
-    name = automaton.name or automaton.model.name.replace("_", " ")
-    counts = f"{len(automaton)} trim{'s' if len(automaton) > 1 else ''}"
-    if automaton.maneuvers:
-        many = len(automaton.maneuvers)
-        counts += f", {many} maneuver{'s' if many > 1 else ''}"
-    return f"{shortened(name, 60)}: {counts}"
 
 
 def _colors(automaton: Automaton) -> list[Color]:

@@ -168,7 +168,7 @@ class Actor:
     @property
     def body(self) -> list[Array]:
         """Outlines (n, 2) of its body in its own frame [m]; none if it is not known."""
-        return footprint_polygons(list(self.mover.bodies.get("", ())))
+        return footprint_polygons(self.mover.bodies.get("", ()))
 
     @property
     def reach(self) -> float:
@@ -225,7 +225,7 @@ class Actor:
             [
                 ring
                 for part in self.parts
-                for ring in placed(footprint_polygons(list(part.bodies[""])), part.pose_at(times))
+                for ring in placed(footprint_polygons(part.bodies[""]), part.pose_at(times))
             ]
             if self.body
             else []
@@ -290,20 +290,7 @@ class Cast:
 
 
 def cast_of(recording: Recording) -> Cast:
-    """The vehicles of a recording, and what is around them.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
-    >>> from maneuver_automaton.fleet import FleetProblem, plan_fleet
-    >>> from maneuver_automaton.recording import recording_of
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
-    >>> rows = [Problem(robot, [0, y, 0], [3, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
-    >>> fleet = plan_fleet(FleetProblem(rows, names=["a", "b"]), max_rounds=0)
-    >>> cast = cast_of(recording_of(fleet))
-    >>> [(one.name, one.arrival) for one in cast.actors], cast.end
-    ([('a', 3.0), ('b', 3.0)], 3.0)
-    """
+    """The vehicles of a recording, and what is around them."""
     movers = recording.movers
     names = [one.name for one in movers]
     short = max(map(len, names)) <= MOST_LABEL
@@ -368,7 +355,7 @@ def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
 
 
 def _carried(part: Mover) -> Carried:
-    body = tuple(footprint_polygons(list(part.bodies[""])))
+    body = tuple(footprint_polygons(part.bodies[""]))
     return Carried(name=part.name, body=body, track=joined_track(part.start, part.pieces))
 
 

@@ -105,13 +105,7 @@ def twist_color(twist: Array) -> Color:
 
 
 def fleet_colors(count: int) -> list[Color]:
-    """A colour for each of `count` vehicles: ten, then their shades.
-
-    Examples
-    --------
-    >>> len(set(fleet_colors(70)))
-    70
-    """
+    """A colour for each of `count` vehicles: ten, then their shades."""
     shades = [SHADES[(k // len(TEN)) % len(SHADES)] for k in range(count)]
     return [_rounded(shaded(TEN[k % len(TEN)], shade)) for k, shade in enumerate(shades)]
 
@@ -150,12 +144,6 @@ def track_colors(twists: Mapping[str, Array]) -> dict[str, Color]:
 
     Up to twelve trims have a colour each. More share the colours of how they move, the darker
     the faster.
-
-    Examples
-    --------
-    >>> slow, fast = ({f"v {v}": np.array([v, 0.0, 0.0]) for v in vs} for vs in ([1, 2], range(20)))
-    >>> track_colors(slow) == trim_colors(slow), len(motion_names(fast, many=True))
-    (True, 2)
     """
     if len(twists) <= MOST_TRIMS:
         return trim_colors(twists)
@@ -174,12 +162,6 @@ def motion_names(twists: Mapping[str, Array], *, many: bool) -> dict[str, str]:
     """What a legend calls the trims with `twists`, and a trim of each: itself, or the fastest.
 
     Trims have their own names, and how they move if they are `many`.
-
-    Examples
-    --------
-    >>> many = {f"trim {k}": np.array([0.1 * k, 0.0, 0.5]) for k in range(1, 21)}
-    >>> motion_names(many, many=True)
-    {'ahead, turning left, 0.1 (pale) to 2 m/s': 'trim 20'}
     """
     if not many:
         return {name: name for name in twists}
@@ -195,13 +177,7 @@ def motion_names(twists: Mapping[str, Array], *, many: bool) -> dict[str, str]:
 
 
 def motion(twist: Array) -> str:
-    """How a trim with `twist` (dof,) moves, in words.
-
-    Examples
-    --------
-    >>> [motion(np.array(twist)) for twist in ([2, 0, -1], [-1, 0, 0], [0, 0, 1], [0, 0, 0, 2])]
-    ['ahead, turning right', 'back', 'turn left on the spot', 'climb']
-    """
+    """How a trim with `twist` (dof,) moves, in words."""
     ahead, aside, turn, *climb = _clear(twist)
     side = "left" if turn > 0.0 else "right"
     if ahead == 0.0 and aside == 0.0:

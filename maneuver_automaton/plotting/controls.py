@@ -111,8 +111,8 @@ def draw_track_controls(
         draw_over_time(ax, track, step_curves(track, k), label="controls", colors=colors, style=k)
         for k in range(many)
     )
-    handles = [Line2D([], [], color=INK, linestyle=STYLES[k % len(STYLES)]) for k in range(many)]
-    outer_legend(ax, handles, names)
+    lines = (Line2D([], [], color=INK, linestyle=STYLES[k % len(STYLES)]) for k in range(many))
+    outer_legend(ax, [*zip(lines, names, strict=True)])
     return drawn
 
 

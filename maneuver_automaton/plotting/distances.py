@@ -31,18 +31,6 @@ def nearest_others(actors: Sequence[Actor], times: Array) -> Array:
 
     It is inf where there is no other. Pairs that a circle around each shows to be further apart
     than another pair are not measured.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
-    >>> from maneuver_automaton.fleet import FleetProblem, plan_fleet
-    >>> from maneuver_automaton.plotting.cast import cast_of
-    >>> from maneuver_automaton.recording import recording_of
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
-    >>> rows = [Problem(robot, [0, y, 0], [3, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
-    >>> cast = cast_of(recording_of(plan_fleet(FleetProblem(rows), max_rounds=0)))
-    >>> nearest_others(cast.actors, np.array([0.0, 1.5])).round(9).tolist()
-    [[0.4, 0.4], [0.4, 0.4]]
     """
     rows = [
         (owner, ring, grown, part.pose_at(times))
@@ -112,13 +100,7 @@ def _nearest(
 
 
 def thinned(times: Array, values: Array, *, most: int) -> tuple[Array, Array]:
-    """At most about so many of the samples, with the least of those between them.
-
-    Examples
-    --------
-    >>> thinned(np.arange(6.0), np.array([5.0, 4.0, 1.0, 2.0, 3.0, 6.0]), most=3)
-    (array([0., 1., 2., 4., 5.]), array([5., 4., 1., 3., 6.]))
-    """
+    """At most about so many of the samples, with the least of those between them."""
     width = -(-len(times) // most)
     begins = range(0, len(times), width)
     least = [begin + int(np.argmin(values[begin : begin + width])) for begin in begins]

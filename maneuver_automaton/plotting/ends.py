@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.quiver import Quiver
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK, Color
-from maneuver_automaton.plotting.style import SMALL_PT, mark_handle
+from maneuver_automaton.plotting.style import SMALL_PT, Entries, dashed_handle, mark_handle
 from maneuver_automaton.problem import Goal, Via
 
 ARROW_SIZE = 0.13  # of the size of the path
@@ -35,7 +35,9 @@ def draw_ends(
     pale = [reached is not None and k != reached for k in range(len(goals))]
     colors = [GREY if others else INK for others in pale]
     headed = [k for k, goal in enumerate(goals) if not goal.free_heading]
-    artists: dict[str, Any] = {"start": draw_start(ax, start)}
+    artists: dict[str, Any] = {
+        "start": ax.scatter(start[0], start[1], s=26.0, color=[INK], linewidths=0.0, zorder=5.1)
+    }
     for k, (goal, color) in enumerate(zip(goals, colors, strict=True)):
         artists[f"goal {k}"] = draw_goal(ax, goal.pose, color=color)
         if goal.free_heading:
@@ -85,11 +87,6 @@ def _draw_via(ax: Axes, via: Sequence[Via]) -> dict[str, Any]:
     return artists
 
 
-def draw_start(ax: Axes, pose: Array) -> PathCollection:
-    """A dot for a start."""
-    return ax.scatter(pose[0], pose[1], s=26.0, color=[INK], linewidths=0.0, zorder=5.1)
-
-
 def draw_goal(ax: Axes, pose: Array, *, color: Color = INK) -> PathCollection:
     """A diamond for a goal; a start in the same place shows inside."""
     return ax.scatter(
@@ -110,27 +107,22 @@ def draw_headings(
     )  # fmt: skip
 
 
-def end_handles(
-    goals: Sequence[Goal] = (), via: Sequence[Via] = ()
-) -> tuple[list[Line2D], list[str]]:
-    """Legend handles of start and goals, what else there is of goals, and poses on the way."""
-    handles = [mark_handle("o", size=5.5, face=INK, edge=INK), mark_handle("D", size=6.0, edge=INK)]
-    names = ["start", "goal"]
-    if goals and all(goal.free_heading for goal in goals):
-        names[1] = "goal, any heading"
-    elif any(goal.free_heading for goal in goals):
-        handles.append(mark_handle("o", size=9.0, edge=INK))
-        names.append("any heading")
+def end_entries(goals: Sequence[Goal] = (), via: Sequence[Via] = ()) -> Entries:
+    """Legend entries of start and goals, what else there is of goals, and poses on the way."""
+    free = [goal.free_heading for goal in goals]
+    goal_name = "goal, any heading" if free and all(free) else "goal"
+    entries: list[tuple[Artist, str]] = [
+        (mark_handle("o", size=5.5, face=INK, edge=INK), "start"),
+        (mark_handle("D", size=6.0, edge=INK), goal_name),
+    ]
+    if any(free) and not all(free):
+        entries.append((mark_handle("o", size=9.0, edge=INK), "any heading"))
     if len(goals) > 1:
-        handles.append(mark_handle("D", size=6.0, edge=GREY))
-        names.append("other goal")
+        entries.append((mark_handle("D", size=6.0, edge=GREY), "other goal"))
     if any(goal.tolerance_m > 0.0 for goal in goals):
-        handles.append(mark_handle("o", size=9.0, face=(*SET, 0.15), edge=SET))
-        names.append("goal tolerance")
+        entries.append((mark_handle("o", size=9.0, face=(*SET, 0.15), edge=SET), "goal tolerance"))
     if any(one.gate is None for one in via):
-        handles.append(mark_handle("o", size=9.0, edge=WAY))
-        names.append("on the way")
+        entries.append((mark_handle("o", size=9.0, edge=WAY), "on the way"))
     if any(one.gate is not None for one in via):
-        handles.append(Line2D([], [], color=WAY, linewidth=1.4, linestyle=(0, (3, 2))))
-        names.append("gate")
-    return handles, names
+        entries.append((dashed_handle(WAY, (0, (3, 2)), width=1.4), "gate"))
+    return entries

@@ -23,40 +23,23 @@ PLACES, HEADINGS = 51, 37  # from the start to the edge of the disc, and around
 ARROW = 0.08  # of the radius
 
 
-class FactorsOfWords(Protocol):
+class _Factors(Protocol):
     """What is proven of the words of a designed library, `DesignedLibrary.words`."""
 
     @property
-    def max_trims(self) -> int:
-        """Trims that a word has at most."""
-        ...
-
+    def max_trims(self) -> int: ...
     @property
-    def radius(self) -> float:
-        """Of the disc of goals [m]."""
-        ...
-
+    def radius(self) -> float: ...
     @property
-    def factor(self) -> float:
-        """No goal has a greater one."""
-        ...
-
+    def factor(self) -> float: ...
     @property
-    def sampled(self) -> float:
-        """Some goal has it."""
-        ...
-
+    def sampled(self) -> float: ...
     @property
-    def worst(self) -> Array:
-        """The goal that has it (3,) [m, m, rad]."""
-        ...
-
-    def factors(self, goals: Array) -> Array:
-        """The factors (n,) at goals (n, 3); NaN where none counts."""
-        ...
+    def worst(self) -> Array: ...
+    def factors(self, goals: Array) -> Array: ...
 
 
-def draw_factor(ax: Axes, proof: FactorsOfWords) -> QuadMesh:
+def draw_factor(ax: Axes, proof: _Factors) -> QuadMesh:
     """Draw the factor over the goals of a `proof`: at each place that of the worst heading.
 
     The start is in the middle and looks to the right; the worst goal that was met is marked.
@@ -65,7 +48,7 @@ def draw_factor(ax: Axes, proof: FactorsOfWords) -> QuadMesh:
     ----------
     ax : Axes
         Where to draw; its scale is made equal in x and y.
-    proof : FactorsOfWords
+    proof : WordsProof
         What was proven, `DesignedLibrary.words`.
 
     Returns
@@ -106,7 +89,7 @@ def draw_factor(ax: Axes, proof: FactorsOfWords) -> QuadMesh:
     return places
 
 
-def save_factor_figure(proof: FactorsOfWords, path: str | Path) -> None:
+def save_factor_figure(proof: _Factors, path: str | Path) -> None:
     """Write a picture of the factor over the goals of a `proof`; see `draw_factor`.
 
     Raises
@@ -126,7 +109,7 @@ def save_factor_figure(proof: FactorsOfWords, path: str | Path) -> None:
     write_figure(figure, path)
 
 
-def _worst_factors(proof: FactorsOfWords, half: Array) -> Array:
+def _worst_factors(proof: _Factors, half: Array) -> Array:
     """Greatest factor (2 n - 1, 2 n - 1) over all headings at each place; NaN where none counts."""
     x, y = np.meshgrid(half, half)
     inside = np.hypot(x, y) <= proof.radius

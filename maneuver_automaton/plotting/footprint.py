@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, as_array
-from maneuver_automaton.collision import Box, Disc, Polygon
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.collision import Disc, Polygon, Shape
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.track import Track, TrackPiece
@@ -16,102 +16,19 @@ from maneuver_automaton.plotting.track import Track, TrackPiece
 DISC_CORNERS = 48
 
 
-def footprint_polygons(footprint: Any) -> list[Array]:
-    """Outlines of a footprint in the body frame; none if `footprint` is None.
-
-    Parameters
-    ----------
-    footprint : None, shape, (n, 2) array, mapping, or a sequence of these
-        A `Polygon`, `Disc` or `Box`; corners [m]; or a mapping of a scenario file:
-        ``{"polygon_m": corners}``, ``{"disc_m": radius}``,
-        ``{"rectangle_m": [length, width], "reference_m": [x, y]}``.
-        `reference_m` says where the pose sits, measured from the centre of the rectangle: the
-        body spans ``[-length / 2 - x, length / 2 - x]`` ahead; (0, 0) if left out.
-
-    Returns
-    -------
-    list of (n, 2) array
-        Corners of every outline [m], x ahead and y to the left, the first not repeated.
-
-    Raises
-    ------
-    ValueError
-        If it is none of these, a polygon has fewer than three corners, or a size is not positive.
-
-    Examples
-    --------
-    >>> footprint_polygons({"rectangle_m": [4.0, 2.0], "reference_m": [-1.0, 0.0]})[0].tolist()
-    [[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]]
-    """
-    if footprint is None:
-        return []
-    if isinstance(footprint, Polygon | Box):
-        return [footprint.corners]
-    if isinstance(footprint, Disc):
-        return [_circle(footprint.radius) + footprint.center]
-    if isinstance(footprint, Mapping):
-        return [_of_mapping(footprint)]
-    if _is_polygon(footprint):
-        return [_polygon(footprint)]
-    if isinstance(footprint, Sequence) and not isinstance(footprint, str):
-        return [outline for part in footprint for outline in footprint_polygons(part)]
-    raise ValueError(f"footprint: got {footprint!r}, need a shape, corners, a mapping, or several")
+def footprint_polygons(shapes: Sequence[Shape]) -> list[Array]:
+    """Outlines (n, 2) of shapes in their own frame [m]."""
+    angle = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return [
+        one.radius * circle + one.center if isinstance(one, Disc) else one.corners for one in shapes
+    ]
 
 
 def placed(outlines: Sequence[Array], poses: Array) -> list[Array]:
     """Outlines (n, 2) at `poses` (m, dof) in the plane: m times len(outlines) arrays (n, 2)."""
     frames = SE2(poses[:, None, :3])
     return [corners for outline in outlines for corners in frames.act(outline)]
-
-
-def _is_polygon(footprint: Any) -> bool:
-    if isinstance(footprint, np.ndarray):
-        return not footprint.dtype.hasobject
-    return bool(
-        isinstance(footprint, Sequence)
-        and len(footprint)
-        and all(
-            isinstance(corner, Sequence | np.ndarray)
-            and len(corner) == 2
-            and all(np.isscalar(number) for number in corner)
-            for corner in footprint
-        )
-    )
-
-
-def _polygon(corners: Any) -> Array:
-    outline = as_array("footprint: polygon", corners)
-    if outline.ndim != 2 or outline.shape[1] != 2 or len(outline) < 3:
-        raise ValueError(f"footprint: polygon has shape {outline.shape}, need (n, 2) with n >= 3")
-    return outline
-
-
-def _of_mapping(footprint: Mapping[str, Any]) -> Array:
-    if "polygon_m" in footprint:
-        return _polygon(footprint["polygon_m"])
-    if "disc_m" in footprint:
-        radius = as_array("footprint: disc_m", footprint["disc_m"])
-        if radius.ndim or not radius > 0.0:
-            raise ValueError(f"footprint: disc_m must be a positive radius, got {radius} m")
-        return _circle(float(radius))
-    if "rectangle_m" in footprint:
-        size = as_array("footprint: rectangle_m", footprint["rectangle_m"], last=2)
-        if not (size > 0.0).all():
-            raise ValueError(f"footprint: rectangle_m must be positive, got {size.tolist()} m")
-        reference = as_array(
-            "footprint: reference_m", footprint.get("reference_m", (0.0, 0.0)), last=2
-        )
-        signs = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-        return 0.5 * signs * size - reference
-    raise ValueError(
-        f"footprint: got the keys {', '.join(map(repr, footprint))}, "
-        "need rectangle_m, polygon_m or disc_m"
-    )
-
-
-def _circle(radius: float) -> Array:
-    angle = np.linspace(0.0, 2.0 * np.pi, DISC_CORNERS, endpoint=False)
-    return radius * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 STRAIGHT_RAD, DETOUR = 1e-9, 1e-12  # turn, and way over chord, of a piece drawn by its two ends
@@ -123,16 +40,6 @@ def swept_region(track: Track, outlines: Sequence[Array]) -> list[Any]:
     Between two samples, which are a few hundredths of a radian apart, each convex piece of the
     body is taken to fill the hull of its two places: on a circle of radius r that is off by
     ``r * angle**2 / 8``, a millimetre for a car.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Plan
-    >>> from maneuver_automaton.plotting.track import track_of_plan
-    >>> from maneuver_automaton.primitives import Trim
-    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0])
-    >>> track = track_of_plan(Plan([0.0, 0.0, 0.0], (ahead,), durations=[3.0]))
-    >>> [part.area for part in swept_region(track, [np.array([[0, 0], [1, 0], [1, 2], [0, 2]])])]
-    [8.0]
     """
     import shapely
 

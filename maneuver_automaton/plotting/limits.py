@@ -21,7 +21,7 @@ from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.places import Ground
 from maneuver_automaton.plotting.colors import GREY, Color
-from maneuver_automaton.plotting.style import line_handle
+from maneuver_automaton.plotting.style import Entries, dashed_handle
 from maneuver_automaton.problem import Bounds
 
 ZONE: Color = (0.76, 0.56, 0.02)
@@ -107,8 +107,8 @@ def draw_ground(ax: Axes, grounds: Sequence[Ground]) -> list[Artist]:
     return artists
 
 
-def ground_handles(grounds: Sequence[Ground]) -> tuple[list[Artist], list[str]]:
-    """Legend handles of ground that has a price: what each costs, and one for all rasters."""
+def ground_entries(grounds: Sequence[Ground]) -> Entries:
+    """Legend entries of ground that has a price: what each costs, and one for all rasters."""
     most = max((one.price for one in grounds if one.areas), default=1.0) or 1.0
     shades: dict[str, float] = {}
     for one in grounds:
@@ -116,22 +116,19 @@ def ground_handles(grounds: Sequence[Ground]) -> tuple[list[Artist], list[str]]:
             shades[f"ground: {one.price:g} per {one.per}"] = MOST_SHADE * one.price / most
         else:
             shades["hills" if one.raster.are_heights else "ground by a raster"] = MOST_SHADE
-    return [Patch(color=(*GROUND, shade)) for shade in shades.values()], [*shades]
+    return [(Patch(color=(*GROUND, shade)), name) for name, shade in shades.items()]
 
 
-def limit_handles(zones: Sequence[Zone], bounds: Bounds) -> tuple[list[Artist], list[str]]:
-    """Legend handles: what each kind of zone asks for, and the bounds."""
-    handles: list[Artist] = [
-        Patch(facecolor=(*ZONE, 0.10), edgecolor=(*ZONE, 0.65), hatch=2 * HATCHES[k % len(HATCHES)])
-        for k in range(len(_alike(zones)))
-    ]
-    names = [f"zone: {asks}" for asks in _alike(zones)]
+def limit_entries(zones: Sequence[Zone], bounds: Bounds) -> Entries:
+    """Legend entries: what each kind of zone asks for, and the bounds."""
+    entries: list[tuple[Artist, str]] = []
+    for k, asks in enumerate(_alike(zones)):
+        hatch = 2 * HATCHES[k % len(HATCHES)]
+        zone = Patch(facecolor=(*ZONE, 0.10), edgecolor=(*ZONE, 0.65), hatch=hatch)
+        entries.append((zone, f"zone: {asks}"))
     if bound_lines(bounds):
-        line = line_handle(GREY, width=1.1)
-        line.set_linestyle(DASHES)
-        handles.append(line)
-        names.append("bounds of the pose")
-    return handles, names
+        entries.append((dashed_handle(GREY, DASHES, width=1.1), "bounds of the pose"))
+    return entries
 
 
 def bound_lines(bounds: Bounds) -> list[Array]:
@@ -161,16 +158,7 @@ CELLS_PER_PATH = 500  # rectangles; the renderer holds so much of one path at a 
 
 
 def shape_path(shape: Shape) -> Path:
-    """The path around a shape.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Polygon
-    >>> square = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
-    >>> path = shape_path(Polygon(square, holes=[square / 2 + 1]))
-    >>> path.contains_point((0.5, 0.5)), len(path.to_polygons())
-    (True, 2)
-    """
+    """The path around a shape."""
     if isinstance(shape, Disc):
         return Path.circle((float(shape.center[0]), float(shape.center[1])), shape.radius)
     return region_path(outlines(shape))
@@ -179,7 +167,7 @@ def shape_path(shape: Shape) -> Path:
 def region_path(polygons: Sequence[Any]) -> Path:
     """The path around valid shapely polygons: outer rings to the left, holes to the right."""
     rings = [
-        _turning(ring, left=k == 0)
+        turning(ring, left=k == 0)
         for polygon in polygons
         for k, ring in enumerate(rings_of(polygon))
     ]
@@ -205,7 +193,7 @@ def moved_path(path: Path, pose: Array) -> Path:
     return Path(SE2(pose).act(np.asarray(path.vertices)), path.codes)
 
 
-def _turning(ring: Array, *, left: bool) -> Array:
+def turning(ring: Array, *, left: bool) -> Array:
     """The ring (n, 2) in the direction asked for."""
     to = ring - ring[0]
     after = np.roll(to, -1, axis=0)

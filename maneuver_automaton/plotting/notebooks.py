@@ -14,14 +14,7 @@ from maneuver_automaton.recording import recording_of
 
 
 def picture_of(value: Any) -> bytes:
-    """The picture of a value as a PNG.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Plan
-    >>> picture_of(Plan([0.0, 0.0, 0.0], (), durations=[]))[1:4]
-    b'PNG'
-    """
+    """The picture of a value as a PNG."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "picture.png"
         if isinstance(value, Automaton):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection
 from matplotlib.patches import Patch
@@ -18,6 +19,7 @@ from maneuver_automaton.collision.shapes import as_obstacles
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import Color, shaded
 from maneuver_automaton.plotting.limits import map_paths, moved_path, shape_path
+from maneuver_automaton.plotting.style import Entries
 
 SOLID: Color = (0.36, 0.38, 0.42)
 MOVING: Color = (0.44, 0.22, 0.58)
@@ -122,10 +124,13 @@ def draw_obstacles(
             [] if fleeting else [one.track(float(times[0]), float(times[-1])) for one in moving]
         )
         colors = [color for *_, color in rows]
+    # Moving shapes, each in its colour, and whether each is there.
+    drawn = PathCollection(shown, linewidths=0.7, zorder=1.9)
+    show_presence(drawn, colors, there)
     artists = ObstacleArtists(
         static=_solid([shape_path(one.shape) for one in static_shapes(known)]),
         maps=tuple(_solid(map_paths(one)) for one in known if isinstance(one, OccupancyMap)),
-        moving=moving_collection(shown, colors, there),
+        moving=drawn,
         tracks=LineCollection(
             tracks, colors=[(*MOVING, 0.45)], linewidths=0.8, linestyles=[(0, (4, 2))], zorder=1.3
         ),
@@ -155,15 +160,6 @@ def moving_shapes(obstacles: Sequence[AnyObstacle], *, fleeting: bool = False) -
     ]
 
 
-def moving_collection(
-    paths: Sequence[Path], colors: Sequence[Color], there: Sequence[bool]
-) -> PathCollection:
-    """Moving shapes, each in its colour, and whether each is there."""
-    drawn = PathCollection(paths, linewidths=0.7, zorder=1.9)
-    show_presence(drawn, colors, there)
-    return drawn
-
-
 def show_presence(drawn: PathCollection, colors: Sequence[Color], there: Sequence[bool]) -> None:
     """Give moving shapes their colours: faint and dashed those that are not there."""
     alphas = [THERE_ALPHA if here else GONE_ALPHA for here in there]
@@ -179,11 +175,6 @@ def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
     """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
 
     There are at most so many steps between them, and one more.
-
-    Examples
-    --------
-    >>> round_times(0.0, 17.3).tolist()
-    [0.0, 5.0, 10.0, 15.0, 17.3]
     """
     if not end > begin:
         return np.array([begin])
@@ -202,26 +193,24 @@ def moment_colors(count: int, *, color: Color = MOVING) -> list[Color]:
     return [shaded(color, amount) for amount in np.linspace(PALEST, DARKEST, count).tolist()]
 
 
-def obstacle_handles(
-    obstacles: Sequence[AnyObstacle], times: Array
-) -> tuple[list[Patch], list[str]]:
-    """Legend handles: obstacles, and moving ones at each of the `times` (n,) [s]."""
-    handles, names = [], []
+def obstacle_entries(obstacles: Sequence[AnyObstacle], times: Array) -> Entries:
+    """Legend entries: obstacles, and moving ones at each of the `times` (n,) [s]."""
+    entries: list[tuple[Artist, str]] = []
     moving = [one for one in obstacles if isinstance(one, Obstacle) and one.motion is not None]
     if len(moving) < len(obstacles):
-        handles.append(Patch(facecolor=SOLID))
-        names.append("obstacle")
+        entries.append((Patch(facecolor=SOLID), "obstacle"))
     if moving:
-        colors = moment_colors(len(times))
-        handles += [Patch(facecolor=(*c, THERE_ALPHA), edgecolor=shaded(c, -0.25)) for c in colors]
         later = [f"at {t:.3g} s" for t in times[1:].tolist()]
-        names += [f"moving, at {times[0]:.3g} s", *later] if later else ["moving"]
+        names = [f"moving, at {times[0]:.3g} s", *later] if later else ["moving"]
+        entries += [
+            (Patch(facecolor=(*color, THERE_ALPHA), edgecolor=shaded(color, -0.25)), name)
+            for color, name in zip(moment_colors(len(times)), names, strict=True)
+        ]
     if any(one.present_s is not None for one in moving):
-        handles.append(
-            Patch(facecolor=(*MOVING, GONE_ALPHA), edgecolor=(*MOVING, 0.6), linestyle="dashed")
-        )
-        names.append("not there at that time")
-    return handles, names
+        faint = (*MOVING, GONE_ALPHA)
+        gone = Patch(facecolor=faint, edgecolor=(*MOVING, 0.6), linestyle="dashed")
+        entries.append((gone, "not there at that time"))
+    return entries
 
 
 def _solid(paths: Sequence[Path]) -> PathCollection:

@@ -15,13 +15,14 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullFormatter
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.plotting.cast import Actor, Cast
+from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.controls import TIME_LABEL, draw_over_time, step_curves, within
 from maneuver_automaton.plotting.distances import distance_times, nearest_others
 from maneuver_automaton.plotting.paths import JUMP
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
+    Entries,
     control_labels,
     dashed_handle,
     line_handle,
@@ -30,7 +31,8 @@ from maneuver_automaton.plotting.style import (
     tidy,
 )
 from maneuver_automaton.plotting.together import HATCH
-from maneuver_automaton.recording import Curve
+from maneuver_automaton.plotting.track import TrackPiece
+from maneuver_automaton.recording import Curve, Mover
 
 MOST_STATES = 4  # panels of reduced state and controls
 RESTS, LEFT_TO_PAY = 0.66, 0.35  # shades of the vehicle's colour, towards white
@@ -44,7 +46,6 @@ MOST_ROWS = 13  # that have a number each
 ROW, LEAST_ROWS, MOST_ROWS_HIGH = 0.17, 0.6, 2.4  # heights of bars, compared with other panels
 SHORTEST_S = 1e-6  # what a clock may have missed, for the logarithm
 OWN_PANEL = ("value", "spent", "lower bound", "solve time")  # labels of curves
-Entries = list[tuple[Artist, str]]
 
 
 class Panel(NamedTuple):
@@ -52,7 +53,7 @@ class Panel(NamedTuple):
 
     draw: Callable[[Axes], object]
     height: float = 1.0
-    entries: Sequence[tuple[Artist, str]] = ()
+    entries: Entries = ()
 
 
 def panels_of(cast: Cast) -> list[Panel]:
@@ -81,7 +82,7 @@ def _quantities(cast: Cast) -> list[Panel]:
     track = one.track
     if not track.pieces:
         return []
-    states, controls = _labels(one)
+    states, controls = labels_of(one.mover, track.pieces[0])
     curves: list[tuple[str, Sequence[Array]]] = [
         (name, [np.stack([piece.time, piece.state[:, k]], axis=-1) for piece in track.pieces])
         for k, name in enumerate(states[:MOST_STATES])
@@ -103,7 +104,7 @@ def _compared(cast: Cast) -> list[Panel]:
     driving = [one for one in cast.actors if one.track.pieces]
     if not driving:
         return []
-    states, controls = _labels(driving[0])
+    states, controls = labels_of(driving[0].mover, driving[0].track.pieces[0])
     count = len(states) + len(controls)
 
     def draw(ax: Axes, k: int) -> None:
@@ -134,11 +135,10 @@ def _draw_curves(ax: Axes, *, cast: Cast, label: str) -> None:
     tidy(ax, x=TIME_LABEL, y=within(ax, said))
 
 
-def _labels(one: Actor) -> tuple[list[str], list[str]]:
+def labels_of(mover: Mover, piece: TrackPiece) -> tuple[list[str], list[str]]:
     """Labels of reduced state and controls of a vehicle."""
-    piece, model = one.track.pieces[0], one.mover.model
-    counts = piece.state.shape[1], piece.control.shape[1]
-    named = one.mover.names if model is None else (model.reduced_names, model.control_names)
+    counts, model = (piece.state.shape[1], piece.control.shape[1]), mover.model
+    named = mover.names if model is None else (model.reduced_names, model.control_names)
     return tuple(  # type: ignore[return-value]
         control_labels(names) if len(names) == count else [f"{kind} {k + 1}" for k in range(count)]
         for names, count, kind in zip(named, counts, ("state", "control"), strict=True)
@@ -147,7 +147,7 @@ def _labels(one: Actor) -> tuple[list[str], list[str]]:
 
 def _values(cast: Cast) -> Panel:
     """What is left to pay, one vehicle's upon another's, what was spent, and the sum of both."""
-    entries: Entries = [
+    entries: list[tuple[Artist, str]] = [
         (Patch(facecolor=shaded(GREY, LEFT_TO_PAY)), "left to pay (value)"),
         (line_handle(GREY, width=1.6), "spent"),
         (dashed_handle(INK, (0, (4, 2)), width=1.0), "sum"),
@@ -214,7 +214,7 @@ def _draw_solve_times(ax: Axes, cast: Cast, curve: Curve) -> None:
 
 def _bars(cast: Cast) -> Panel:
     """A bar for each vehicle from when it may leave until it arrives; rests are light."""
-    entries: Entries = []
+    entries: list[tuple[Artist, str]] = []
     if any(rests for one in cast.actors for *_, rests in one.spans):
         entries.append((Patch(facecolor=shaded(GREY, RESTS - 0.1)), "rests (light)"))
     kinds = {event.kind for event in cast.recording.events}
@@ -292,7 +292,7 @@ def _name_rows(ax: Axes, cast: Cast) -> None:
 def _distances(cast: Cast) -> Panel:
     """The least distance of any two bodies, measured by shapely every 0.05 s, and the margin."""
     margin = cast.recording.world.margin
-    entries: Entries = [
+    entries: list[tuple[Artist, str]] = [
         (line_handle(INK, width=1.3), "nearest two bodies"),
         (line_handle(MARGIN, width=1.0), f"margin, {margin:g} m"),
     ]

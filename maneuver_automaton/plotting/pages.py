@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -21,7 +20,14 @@ from matplotlib.figure import Figure
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.plotting.colors import INK
 from maneuver_automaton.plotting.look import HEAD_PT, TITLE_PT, Look
-from maneuver_automaton.plotting.style import NAME_LENGTH, SMALL_PT, TEXT_PT, plain
+from maneuver_automaton.plotting.style import (
+    CHARACTER,
+    NAME_LENGTH,
+    SMALL_PT,
+    TEXT_PT,
+    Entries,
+    plain,
+)
 
 DPI = 130
 # text as text, in fonts that journals take; the same picture gives the same bytes
@@ -45,13 +51,6 @@ def new_figure(width: float, height: float) -> Figure:
     figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
-
-
-def hide_times(column: Sequence[Axes]) -> None:
-    """Leave the times to the axes below."""
-    for ax in column:
-        ax.set_xlabel("")
-        ax.tick_params(labelbottom=False)
 
 
 def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
@@ -83,13 +82,17 @@ class Page:
     def share_times(self) -> None:
         """Leave the times to the lowest of panels that stand above each other."""
         if self.is_stacked:
-            hide_times(self.panels[:-1])
+            # Leave the times to the axes below.
+            column = self.panels[:-1]
+            for ax in column:
+                ax.set_xlabel("")
+                ax.tick_params(labelbottom=False)
 
 
 def page_of(
     look: Look,
     lines: Sequence[str],
-    legend: tuple[Sequence[Artist], Sequence[str]],
+    legend: Entries,
     *,
     shape: float,
     panels: Sequence[float] = (),
@@ -143,7 +146,7 @@ def page_of(
 def space_page(
     look: Look,
     lines: Sequence[str],
-    legend: tuple[Sequence[Artist], Sequence[str]],
+    legend: Entries,
     *,
     shape: float,
 ) -> Page:
@@ -181,12 +184,10 @@ def plain_page(
     return figure, figure.subplot_mosaic(mosaic, empty_sentinel="", **ratios)
 
 
-def _framed(
-    look: Look, lines: Sequence[str], legend: tuple[Sequence[Artist], Sequence[str]]
-) -> tuple[Figure, float, float]:
+def _framed(look: Look, lines: Sequence[str], legend: Entries) -> tuple[Figure, float, float]:
     """A figure with heading and legend, and the heights [in] that these take."""
     figure, top = _headed(look, lines, look.width)
-    return figure, top, _legend_below(figure, *legend) + EDGE
+    return figure, top, _legend_below(figure, legend) + EDGE
 
 
 def _headed(look: Look, lines: Sequence[str], width: float) -> tuple[Figure, float]:
@@ -203,7 +204,7 @@ def _headed(look: Look, lines: Sequence[str], width: float) -> tuple[Figure, flo
 
 def _settle(figure: Figure, height: float, top: float) -> None:
     """Give a figure its height [in], of which the axes have what is below the heading."""
-    height = even_height(height)
+    height = 2.0 * round(height * DPI / 2.0) / DPI
     figure.set_figheight(height)
     left, low = EDGE / figure.get_figwidth(), EDGE / height
     rect = (left, low, 1.0 - 2.0 * left, 1.0 - low - top / height)
@@ -212,22 +213,20 @@ def _settle(figure: Figure, height: float, top: float) -> None:
         text.set_y(1.0 - (1.0 - text.get_position()[1]) * FIRST / height)
 
 
-def even_height(inches: float) -> float:
-    """A height that is an even number of pixels, as films need it."""
-    return 2.0 * round(inches * DPI / 2.0) / DPI
-
-
-def _legend_below(figure: Figure, handles: Sequence[Artist], labels: Sequence[str]) -> float:
+def _legend_below(figure: Figure, entries: Entries) -> float:
     """Put a legend along the lower edge, and return its height [in]."""
-    if not labels:
+    if not entries:
         return 0.0
+    longest = max(min(len(name), NAME_LENGTH) for _, name in entries)
+    most = int((figure.get_figwidth() - 2.0 * EDGE) / (CHARACTER * longest + 0.44))
+    rows = math.ceil(len(entries) / max(1, min(len(entries), most)))
     legend = figure.legend(
-        handles, [str(k) for k in range(len(labels))], loc="outside lower left", frameon=False,
-        borderaxespad=1.0,
-        ncols=_columns(labels, figure.get_figwidth() - 2.0 * EDGE, NAME_LENGTH),
-        fontsize=SMALL_PT, borderpad=0.0, handlelength=1.8, columnspacing=1.6, labelspacing=0.45,
+        [handle for handle, _ in entries], [str(k) for k in range(len(entries))],
+        loc="outside lower left", frameon=False, borderaxespad=1.0,
+        ncols=math.ceil(len(entries) / rows), fontsize=SMALL_PT, borderpad=0.0, handlelength=1.8,
+        columnspacing=1.6, labelspacing=0.45,
     )  # fmt: skip
-    plain(legend, labels)
+    plain(legend, entries)
     with any_script():
         return float(legend.get_window_extent().height / figure.dpi)
 
@@ -251,15 +250,7 @@ def settled(figure: Figure) -> Figure:
 
 
 def write_figure(figure: Figure, path: str | Path) -> None:
-    """Write `figure` to `path`, by its ending (.png, .pdf, .svg; .png if there is none).
-
-    Raises
-    ------
-    ValueError
-        If Matplotlib does not know the ending.
-    OSError
-        If the file cannot be written; an old one stays as it was.
-    """
+    """Write `figure` to `path`, by its ending (.png, .pdf, .svg; .png if there is none)."""
     target = Path(path)
     ending = target.suffix.lstrip(".").lower() or "png"
     stream = io.BytesIO()
@@ -270,9 +261,3 @@ def write_figure(figure: Figure, path: str | Path) -> None:
         else:
             figure.savefig(stream, format=ending, metadata=UNDATED.get(ending))
     write_bytes_atomically(target, stream.getvalue())
-
-
-def _columns(labels: Sequence[str], width: float, length: int) -> int:
-    longest = max((min(len(label), length) for label in labels), default=1)
-    most = max(1, min(len(labels), int(width / (0.062 * longest + 0.44))))
-    return math.ceil(len(labels) / math.ceil(len(labels) / most))

@@ -7,10 +7,8 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from maneuver_automaton._arrays import Array, wrapped
@@ -20,7 +18,13 @@ from maneuver_automaton.plotting.ends import SET, draw_ends
 from maneuver_automaton.plotting.footprint import footprint_polygons, merged, placed, swept_region
 from maneuver_automaton.plotting.limits import region_path
 from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
-from maneuver_automaton.plotting.style import dashed_handle, line_handle, mark_handle, shown_name
+from maneuver_automaton.plotting.style import (
+    Entries,
+    dashed_handle,
+    line_handle,
+    mark_handle,
+    shown_name,
+)
 from maneuver_automaton.plotting.track import Track, TrackPiece
 
 SPIN_RADIUS, ARC_POINTS, MOST_SPINS = 0.09, 61, 12  # of the size; more cannot be told apart
@@ -120,47 +124,46 @@ def _steps_of(ax: Axes, cast: Cast, one: Actor) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def path_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], list[str]]:
-    """Legend handles and names of the only vehicle of a cast: its trims, its body, its steps.
+def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
+    """Legend entries of the only vehicle of a cast: its trims, its body, its steps.
 
     In a film the trims alone, if they are few.
     """
     one, scene = cast.actors[0], cast.scene
-    handles, names = trim_handles(one.track, cast.colors)
+    entries = [*trim_entries(one.track, cast.colors)]
     if moving:
-        few = len(names) <= MOST_TRIMS
-        return ([*handles], names) if few else ([], [])
-    more: list[tuple[Artist, str]] = []
+        return entries if len(entries) <= MOST_TRIMS else []
     swept = bool(scene.body and one.track.pieces)
     if swept:
         names_of_parts = [part.name.replace("_", " ") for part in scene.carried]
         by = f" and the {names_of_parts[0]}" if names_of_parts else ""
         by = " and all that it pulls" if len(names_of_parts) > 1 else by
-        more.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), f"swept by the body{by}"))
+        entries.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), f"swept by the body{by}"))
     if swept and scene.moves:
         said = "body at the same times"
-        more.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), said))
+        entries.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), said))
     if one.held:
-        more.append((line_handle(GREY, width=0.9), "plan of a step"))
+        entries.append((line_handle(GREY, width=0.9), "plan of a step"))
     if any(event.kind == "replanned" for event in cast.recording.events):
         ring = mark_handle("o", size=5.0)
         ring.set(linestyle=HELD_STYLE, linewidth=0.9, color=INK)
-        more.append((ring, "replanned"))
+        entries.append((ring, "replanned"))
     if one.jumps:
-        more.append((dashed_handle(JUMP, JUMP_STYLE, width=1.5), "disturbance"))
-    return [*handles, *(handle for handle, _ in more)], [*names, *(name for _, name in more)]
+        entries.append((dashed_handle(JUMP, JUMP_STYLE, width=1.5), "disturbance"))
+    return entries
 
 
-def trim_handles(track: Track, colors: Mapping[str, Color]) -> tuple[list[Line2D], list[str]]:
-    """Legend handles and names of the trims of a `track` that can be seen, in order.
+def trim_entries(track: Track, colors: Mapping[str, Color]) -> Entries:
+    """Legend entries of the trims of a `track` that can be seen, in order.
 
     Of how they move, if they are many.
     """
     symbols = {piece.name: _symbol(piece) for piece in reversed(track.pieces)}
     seen = {name: twist for name, twist in track.twists.items() if name in track.seen}
-    entries = motion_names(seen, many=len(colors) > MOST_TRIMS)
-    handles = [line_handle(colors[name], marker=symbols[name]) for name in entries.values()]
-    return handles, [shown_name(name) for name in entries]
+    return [
+        (line_handle(colors[name], marker=symbols[name]), shown_name(said))
+        for said, name in motion_names(seen, many=len(colors) > MOST_TRIMS).items()
+    ]
 
 
 def _symbol(piece: TrackPiece) -> str:
@@ -276,7 +279,7 @@ def _step_bodies(one: Actor, *, size: float) -> PolyCollection:
     outlines = placed(body, poses[shown])
     for part in one.parts[1:]:
         at = np.array([*(piece.start for piece in part.pieces), part.end])
-        outlines += placed(footprint_polygons(list(part.bodies[""])), at[shown])
+        outlines += placed(footprint_polygons(part.bodies[""]), at[shown])
     return PolyCollection(
         outlines, facecolors=[(*GREY, 0.06 if one.body else 0.35)], edgecolors=[(*INK, 0.55)],
         linewidths=0.7, zorder=2.0,

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 
 from maneuver_automaton.plotting.cast import MARGIN, Cast, cast_of, cast_of_alternatives
 from maneuver_automaton.plotting.look import Look
-from maneuver_automaton.plotting.over_time import Panel, panels_of
+from maneuver_automaton.plotting.over_time import panels_of
 from maneuver_automaton.plotting.pages import EDGE, page_of, write_figure
 from maneuver_automaton.plotting.plane import draw_cast, plane_entries
 from maneuver_automaton.plotting.searches import draw_cost_bar
@@ -102,10 +101,13 @@ def figure_of(result: Any, *, look: Look | None = None, view: str = "plane") -> 
 def _figure(cast: Cast, lines: Sequence[str], look: Look) -> Figure:
     panels = panels_of(cast)
     wide, high = np.ptp(cast.box, axis=0) * (1.0 + 2.0 * MARGIN)
+    entries = [*plane_entries(cast)]
+    known = {name for _, name in entries}
+    entries += [row for panel in panels for row in panel.entries if row[1] not in known]
     page = page_of(
         look,
         lines,
-        _legend(cast, panels),
+        entries,
         shape=max(float(wide), 1e-9) / max(float(high), 1e-9),
         panels=[panel.height for panel in panels],
     )
@@ -116,15 +118,6 @@ def _figure(cast: Cast, lines: Sequence[str], look: Look) -> Figure:
     if (ticks := artists.get("nodes")) is not None and ticks.get_array() is not None:
         draw_cost_bar(page.figure, page.plane, ticks)
     return page.figure
-
-
-def _legend(cast: Cast, panels: Sequence[Panel]) -> tuple[list[Artist], list[str]]:
-    handles, names = plane_entries(cast)
-    rows = dict.fromkeys(names)
-    for handle, name in (row for panel in panels for row in panel.entries):
-        if name not in rows:
-            handles, names = [*handles, handle], [*names, name]
-    return handles, names
 
 
 def heading_of(recording: Recording, look: Look) -> list[str]:

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import PathCollection, PolyCollection
 from matplotlib.patches import Patch
 
 from maneuver_automaton.plotting.cast import Cast, cast_of, set_view
 from maneuver_automaton.plotting.colors import INK, LANE, SEQUENCE
-from maneuver_automaton.plotting.ends import end_handles
+from maneuver_automaton.plotting.ends import end_entries
 from maneuver_automaton.plotting.limits import (
     draw_ground,
     draw_limits,
-    ground_handles,
-    limit_handles,
+    ground_entries,
+    limit_entries,
     shape_path,
 )
-from maneuver_automaton.plotting.obstacles import draw_obstacles, obstacle_handles
+from maneuver_automaton.plotting.obstacles import draw_obstacles, obstacle_entries
 from maneuver_automaton.plotting.paths import draw_path, path_entries
 from maneuver_automaton.plotting.searches import draw_nodes
-from maneuver_automaton.plotting.style import SMALL_PT, outer_legend
+from maneuver_automaton.plotting.style import SMALL_PT, Entries, outer_legend
 from maneuver_automaton.plotting.together import draw_vehicles, vehicle_entries
 from maneuver_automaton.recording import Search, recording_of
 
@@ -68,7 +66,7 @@ def draw_plane(ax: Axes, result: Any, *, legend: bool = True) -> dict[str, Any]:
     cast = cast_of(recording_of(result))
     artists = draw_cast(ax, cast)
     if legend:
-        outer_legend(ax, *plane_entries(cast))
+        outer_legend(ax, plane_entries(cast))
     return artists
 
 
@@ -119,32 +117,23 @@ def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
     return parts | {f"zone {k}": one for k, one in enumerate(limits.zones)}
 
 
-def plane_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], list[str]]:
-    """Legend handles and names of all that is in the plane, or in a film of it: `moving`."""
-    scene, world = cast.scene, cast.recording.world
+def plane_entries(cast: Cast, *, moving: bool = False) -> Entries:
+    """Legend entries of all that is in the plane, or in a film of it: `moving`."""
+    scene, world, search = cast.scene, cast.recording.world, cast.recording.search
     if cast.is_alone:
-        driven = path_entries(cast, moving=moving)
-        ends = end_handles(scene.goals, scene.via)
+        driven, ends = path_entries(cast, moving=moving), end_entries(scene.goals, scene.via)
     else:
-        driven, ends = vehicle_entries(cast, moving=moving), ([], [])
-    lanes = ([Patch(facecolor=LANE)], ["lane"]) if world.lanes else ([], [])
-    around = obstacle_handles(scene.obstacles, scene.times[:1] if moving else scene.times)
-    limits, ground = limit_handles(scene.zones, scene.bounds), ground_handles(world.ground)
-    rows: list[tuple[Sequence[Artist], Sequence[str]]] = [
-        driven,
-        ends,
-        lanes,
-        around,
-        ground,
-        limits,
+        driven, ends = vehicle_entries(cast, moving=moving), []
+    reached = not moving and search is not None and search.reached is not None
+    return [
+        *driven,
+        *ends,
+        *([(Patch(facecolor=LANE), "lane")] if world.lanes else []),
+        *obstacle_entries(scene.obstacles, scene.times[:1] if moving else scene.times),
+        *ground_entries(world.ground),
+        *limit_entries(scene.zones, scene.bounds),
+        *([(Patch(color=REACHED), "may be reached")] if reached else []),
     ]
-    if (
-        not moving
-        and cast.recording.search is not None
-        and cast.recording.search.reached is not None
-    ):
-        rows.append(([Patch(color=REACHED)], ["may be reached"]))
-    return [one for row in rows for one in row[0]], [name for row in rows for name in row[1]]
 
 
 def _draw_search(ax: Axes, search: Search) -> dict[str, Any]:

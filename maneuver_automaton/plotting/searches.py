@@ -23,15 +23,7 @@ TICK_IN = 0.05  # [in] length of a tick
 
 
 def draw_nodes(ax: Axes, nodes: ArrayLike, *, cost: ArrayLike | None = None) -> Quiver:
-    """Draw expanded `nodes` on `ax`, which keeps its limits: ticks that point where each heads.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> ticks = draw_nodes(Figure().add_subplot(), [[0, 0, 0], [1, 2, 0.5]], cost=[0.0, 3.0])
-    >>> ticks.get_offsets().tolist(), ticks.get_clim()
-    ([[0.0, 0.0], [1.0, 2.0]], (0.0, 3.0))
-    """
+    """Draw expanded `nodes` on `ax`, which keeps its limits: ticks that point where each heads."""
     poses = as_array("nodes", nodes, last=3)
     if poses.ndim != 2:
         raise ValueError(f"nodes: got shape {poses.shape}, need (n, 3)")

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
@@ -22,11 +21,11 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.ends import WAY
-from maneuver_automaton.plotting.limits import shape_path
+from maneuver_automaton.plotting.limits import shape_path, turning
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import space_page
-from maneuver_automaton.plotting.paths import trim_handles
-from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, line_handle, tidy
+from maneuver_automaton.plotting.paths import trim_entries
+from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, Entries, line_handle, tidy
 from maneuver_automaton.recording import recording_of
 
 ELEVATION, AZIMUTH = 42.0, -68.0  # [deg] from where space is seen
@@ -83,11 +82,21 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
             inner.append(shaded(BUILDING, shade))
             rims.append((*shaded(BUILDING, -0.25), 0.5))
     for places, color, width in _strokes(cast, ground=float(low[2])):
-        faces.append(_ribbon(places, width * size))
+        # A stroke (2, 3) as a face (4, 3) that is seen from the front.
+        azimuth, elevation = math.radians(AZIMUTH), math.radians(ELEVATION)
+        level = math.cos(elevation)
+        seen = [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)]
+        aside = np.cross(places[1] - places[0], seen)
+        length = float(np.linalg.norm(aside))
+        aside = 0.5 * (width * size) * aside / length if length > 0.0 else np.zeros(3)
+        faces.append(
+            np.array([places[0] - aside, places[1] - aside, places[1] + aside, places[0] + aside])
+        )
         inner.append(color)
         rims.append((*color, 1.0))
+    longest = max((len(face) for face in faces), default=0)
     collection = Poly3DCollection(
-        _as_long_as_the_longest(faces),
+        [np.pad(face, ((0, longest - len(face)), (0, 0)), mode="edge") for face in faces],
         facecolors=inner,
         edgecolors=rims,
         linewidths=RIM,
@@ -108,7 +117,14 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     ax.set_box_aspect(tuple(high - low), zoom=1.32)
     ax.view_init(elev=ELEVATION, azim=AZIMUTH)
-    _bare_axes(ax)
+    # Faint panes and small numbers.
+    for axis, name in ((ax.xaxis, "x [m]"), (ax.yaxis, "y [m]"), (ax.zaxis, "altitude [m]")):
+        axis.set_label_text(name, fontsize=TEXT_PT, color=INK)
+        axis.set_tick_params(labelsize=SMALL_PT, labelcolor=INK, pad=0.0)
+        axis.pane.set_facecolor((0.965, 0.97, 0.975, 1.0))
+        axis.pane.set_edgecolor((*GREY, 0.4))
+        axis._axinfo["grid"].update(color=(*GREY, 0.25), linewidth=0.5)
+    ax.locator_params(axis="z", nbins=4)
     for part in ax.get_children():  # what stands out of its box makes it no smaller
         part.set_in_layout(False)
     return collection
@@ -191,23 +207,6 @@ def _parts(places: Array) -> list[Array]:
     return [even[k : k + 2] for k in range(count - 1)]
 
 
-def _ribbon(places: Array, width: float) -> Array:
-    """A stroke (2, 3) as a face (4, 3) that is seen from the front."""
-    azimuth, elevation = math.radians(AZIMUTH), math.radians(ELEVATION)
-    level = math.cos(elevation)
-    seen = [level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation)]
-    aside = np.cross(places[1] - places[0], seen)
-    length = float(np.linalg.norm(aside))
-    aside = 0.5 * width * aside / length if length > 0.0 else np.zeros(3)
-    return np.array([places[0] - aside, places[1] - aside, places[1] + aside, places[0] + aside])
-
-
-def _as_long_as_the_longest(faces: list[Array]) -> list[Array]:
-    """Faces (k, 3) with as many corners each; a shorter one stays in its last corner."""
-    longest = max((len(face) for face in faces), default=0)
-    return [np.pad(face, ((0, longest - len(face)), (0, 0)), mode="edge") for face in faces]
-
-
 def _prism(obstacle: Obstacle, bottom: float, top: float) -> list[tuple[Array, float]]:
     """Faces (n, 3) of an upright prism, walls in pieces, each with its shade."""
     ring = _ring(obstacle)
@@ -237,9 +236,7 @@ def _ring(obstacle: Obstacle) -> Array:
     ring = np.asarray(shape_path(obstacle.shape).to_polygons()[0])[:-1]
     if obstacle.motion is not None:
         ring = np.asarray(SE2(obstacle.motion.pose[0]).act(ring))
-    after = np.roll(ring, -1, axis=0)
-    area = float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum())
-    return ring if area > 0.0 else ring[::-1]
+    return turning(ring, left=True)
 
 
 def _height(obstacle: Any) -> tuple[float, float] | None:
@@ -250,22 +247,18 @@ def _standing(cast: Cast) -> list[Obstacle]:
     return [one for one in cast.scene.obstacles if isinstance(one, Obstacle)]
 
 
-def _entries(cast: Cast) -> tuple[list[Artist], list[str]]:
-    handles: list[Artist]
-    if cast.is_alone:
-        handles, names = trim_handles(cast.actors[0].track, cast.colors)  # type: ignore[assignment]
-    else:
-        named = [] if cast.is_many else cast.actors
-        handles, names = [line_handle(one.color) for one in named], [one.name for one in named]
-    for color, marker in ((START, "o"), (GOAL, "*")):
-        handle = line_handle(color if cast.is_alone else INK, marker=marker)
-        handle.set_markerfacecolor(color if cast.is_alone else INK)
-        handles.append(handle)
+def _entries(cast: Cast) -> Entries:
+    alone = cast.is_alone
+    named = [] if cast.is_many or alone else cast.actors
+    entries = [*trim_entries(cast.actors[0].track, cast.colors)] if alone else []
+    entries += [(line_handle(one.color), one.name) for one in named]
+    for color, marker, name in ((START, "o", "start"), (GOAL, "*", "goal")):
+        handle = line_handle(color if alone else INK, marker=marker)
+        handle.set_markerfacecolor(color if alone else INK)
+        entries.append((handle, name))
     if any(one.mover.via for one in cast.actors):
-        handles.append(line_handle(WAY, marker="s"))
-        names = [*names, "start", "goal", "on the way"]
-        return handles, names
-    return handles, [*names, "start", "goal"]
+        entries.append((line_handle(WAY, marker="s"), "on the way"))
+    return entries
 
 
 def _box(cast: Cast) -> tuple[Array, Array]:
@@ -295,14 +288,3 @@ def _mark(ax: Axes3D, pose: Array, color: Color, marker: str) -> Line2D:
         zorder=10, clip_on=False,
     )  # fmt: skip
     return mark
-
-
-def _bare_axes(ax: Axes3D) -> None:
-    """Faint panes and small numbers."""
-    for axis, name in ((ax.xaxis, "x [m]"), (ax.yaxis, "y [m]"), (ax.zaxis, "altitude [m]")):
-        axis.set_label_text(name, fontsize=TEXT_PT, color=INK)
-        axis.set_tick_params(labelsize=SMALL_PT, labelcolor=INK, pad=0.0)
-        axis.pane.set_facecolor((0.965, 0.97, 0.975, 1.0))
-        axis.pane.set_edgecolor((*GREY, 0.4))
-        axis._axinfo["grid"].update(color=(*GREY, 0.25), linewidth=0.5)
-    ax.locator_params(axis="z", nbins=4)

@@ -20,6 +20,9 @@ TEXT_PT = 9.0
 SMALL_PT = 8.0
 FAR_M = 1e5  # from here on coordinates are counted from a round number
 NAME_LENGTH = 60  # characters of a name before it is cut
+Entries = Sequence[tuple[Artist, str]]
+"""What a legend shows: handles and names."""
+
 LEAST_SHARE = 0.3  # of the width of axes that a legend beside them leaves
 CHARACTER, ROW = 0.062, 0.19  # [in] of a character in a legend, and from row to row
 
@@ -84,22 +87,15 @@ def mark_handle(marker: str, *, size: float, edge: Color = INK, face: Any = "whi
     )  # fmt: skip
 
 
-def plain(legend: Legend, labels: Sequence[str], *, length: int = NAME_LENGTH) -> Legend:
-    """The `legend` with `labels` as they are: no mathematics, no hidden leading underscore."""
-    for text, label in zip(legend.get_texts(), labels, strict=True):
+def plain(legend: Legend, entries: Entries) -> Legend:
+    """The `legend` with names as they are: no mathematics, no hidden leading underscore."""
+    for text, (_, label) in zip(legend.get_texts(), entries, strict=True):
         text.set_parse_math(False)
-        text.set_text(shortened(label, length))
+        text.set_text(shortened(label))
     return legend
 
 
-def outer_legend(
-    ax: Axes,
-    handles: Sequence[Artist],
-    labels: Sequence[str],
-    *,
-    above: bool = False,
-    length: int = NAME_LENGTH,
-) -> Legend:
+def outer_legend(ax: Axes, entries: Entries, *, above: bool = False) -> Legend:
     """A legend on the right of `ax`, or `above` it, never over what is drawn.
 
     The axes make room for it unless a layout engine does, or too little of them were left.
@@ -108,10 +104,11 @@ def outer_legend(
     assert figure is not None
     wide, high = figure.get_size_inches()
     place = ax.get_position()
-    longest = max((min(len(label), length) for label in labels), default=1)
+    longest = max((min(len(name), NAME_LENGTH) for _, name in entries), default=1)
     if above:
-        columns = max(1, min(len(labels), int(place.width * wide / (CHARACTER * longest + 0.5))))
-        room = (0.0, (ROW * math.ceil(len(labels) / columns) + 0.08) / high)
+        columns = int(place.width * wide / (CHARACTER * longest + 0.5))
+        columns = max(1, min(len(entries), columns))
+        room = (0.0, (ROW * math.ceil(len(entries) / columns) + 0.08) / high)
     else:
         columns, room = 1, ((CHARACTER * longest + 0.6) / wide, 0.0)
     width, height = place.width - room[0], place.height - room[1]
@@ -119,8 +116,8 @@ def outer_legend(
     if figure.get_layout_engine() is None and enough:
         ax.set_position((place.x0, place.y0, width, height))
     legend = ax.legend(
-        handles,
-        [str(k) for k in range(len(labels))],
+        [handle for handle, _ in entries],
+        [str(k) for k in range(len(entries))],
         loc="lower left" if above else "upper left",
         bbox_to_anchor=(0.0, 1.0) if above else (1.02, 1.0),
         ncols=columns,
@@ -132,7 +129,7 @@ def outer_legend(
         columnspacing=1.2,
         handlelength=1.6,
     )
-    return plain(legend, labels, length=length)
+    return plain(legend, entries)
 
 
 UNITS = {
@@ -168,13 +165,7 @@ POLISHED = "polished"  # what planning calls a motion by optimal control
 
 
 def control_labels(names: Sequence[str]) -> list[str]:
-    """Axis labels of controls: words, with the unit of those whose name says what they are.
-
-    Examples
-    --------
-    >>> control_labels(["turn_rate", "thrust"])
-    ['turn rate [rad/s]', 'thrust']
-    """
+    """Axis labels of controls: words, with the unit of those whose name says what they are."""
     return [
         name.replace("_", " ") + (f" [{UNITS[name]}]" if name in UNITS else "") for name in names
     ]

@@ -18,7 +18,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Actor, Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.paths import HELD_STYLE, JUMP, JUMP_STYLE
-from maneuver_automaton.plotting.style import dashed_handle, line_handle, mark_handle
+from maneuver_automaton.plotting.style import Entries, dashed_handle, line_handle, mark_handle
 
 TINY = 0.008  # of the picture: smaller bodies are marks at starts and goals
 HATCH = "/////"
@@ -94,8 +94,8 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
     return artists
 
 
-def vehicle_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], list[str]]:
-    """Legend handles and names: the vehicles if they are few, and what the marks say.
+def vehicle_entries(cast: Cast, *, moving: bool = False) -> Entries:
+    """Legend entries: the vehicles if they are few, and what the marks say.
 
     `moving`: in a film, where bodies stand along no path.
     """
@@ -122,7 +122,7 @@ def vehicle_entries(cast: Cast, *, moving: bool = False) -> tuple[list[Artist], 
         rows.append((dashed_handle(shaded(GREY, HELD), HELD_STYLE, width=1.0), "plan held"))
     if any(one.jumps for one in actors):
         rows.append((dashed_handle(JUMP, JUMP_STYLE, width=1.3), "disturbance"))
-    return [handle for handle, _ in rows], [name for _, name in rows]
+    return rows
 
 
 def _between(one: Actor, times: Array) -> list[float]:

@@ -167,7 +167,15 @@ def joined_track(start: Array, plans: Sequence[Plan]) -> Track:
     for plan in plans:
         for k, piece in enumerate(track_of_plan(plan).pieces):
             if k == 0 and pieces and _goes_on(pieces[-1], piece):
-                pieces[-1] = _one_piece(pieces[-1], piece)
+                one = pieces[-1]
+                pieces[-1] = TrackPiece(
+                    name=one.name,
+                    twist=one.twist,
+                    time=np.concatenate([one.time, piece.time[1:]]),
+                    pose=np.concatenate([one.pose, piece.pose[1:]]),
+                    control=np.concatenate([one.control, piece.control[1:]]),
+                    state=np.concatenate([one.state, piece.state[1:]]),
+                )
             else:
                 pieces.append(piece)
     return Track(start, tuple(pieces))
@@ -179,17 +187,6 @@ def _goes_on(one: TrackPiece, other: TrackPiece) -> bool:
         one.name == other.name
         and abs(one.time[-1] - other.time[0]) <= END_TOLERANCE * (1.0 + abs(one.time[-1]))
         and np.abs(one.pose[-1] - other.pose[0]).max() <= END_TOLERANCE * scale
-    )
-
-
-def _one_piece(one: TrackPiece, other: TrackPiece) -> TrackPiece:
-    return TrackPiece(
-        name=one.name,
-        twist=one.twist,
-        time=np.concatenate([one.time, other.time[1:]]),
-        pose=np.concatenate([one.pose, other.pose[1:]]),
-        control=np.concatenate([one.control, other.control[1:]]),
-        state=np.concatenate([one.state, other.state[1:]]),
     )
 
 
@@ -268,7 +265,13 @@ class _Run(NamedTuple):
 
 def _runs(samples: _Samples) -> list[_Run]:
     """Runs of one gear and one turn; a single one unless the gear or the side changes."""
-    cuts = _turning_points(samples)
+    # Where the direction of travel changes, among the samples.
+    steps = np.diff(samples.pose[:, :2], axis=0)
+    heading = samples.pose[:-1, 2]
+    ahead = np.cos(heading) * steps[:, 0] + np.sin(heading) * steps[:, 1]
+    driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
+    changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
+    cuts = [int(driven[k + 1]) for k in changes]
     bounds = [0, *cuts, len(samples.time) - 1]
     runs = [run for first, last in pairwise(bounds) for run in _turns(samples, first, last)]
     sides = {run.turn for run in runs}
@@ -310,16 +313,6 @@ def _joined(runs: Sequence[_Run]) -> list[_Run]:
         _Run(alike[0].first, alike[-1].last, turn)
         for turn, alike in ((turn, list(some)) for turn, some in groupby(runs, lambda r: r.turn))
     ]
-
-
-def _turning_points(samples: _Samples) -> list[int]:
-    """Where the direction of travel changes, among the samples."""
-    steps = np.diff(samples.pose[:, :2], axis=0)
-    heading = samples.pose[:-1, 2]
-    ahead = np.cos(heading) * steps[:, 0] + np.sin(heading) * steps[:, 1]
-    driven = np.flatnonzero(np.abs(ahead) > TURNING_M)
-    changes = np.flatnonzero(np.diff(np.sign(ahead[driven])))
-    return [int(driven[k + 1]) for k in changes]
 
 
 def _held(control: Array) -> Array:

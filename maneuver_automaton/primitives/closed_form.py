@@ -112,14 +112,7 @@ def differing(maneuvers: Sequence[Maneuver], others: Sequence[Maneuver]) -> tupl
 
 
 def has_limited_rates(model: Model) -> bool:
-    """Whether the control is the rate of the reduced state, component by component, and limited.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SingleTrack, Unicycle
-    >>> has_limited_rates(Unicycle()), has_limited_rates(SingleTrack())
-    (False, False)
-    """
+    """Whether the control is the rate of the reduced state, component by component, and limited."""
     n = len(model.reduced_names)
     if n == 0 or n != len(model.control_names) or not np.isfinite(model.control_limits).all():
         return False
@@ -450,20 +443,6 @@ def quickest_maneuvers(
 
     In narrow places a maneuver between speed trims is longer than the room there is: short
     strokes are what parking is made of.
-
-    Parameters
-    ----------
-    model : Model
-        A vehicle whose control is the rate of its reduced state.
-    trims : sequence of Trim
-        Its trims.
-    pairs : "all", "neighbours" or a sequence of pairs of int
-        See `connect_bang_bang`.
-    late : bool
-        Whether to add the maneuvers that are as quick but change late what has time, where these
-        lead elsewhere.
-    strokes, turns : sequences of float
-        Lengths, negative in reverse [m], and angles of turns on the spot [rad].
 
     Examples
     --------

@@ -56,14 +56,7 @@ def _rates(model: Model) -> VectorField:
 
 
 def pieces(time: Array, control: Array) -> list[tuple[float, float, Array]]:
-    """Stretches (begin, end, control) of one control each, of samples in time.
-
-    Examples
-    --------
-    >>> time, control = np.array([0.0, 1.0, 2.0, 3.0]), np.array([[1.0], [1.0], [2.0], [2.0]])
-    >>> [(begin, end, u.tolist()) for begin, end, u in pieces(time, control)]
-    [(0.0, 2.0, [1.0]), (2.0, 3.0, [2.0])]
-    """
+    """Stretches (begin, end, control) of one control each, of samples in time."""
     changes = 1 + np.flatnonzero((control[1:-1] != control[:-2]).any(axis=-1))
     firsts = [0, *changes.tolist()]
     lasts = [*changes.tolist(), time.size - 1]
@@ -142,40 +135,6 @@ def connect(
     a step fails it is tried again from other guesses and with limits drawn in.
 
     Source: Frazzoli, Dahleh, Feron (2005), Sec. III-B.
-
-    Parameters
-    ----------
-    model : Model
-        The vehicle.
-    source, target : Trim
-        Two trims of different reduced state.
-    objective : ManeuverObjective, optional
-        Least time if left out.
-    settings : TransferSettings, optional
-        Intervals and bounds of the duration.
-    program : TransferProgram, optional
-        What `transfer_program` made of the three above, so that it is not made again.
-    control_limits : (n_u, 2) array, optional
-        Narrower limits than the model's, say to go one way only.
-
-    Raises
-    ------
-    MissingExtra
-        If CasADi is not installed.
-    ValueError
-        If the trims do not fit the model, or are of one class.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.groups import SE2
-    >>> from maneuver_automaton.models import UserModel
-    >>> cart = UserModel(name="cart", group=SE2, control_names=("push",), reduced_names=("speed",),
-    ...                  velocity=lambda z, u: [z[0], 0.0, 0.0], dynamics=lambda z, u: [u[0]],
-    ...                  control_limits=[[-2.0, 2.0]])
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0.0], reduced_state=[0.0])
-    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0.0], reduced_state=[1.0])
-    >>> connect(cart, rest, ahead).maneuver.displacement.round(3).tolist()
-    [0.25, 0.0, 0.0]
     """
     program = program or transfer_program(model, objective=objective, settings=settings)
     outside = _outside(model, source) or _outside(model, target)
@@ -263,28 +222,6 @@ def closed(
 
     Newton's method on all inputs and a common factor of the time; of all corrections the least,
     each input measured by its room within its limits, so that those at a limit stay there.
-
-    Parameters
-    ----------
-    model : Model
-        The vehicle.
-    start, end : (n_z,) arrays
-        Reduced states.
-    inputs : Inputs
-        What nearly does.
-    limits : (n_u, 2) array
-        The inputs stay within.
-    last : int, optional
-        Correct the inputs of that many last intervals alone, and no times.
-    enough : float
-        An end that misses by no more is met.
-    substeps : int
-        Of Runge-Kutta in an interval, for derivatives: one is enough where intervals are short.
-
-    Returns
-    -------
-    Inputs, Trajectory
-        The best that were found, whether they meet the end or not, and where they lead.
     """
     control, interval = np.clip(inputs.control, *limits.T), inputs.interval
     width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 2.0)

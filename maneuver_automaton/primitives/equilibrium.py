@@ -193,7 +193,12 @@ def _trim_at(
         return MissingTrim(name=name, reason=f"no steady motion: {what}")
     inside = np.clip(everything, *balance.limits.T) + 0.0
     state, control = np.split(inside, [len(model.reduced_names)])
-    twist = _as_asked(model.body_velocity(state, control), balance)
+    exact: Array = np.array(model.body_velocity(state, control))
+    for k, value in balance.twist.items():
+        if abs(exact[k] - value) <= ROUNDING * max(1.0, abs(value)):
+            exact[k] = value
+    exact += 0.0  # -0.0 is 0.0
+    twist = exact
     turn_rate = float(np.abs(twist[2:3]).sum()) if "turn_rate" in _twist_names(model) else 0.0
     lateral = float(np.hypot(twist[0], twist[1]) * turn_rate)
     most = math.inf if max_lateral_acceleration is None else max_lateral_acceleration
@@ -285,16 +290,6 @@ def _simplest(missed: Callable[[Array], Array], x: Array) -> Array:
         if np.abs(missed(simple)).max() <= max(np.abs(missed(x)).max(), 1e-15):
             x = simple
     return x
-
-
-def _as_asked(twist: Array, balance: _Balance) -> Array:
-    """The body velocity, with the numbers asked for where it has them but for rounding."""
-    exact: Array = np.array(twist)
-    for k, value in balance.twist.items():
-        if abs(exact[k] - value) <= ROUNDING * max(1.0, abs(value)):
-            exact[k] = value
-    exact += 0.0  # -0.0 is 0.0
-    return exact
 
 
 def _beyond(balance: _Balance, everything: Array, excess: Array) -> str:

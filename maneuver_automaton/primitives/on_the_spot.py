@@ -46,11 +46,6 @@ LEAST = 1e-9  # [units of the reduced state] a difference that takes time
 def state_of(model: Model, value: Any, what: str) -> Array:
     """A reduced state (n_z,) of a model, stated in its order or by names; those left out are 0.
 
-    Raises
-    ------
-    ValueError
-        If the vehicle has none, a name is none of its own, or a number is out of its limits.
-
     Examples
     --------
     >>> from maneuver_automaton.models import SecondOrderCar
@@ -94,14 +89,6 @@ def trim_at(model: Model, state: Array, name: str) -> Trim:
     """What stands for a reduced state at an end of a plan: a trim that lasts no time.
 
     Its control is zero, where that is within the limits of the vehicle.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderUnicycle
-    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
-    ...                             max_angular_acceleration=1.0)
-    >>> trim_at(robot, np.array([0.3, 0.1]), "start state").body_velocity.tolist()
-    [0.3, 0.0, 0.1]
     """
     control = np.clip(np.zeros(len(model.control_names)), *model.control_limits.T)
     velocity = np.asarray(model.body_velocity(state, control), dtype=np.float64)
@@ -131,16 +118,6 @@ def maneuvers_between(model: Model, source: Trim, target: Trim) -> tuple[Maneuve
 
     In closed form the components change at once, or as late as they can; a hitch is bent or
     straightened ahead and in reverse.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderUnicycle
-    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
-    ...                             max_angular_acceleration=1.0)
-    >>> source, target = (trim_at(robot, np.array([v, 0.0]), name) for v, name in ((0.3, "here"),
-    ...                                                                           (0.8, "there")))
-    >>> [(one.name, round(one.duration, 9)) for one in maneuvers_between(robot, source, target)]
-    [('here to there', 1.0)]
     """
     return next(all_maneuvers_between(model, [(source, target)]))
 

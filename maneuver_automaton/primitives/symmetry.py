@@ -221,11 +221,6 @@ def maneuver_in_world(model: OnlyTranslated, maneuver: Maneuver) -> Maneuver:
     """A maneuver whose displacement is along the world's axes, seen from where it begins.
 
     Any other maneuver is returned as it is.
-
-    Raises
-    ------
-    ValueError
-        If it has no course: then it does not say how far it turns.
     """
     if not _is_stated(model, maneuver.displacement):
         return maneuver

@@ -28,21 +28,6 @@ def turns_between(
     A turn begins in a trim, keeps its other controls, and ends in the trim that has these, or
     else in the first one, at the other heading. It takes the shorter side; half a turn, both.
 
-    Parameters
-    ----------
-    model : Model
-        The vehicle; one control is the rate of its heading, the only reduced state.
-    trims : sequence of Trim
-        Its trims.
-    pairs : "neighbours", "all" or a sequence of pairs of int
-        To the next heading on either side, of which longer turns are made; to every other one; or
-        from and to the trims of these positions.
-
-    Returns
-    -------
-    tuple of Maneuver
-        None if the vehicle has one heading only, or no limited control is the rate of its heading.
-
     Examples
     --------
     >>> from maneuver_automaton.groups import translations
@@ -172,12 +157,6 @@ def hitch_trims(model: CarWithTrailer, hitches: Sequence[float]) -> tuple[Trim, 
     Where the wheels cannot hold an angle there is rest alone.
 
     Source: ``hitch' = 0``: tan(steering) = wheelbase sin(hitch) / hitch_length.
-
-    Examples
-    --------
-    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
-    >>> [trim.name for trim in hitch_trims(truck, [0.0])]
-    ['rest, hitch 0', 'ahead, hitch 0', 'back, hitch 0']
     """
     trims = []
     for hitch in hitches:

@@ -65,13 +65,7 @@ def between_trims(problem: Problem, plan: Plan, pieces: int) -> Plan:
 
 
 def base_name(name: str) -> str:
-    """Name of the trim of the library that a trim at another pace comes from.
-
-    Examples
-    --------
-    >>> base_name("spin x0.5 x0.25"), base_name("ahead")
-    ('spin', 'ahead')
-    """
+    """Name of the trim of the library that a trim at another pace comes from."""
     return PACE.sub("", name) if " x" in name else name
 
 

@@ -254,7 +254,12 @@ class RecedingHorizon:
         if passed is None and last is not None and self.problem.via:
             motion = first_part(last.plan, driven)
             passed = going_on(self.problem, last.passed, motion, ended=pose)
-        self._look_ahead(passed or ())
+        # Have the problem ahead be the one without what was passed on the way.
+        via = still_ahead(self.problem, passed or ())
+        if via != self.ahead.via or self.ahead.obstacles is not self.problem.obstacles:
+            self.ahead = replace(self.problem, via=via)
+            if not via:
+                load_search(self.ahead)
         automaton = self.problem.automaton
         known = None if state is None else state_of(automaton.model, state, "measured")
         trim = automaton.trim_names[automaton.rest or 0]  # where a plan is held, it says which
@@ -276,14 +281,6 @@ class RecedingHorizon:
         if control is None and self.settings.pad is not None:
             control = self.settings.pad.control
         return control, self.last
-
-    def _look_ahead(self, passed: Sequence[Passed]) -> None:
-        """Have the problem ahead be the one without what was passed on the way."""
-        via = still_ahead(self.problem, passed)
-        if via != self.ahead.via or self.ahead.obstacles is not self.problem.obstacles:
-            self.ahead = replace(self.problem, via=via)
-            if not via:
-                load_search(self.ahead)
 
     def _known(self, now: Situation) -> float:
         """What steps before have proven of this one."""

@@ -322,16 +322,6 @@ def mitigate(here: Problem, *, step: float, until: float, known: Sequence[Plan] 
     its last trim.
 
     The margin does not count: contact alone does, until a time [s] of the world's clock.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Motion, Obstacle, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "back": (-0.5, 0)})
-    >>> chasing = Obstacle(Disc(1.0), motion=Motion([0, 9], [[4, 0, 0], [-5, 0, 0]]))
-    >>> problem = Problem(robot, [0, 0, 0], [9, 9, 0], obstacles=chasing)
-    >>> found = mitigate(problem, step=1.0, until=8.0)
-    >>> found.plan.word[0], 5.9 < found.contact <= 6.0
-    ('back', True)
     """
     bare = replace(here, margin=0.0)
     length = until - here.start_time

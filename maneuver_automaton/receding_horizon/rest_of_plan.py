@@ -32,14 +32,6 @@ def rest_of(
     rests there.
 
     Source: the paper, Sec. 4, after Algorithm 14.
-
-    Examples
-    --------
-    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[1, 0])
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0, 0])
-    >>> left = rest_of(Plan([0, 0, 0], (ahead,), durations=[2.0]), 0.5, pad=rest)
-    >>> left.word, left.durations.tolist(), left.end.tolist()
-    (('ahead', 'rest'), [1.5, 0.5], [2.0, 0.0, 0.0])
     """
     left = without_nothing(tail_of(plan, after, start=start))
     return left if pad is None else rested(left, pad, after)
@@ -143,15 +135,7 @@ def costliest_first(plan: Plan, rates: Array) -> Plan:
 
 
 def commute(one: Sequence[float] | Array, other: Sequence[float] | Array) -> bool:
-    """Whether two twists commute: their Lie bracket is zero.
-
-    Examples
-    --------
-    >>> commute([1.0, 0.0, 0.0], [-2.0, 0.0, 0.0])
-    True
-    >>> commute([1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
-    False
-    """
+    """Whether two twists commute: their Lie bracket is zero."""
     bracket = max(
         abs(one[2] * other[0] - other[2] * one[0]), abs(one[2] * other[1] - other[2] * one[1])
     )
@@ -187,7 +171,15 @@ def reanchored(
         yield from rejoining(problem, plan, goal, pad=pad)
     elif goal.tolerance_m or goal.tolerance_rad:
         from_here = replace(plan, start=problem.start)
-        eased = _eased(goal, from_here.end)
+        # The goal moved, within its tolerance, towards where a plan ends.
+        places = [0, 1, *range(3, from_here.end.size)]
+        off = from_here.end - goal.pose
+        off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
+        distance_m, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
+        pose = np.array(goal.pose)
+        pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
+        pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
+        eased = replace(goal, pose=pose)
         near = same_word(problem, plan, eased, pad=pad, under_way=under_way)
         if near is not None:
             yield near
@@ -242,18 +234,6 @@ def same_word(
     if missed(again, goal) > NEAR * (1.0 + float(np.abs(again.start).max())):
         return None
     return without_nothing(again)
-
-
-def _eased(goal: Goal, end: Array) -> Goal:
-    """The goal moved, within its tolerance, towards where a plan ends."""
-    places = [0, 1, *range(3, end.size)]
-    off = end - goal.pose
-    off[2] = 0.0 if goal.free_heading else math.remainder(float(off[2]), 2.0 * math.pi)
-    distance_m, turn = float(np.linalg.norm(off[places])), abs(float(off[2]))
-    pose = np.array(goal.pose)
-    pose[places] += off[places] * min(1.0, EASED * goal.tolerance_m / max(distance_m, NEAR))
-    pose[2] += off[2] * min(1.0, EASED * goal.tolerance_rad / max(turn, NEAR))
-    return replace(goal, pose=pose)
 
 
 def rejoining(problem: Problem, plan: Plan, goal: Goal, *, pad: Trim | None) -> Iterator[Plan]:

@@ -50,12 +50,6 @@ def test_adjoint_by_hand():
     np.testing.assert_allclose(SE2([2.0, 3.0, np.pi / 2]).adjoint(), expected, atol=1e-15)
 
 
-def test_coadjoint_by_hand():
-    # A force along x at height 2 above the new origin turns it clockwise.
-    moved = SE2([0.0, 2.0, 0.0]).coadjoint() @ [1.0, 0.0, 0.0]
-    assert moved.tolist() == [1.0, 0.0, -2.0]
-
-
 def test_matrix_composes_as_poses_do():
     a, b = SE2([1.0, 2.0, 0.7]), SE2([-0.5, 0.3, 2.0])
     np.testing.assert_allclose((a @ b).matrix(), a.matrix() @ b.matrix(), atol=1e-15)

@@ -12,7 +12,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyM
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import draw_obstacles
 from maneuver_automaton.plotting.limits import map_paths, shape_path
-from maneuver_automaton.plotting.obstacles import obstacle_handles, round_times
+from maneuver_automaton.plotting.obstacles import obstacle_entries, round_times
 
 RING = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 AROUND = Motion([0.0, 2.0], [[0.0, 0.0, 0.0], [4.0, 0.0, np.pi / 2]])
@@ -121,7 +121,7 @@ def test_what_is_not_there_at_a_time_is_faint_and_dashed():
     assert alphas[2] < 0.2 < 0.5 < alphas[0] == alphas[1] == alphas[3]
     dashed = [pattern is not None for _, pattern in artists.moving.get_linestyle()]
     assert dashed == [False, False, True, False]
-    _, names = obstacle_handles([door], np.array([0.5, 1.5]))
+    names = [name for _, name in obstacle_entries([door], np.array([0.5, 1.5]))]
     assert names == ["moving, at 0.5 s", "at 1.5 s", "not there at that time"]
 
 

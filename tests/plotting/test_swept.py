@@ -9,6 +9,7 @@ import shapely
 
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import carried
+from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus
@@ -20,7 +21,7 @@ from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.plotting.cases import document_of, parking_plan, plan_of
 
-CAR = footprint_polygons({"rectangle_m": [0.9, 0.5], "reference_m": [-0.2, 0.0]})
+CAR = footprint_polygons([Box([0.9, 0.5], [0.2, 0.0])])
 ANGLE = [np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 0.2], [0.2, 0.2], [0.2, 2.0], [0.0, 2.0]])]
 
 
@@ -33,7 +34,7 @@ def test_straight_ahead_it_is_body_and_way():
 
 
 def test_a_disc_that_spins_sweeps_itself():
-    (disc,) = footprint_polygons({"disc_m": 0.3})
+    (disc,) = footprint_polygons([Disc(0.3)])
     area = area_of(plan_of(["spin"], [3.0]), [disc])
     assert shapely.Polygon(disc).area <= area <= math.pi * 0.3**2
 

@@ -95,7 +95,7 @@ def test_a_body_is_where_plotting_draws_it(text, corners):
     scenario = read(but("{model: unicycle}", f"{{model: unicycle, footprint: {text}}}"))
     (body,) = scenario.problem.footprint
     assert body.corners.tolist() == corners
-    (drawn,) = footprint_polygons(list(scenario.footprint))
+    (drawn,) = footprint_polygons(scenario.problem.footprint)
     assert drawn.tolist() == corners
 
 

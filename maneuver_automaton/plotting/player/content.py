@@ -160,7 +160,7 @@ def _motion(
     times = sample_times(track.switching_times)
     poses = track.at(times)
     around = recording.world.obstacles if mover.problem is None else mover.problem.obstacles
-    rings = footprint_polygons(list(mover.bodies.get("", ()))) or [np.zeros((1, 2))]
+    rings = footprint_polygons(mover.bodies.get("", ())) or [np.zeros((1, 2))]
     bodies = [(ring, poses) for ring in rings]
     parts: list[Any] = []
     if model is not None and names and track.pieces:
@@ -168,7 +168,7 @@ def _motion(
         for k, name in enumerate(names):
             columns = [np.interp(times, at, column) for column in frames[:, k].T]
             there = (SE2(poses[:, :3]) @ SE2(np.stack(columns, axis=-1))).pose
-            bodies += [(ring, there) for ring in footprint_polygons(list(mover.bodies[name]))]
+            bodies += [(ring, there) for ring in footprint_polygons(mover.bodies[name])]
         parts = part_entries(track, model, names)
     heights = None
     if mover.problem is not None and track.start.size > 3:

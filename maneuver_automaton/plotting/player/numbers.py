@@ -23,7 +23,7 @@ from maneuver_automaton.plotting.controls import step_curves
 from maneuver_automaton.plotting.distances import thinned
 from maneuver_automaton.plotting.footprint import footprint_polygons
 from maneuver_automaton.plotting.limits import bound_lines, map_paths
-from maneuver_automaton.plotting.style import control_labels
+from maneuver_automaton.plotting.over_time import labels_of
 from maneuver_automaton.plotting.track import Track, TrackPiece
 from maneuver_automaton.problem import Bounds, Goal
 from maneuver_automaton.recording import Mover
@@ -57,13 +57,7 @@ def rounded(values: Array | Sequence[float], digits: int = VALUE_DIGITS) -> list
 
 
 def hex_color(color: Sequence[float]) -> str:
-    """A colour as the browser reads it.
-
-    Examples
-    --------
-    >>> hex_color((1.0, 0.5, 0.0))
-    '#ff8000'
-    """
+    """A colour as the browser reads it."""
     return "#" + "".join(f"{round(255 * channel):02x}" for channel in color)
 
 
@@ -97,19 +91,14 @@ def curve_entries(track: Track, mover: Mover) -> list[dict[str, Any]]:
     """Reduced state and controls of a `track` over time, each with its label."""
     if not track.pieces:
         return []
-    states, controls = track.pieces[0].state.shape[1], track.pieces[0].control.shape[1]
-    model = mover.model
-    known = mover.names if model is None else (model.reduced_names, model.control_names)
-    labels = []
-    for names, count, what in zip(known, (states, controls), ("state", "control"), strict=True):
-        counted = [f"{what} {k + 1}" for k in range(count)]
-        labels += control_labels(names) if len(names) == count else counted
+    states, controls = labels_of(mover, track.pieces[0])
     curves = [
         np.concatenate([np.stack([one.time, one.state[:, k]], axis=-1) for one in track.pieces])
-        for k in range(states)
+        for k in range(len(states))
     ]
-    curves += [np.concatenate(step_curves(track, k)) for k in range(controls)]
-    return [{"label": label, **_curve(curve)} for label, curve in zip(labels, curves, strict=True)]
+    curves += [np.concatenate(step_curves(track, k)) for k in range(len(controls))]
+    rows = zip([*states, *controls], curves, strict=True)
+    return [{"label": label, **_curve(curve)} for label, curve in rows]
 
 
 def part_entries(track: Track, model: Model, names: Sequence[str]) -> list[dict[str, Any]]:
@@ -155,7 +144,12 @@ def _curve(curve: Array) -> dict[str, list[float]]:
 def obstacle_entries(obstacles: Iterable[AnyObstacle], local: Local, *, leave: bool) -> list[Any]:
     """Static and moving obstacles; with `leave`, a moving one is there for its motion only."""
     return [
-        _map_entry(one, local)
+        {
+            "name": one.name,
+            "origin": local.poses(one.origin),
+            "cell": one.resolution,
+            "cells": blocked_rectangles(one.blocked).ravel().tolist(),
+        }
         if isinstance(one, OccupancyMap)
         else _obstacle_entry(one, local, leave=leave)
         for one in obstacles
@@ -192,9 +186,7 @@ def goal_entries(goals: Sequence[Goal], local: Local, reached: int | None) -> li
 def body_entries(bodies: Mapping[str, Sequence[Shape]]) -> list[Any]:
     """Outlines of the body, in frame 0, and of what it carries, in frames from 1 on."""
     outlines = [
-        (k, ring)
-        for k, shapes in enumerate(bodies.values())
-        for ring in footprint_polygons(list(shapes))
+        (k, ring) for k, shapes in enumerate(bodies.values()) for ring in footprint_polygons(shapes)
     ]
     return [
         {
@@ -211,7 +203,7 @@ def body_entries(bodies: Mapping[str, Sequence[Shape]]) -> list[Any]:
 def shape_rings(shape: Shape) -> list[Array]:
     """Rings (n, 2) around a shape and its holes; a disc has many corners."""
     if isinstance(shape, Disc):
-        return footprint_polygons(shape)
+        return footprint_polygons([shape])
     return [ring for part in outlines(shape) for ring in rings_of(part)]
 
 
@@ -230,16 +222,6 @@ def _obstacle_entry(one: Obstacle, local: Local, *, leave: bool) -> dict[str, An
         "t": rounded(times, POSE_DIGITS),
         "pose": local.poses(one.motion.at(times)),
         "leaves": leave,
-    }
-
-
-def _map_entry(cells: OccupancyMap, local: Local) -> dict[str, Any]:
-    """Blocked cells as rectangles [low column, low row, high column, high row]."""
-    return {
-        "name": cells.name,
-        "origin": local.poses(cells.origin),
-        "cell": cells.resolution,
-        "cells": blocked_rectangles(cells.blocked).ravel().tolist(),
     }
 
 
