@@ -144,11 +144,6 @@ def format_of(path: Path, document: Document | None = None) -> FileFormat | None
     """The format of a file; None of a scenario, and of what nothing recognises.
 
     Those of other packages are asked first, and all only of files that are no scenario.
-
-    Raises
-    ------
-    InvalidScenario
-        If the ending is that of a format that is not read.
     """
     ending = path.suffix.lower()
     if document is not None and isinstance(document.value, dict) and "schema" in document.value:
@@ -173,25 +168,13 @@ def format_of(path: Path, document: Document | None = None) -> FileFormat | None
 
 
 def reader_of(path: Path) -> Reader | None:
-    """What reads a file that is no YAML; None for scenarios and all that is YAML.
-
-    Raises
-    ------
-    InvalidScenario
-        If the ending is that of a format that is not read.
-    """
+    """What reads a file that is no YAML; None for scenarios and all that is YAML."""
     found = format_of(path)
     return None if found is None else functools.partial(found.read, document=None)
 
 
 def yaml_statements(document: Document, path: Path) -> tuple[Statement, ...] | None:
-    """What a YAML file of another format states; None for a scenario.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file belongs to a problem and states none, or cannot be used.
-    """
+    """What a YAML file of another format states; None for a scenario."""
     if (found := format_of(path, document)) is not None:
         return found.read(path, document)
     if said := belongs_to(document):
