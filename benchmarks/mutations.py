@@ -94,7 +94,6 @@ def kinds(made: Path) -> list[Kind]:
         Kind("dynobench", _in(DATA, "dynobench/envs/[cu][an]*/*.yaml"), (plan, plan, again)),
         Kind("parkbench", _in(DATA, "parkbench/*.yaml"), (plan, again)),
         Kind("car", _in(DATA, "car-scenarios/*.yaml"), (plan, again)),
-        Kind("bench-mr", _in(DATA, "bench-mr/*/*.svg"), ((*plan, *beside), (*again, *beside))),
         Kind("sbpl", _in(DATA, "sbpl/*/*/*.cfg"), ((*plan, *beside), (*again, *beside))),
         Kind(
             "mprim",

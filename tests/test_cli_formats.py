@@ -12,7 +12,7 @@ from maneuver_automaton.formats.movingai import load_movingai_map
 from maneuver_automaton.formats.nav2_map import load_nav2_map
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.scenario import load_scenario
-from tests.formats import test_benchmr, test_dynobench, test_movingai, test_sbpl_cfg, test_tpcap
+from tests.formats import test_dynobench, test_movingai, test_sbpl_cfg, test_tpcap
 from tests.formats.outside import DATA, needs_data
 from tests.scenario.files import SCENARIO
 from tests.scenario.test_loading import BESIDE
@@ -44,9 +44,6 @@ def folder(tmp_path, monkeypatch):
     (many / "room.map").write_text(test_movingai.MAP)
     (many / "room.map.scen").write_text(test_movingai.SCEN)
     (many / "hall.map").write_text(test_movingai.MAP)
-    (many / "yard2.svg").write_text(test_benchmr.SVG)
-    (many / "cart.svg").write_text(test_benchmr.ROBOT)
-    (many / "queries.csv").write_text(test_benchmr.QUERIES.replace("yard,", "yard2,"))
     (many / "picture.svg").write_text("<svg/>")
     (many / "prims.mprim").write_text("resolution_m: 0.1\n")
     (many / "notes.txt").write_text("nothing to plan")
@@ -134,11 +131,11 @@ class TestFolder:
     def test_plans_what_states_a_problem(self, folder, asked, capsys):
         assert run(["plan", "many", "--with", "beside.yaml", "--case", "1", "--no-plot"]) == 1
         printed = capsys.readouterr()
-        names = ["Case0", "a", "b", "flat", "hall", "nav", "room.map", "yard", "yard2"]
+        names = ["Case0", "a", "b", "flat", "hall", "nav", "room.map", "yard"]
         assert sorted(path.name for path in Path("out").iterdir()) == names
         assert len(asked) == len(names)
         assert printed.err.count("no_plan: not tried") == len(names)
-        for name in ("setup", "solution", "results", "used", "picture", "cart", "notes", "prims"):
+        for name in ("setup", "solution", "results", "used", "picture", "notes", "prims"):
             assert name not in printed.out
         starts = [problem.start[:2].tolist() for problem in asked]
         assert [2.5, 0.5] in starts  # case 1 of the queries
@@ -175,7 +172,6 @@ class TestFolder:
             ("nav2-maps", 4),
             ("movingai", 2),
             ("sbpl/env_examples/nav3d", 2),
-            ("bench-mr/polygon_mazes", 3),
             ("dynobench/envs/unicycle1_v0", 3),
             ("car-scenarios", 24),
         ],
@@ -188,9 +184,7 @@ class TestFolder:
 
 
 class TestConvert:
-    @pytest.mark.parametrize(
-        "name", ["Case0.csv", "yard.yaml", "flat.cfg", "hall.map", "nav.yaml", "yard2.svg"]
-    )
+    @pytest.mark.parametrize("name", ["Case0.csv", "yard.yaml", "flat.cfg", "hall.map", "nav.yaml"])
     def test_any_problem_becomes_a_scenario(self, folder, name):
         assert run(["convert", f"many/{name}", "new/x.yaml", "--with", "beside.yaml"]) == 0
         one = load_scenario(Path("many") / name, beside="beside.yaml")
@@ -231,9 +225,8 @@ class TestConvert:
     @pytest.mark.parametrize(
         ("arguments", "message"),
         [
-            (["many/yard2.svg", "x.map"], "states no occupancy map, or several; need one"),
-            (["many/yard2.svg", "x.yaml"],
-             "states no vehicle (Bench-MR); need --with and a scenario that does"),
+            (["many/room.map.scen", "x.yaml", "--case", "1"],
+             "states no vehicle (MovingAI); need --with and a scenario that does"),
             (["many/room.map.scen", "x.yaml"],
              "holds 2 problems, need --case and a number, 0 to 1"),
             (["many/a.yaml", "x.map"], "states no occupancy map, or several; need one"),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import typer
 
@@ -17,6 +19,139 @@ from maneuver_automaton.cli.streams import safe_streams
 from maneuver_automaton.errors import InvalidScenario
 
 PRINTED = (["schema"],)  # commands that do nothing but print
+KINDS: dict[str, Any] = {  # of values, by what stands for them; of others a text
+    **dict.fromkeys(("DIR", "FILE", "FIELD", "LOG", "IN", "OUT", "PLAN.json"), Path),
+    **dict.fromkeys(("S", "M", "R", "T", "HZ", "SHARE"), float),
+    **dict.fromkeys(("N", "K"), int),
+    "": bool,
+}
+NEEDED = inspect.Parameter.empty
+
+
+class Entry(NamedTuple):
+    """An argument or option of commands: its flags, what stands for its value, what it is."""
+
+    flags: str  # none: an argument
+    stands: str  # empty: the option itself says it
+    said: str
+    default: Any  # None: it may be left out
+    more: Mapping[str, Any]
+
+    def parameter(self, name: str) -> inspect.Parameter:
+        """What Typer makes an argument or an option of."""
+        make: Callable[..., Any] = typer.Option if self.flags else typer.Argument
+        told = {"metavar": self.stands or None, "help": self.said or None, **self.more}
+        kind = KINDS.get(self.stands, str)
+        return inspect.Parameter(
+            name,
+            inspect.Parameter.POSITIONAL_OR_KEYWORD,
+            default=self.default,
+            annotation=Annotated[
+                kind | None if self.default is None else kind, make(*self.flags.split(), **told)
+            ],
+        )
+
+
+def option(flags: str, stands: str, said: str, default: Any = None, **more: Any) -> Entry:
+    """An option with a value."""
+    return Entry(flags, stands, said, default, more)
+
+
+def argument(stands: str, said: str = "", default: Any = NEEDED) -> Entry:
+    """An argument."""
+    return Entry("", stands, said, default, {})
+
+
+def flag(flags: str, said: str, *, default: bool = False) -> Entry:
+    """An option without a value."""
+    return Entry(flags, "", said, default, {})
+
+
+OUT, RESULT = Path("out"), "Of plan, or a closed_loop.json of mpc."
+TABLE = {
+    "file": argument("FILE", "Scenario (YAML), or another format."),
+    "field": argument("FIELD", "A scenario with `field` (YAML), or GeoJSON."),
+    "library": argument("FILE", "Scenario or library file."),
+    "build_file": argument("FILE", "Build file with design, or library."),
+    "result": argument("PLAN.json", RESULT),
+    "source": argument("IN"),
+    "target": argument("OUT"),
+    "name": argument("NAME", "Of a scenario; left out, all are listed.", default=None),
+    "out": option("--out -o", "DIR", "Folder for the results.", default=OUT),
+    "picture": option("--out", "FILE", "The picture."),
+    "exported": option("--out -o", "FILE", "The file, or the folder of a bag."),
+    "copy": option("--out -o", "FILE", "File or folder (default: NAME.yaml)."),
+    "time_limit": option("--time-limit", "S", "Upper bound for search and refinement [s]."),
+    "turn_limit": option("--time-limit", "S", "For each turn [s]; left out: 1."),
+    "gap": option(
+        "--gap",
+        "SHARE",
+        "Stop once no plan is proven to be cheaper by more than this share (0.05: 5 %).",
+    ),
+    "alternatives": option(
+        "--alternatives", "K", "Costlier plans to list as well.", default=0, min=0
+    ),
+    "steps": option("--steps", "N", "Steps at most (default: the scenario's).", min=1),
+    "seed": option("--seed", "N", "Seed of the disturbance.", min=0),
+    "seeds": option("--seeds", "K", "Statistics over K seeds instead of one loop.", min=1),
+    "resume": option("--resume", "LOG", "Go on from a closed_loop.json."),
+    "leave": flag("--leave", "Leave a start in contact first, by the shortest coast."),
+    "leaves": flag("--leave", "The plan of one vehicle leaves a start in contact."),
+    "plot": flag("--plot/--no-plot", "Draw the plan.", default=True),
+    "factor": flag("--plot", "Draw the factor over the goals, with --max-trims."),
+    "title": option("--title", "TEXT", "Of the pictures (default: scenario's name)."),
+    "size": option("--size", "WxH", "Of the main picture [in]: 7x4, or 3.5."),
+    "style": option("--style", "NAME", "screen, or paper: no numbers above.", default="screen"),
+    "animate": flag("--animate", "Animate it as well (plan: GIF; mpc: GIF and HTML)."),
+    "html": flag("--html", "Write a page that plays it: one file, no network."),
+    "quiet": flag("--quiet", "Print nothing but errors."),
+    "as_json": flag("--json", "Print what is written, as JSON; the table goes to stderr."),
+    "jobs": option(
+        "--jobs",
+        "N",
+        "Files (of a folder), seeds, or searches for a fleet at a time.",
+        default=1,
+        min=1,
+    ),
+    "turns": option("--jobs", "N", "Turns that are planned at a time.", default=1, min=1),
+    "solved": option("--jobs", "N", "Maneuvers solved at a time.", default=1, min=1),
+    "processes": option("--jobs", "N", "Processes; by default one a core, 2 GB each.", min=1),
+    "dask": option("--dask", "ADDRESS", "Dask scheduler for files, seeds or a fleet, or local."),
+    "dask_build": option("--dask", "ADDRESS", "Dask scheduler for them, or local."),
+    "beside": option("--with", "FILE", "Scenario for what FILE leaves out, such as the vehicle."),
+    "world": option("--with", "FILE", "Scenario: its body, obstacles and goals."),
+    "driven_in": option("--with", "FILE", "Scenario that was planned or driven."),
+    "model": option(
+        "--model", "MODULE:OBJECT", "Your own vehicle, for files that cannot state it."
+    ),
+    "case": option("--case", "N", "Which problem of FILE, from 0.", min=0),
+    "width": option("--width", "M", "Working width [m]."),
+    "headland": option("--headland", "M", "Of the strip to turn in [m]."),
+    "corner": option("--origin", "LAT,LON", "Of the point 0, 0 [deg], for the GeoJSON written."),
+    "origin": option(
+        "--origin",
+        "LAT,LON",
+        "Of the point 0, 0 [deg]: longitudes and latitudes as well (csv), or instead of metres "
+        "(geojson); x is east.",
+    ),
+    "within": option("--within", "T", "Factor that words may be costlier.", min=1.0),
+    "most": option("--most", "N", "Trims (or maneuvers) of it.", min=1),
+    "max_trims": option("--max-trims", "N", "Trims of a word.", min=3),
+    "radius": option("--radius", "R", "Of the disc of goals [m]."),
+    "coverage": flag("--coverage", "How well its words cover the poses around, by samples."),
+    "to": option(
+        "--to", "FORMAT", "commonroad, csv, geojson, rerun or ros2 (a bag).", default=NEEDED
+    ),
+    "step": option("--step", "S", "Time between rows [s] (csv, rerun, ros2)."),
+    "rate": option("--rate", "HZ", "Rows per second, instead of --step."),
+    "document": option(
+        "--document",
+        "KIND",
+        "Of a result file: plan, loop, statistics, fleet, fleet-loop, road-plan, drive, road-fleet "
+        "or road-fleet-drive.",
+    ),
+}
+LOOK = "title size style"
 
 app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -26,93 +161,42 @@ app = typer.Typer(
     help="Exact motion planning with symmetry: trims, maneuvers, and the words that join them.",
     epilog=ending(""),
 )
-automaton_app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    help="Make, list or draw a library of trims.",
-    epilog=ending("automaton"),
-)
-app.add_typer(automaton_app, name="automaton")
-cache_app = typer.Typer(
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    help="List or clear what is kept on disk.",
-    epilog=ending("cache"),
-)
-app.add_typer(cache_app, name="cache")
+GROUPS = {"": app}
+for group, said in {
+    "automaton": "Make, list or draw a library of trims.",
+    "cache": "List or clear what is kept on disk.",
+}.items():
+    GROUPS[group] = typer.Typer(
+        no_args_is_help=True, rich_markup_mode=None, help=said, epilog=ending(group)
+    )
+    app.add_typer(GROUPS[group], name=group)
 
-File = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario (YAML), or another format.")]
-Library = Annotated[Path, typer.Argument(metavar="FILE", help="Scenario or library file.")]
-Out = Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")]
-TimeLimit = Annotated[
-    float | None,
-    typer.Option("--time-limit", metavar="S", help="Upper bound for search and refinement [s]."),
-]
-Gap = Annotated[
-    float | None,
-    typer.Option(
-        "--gap",
-        metavar="SHARE",
-        help="Stop once no plan is proven to be cheaper by more than this share (0.05: 5 %).",
-    ),
-]
-Alternatives = Annotated[
-    int, typer.Option("--alternatives", min=0, metavar="K", help="Costlier plans to list as well.")
-]
-Plot = Annotated[bool, typer.Option("--plot/--no-plot", help="Draw the plan.")]
-Title = Annotated[
-    str | None,
-    typer.Option("--title", metavar="TEXT", help="Of the pictures (default: scenario's name)."),
-]
-Size = Annotated[
-    str | None,
-    typer.Option("--size", metavar="WxH", help="Of the main picture [in]: 7x4, or 3.5."),
-]
-Style = Annotated[
-    str, typer.Option("--style", metavar="NAME", help="screen, or paper: no numbers above.")
-]
-Animate = Annotated[
-    bool, typer.Option("--animate", help="Animate it as well (plan: GIF; mpc: GIF and HTML).")
-]
-Html = Annotated[
-    bool, typer.Option("--html", help="Write a page that plays it: one file, no network.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
-Json = Annotated[
-    bool,
-    typer.Option("--json", help="Print what is written, as JSON; the table goes to stderr."),
-]
-Jobs = Annotated[
-    int,
-    typer.Option(
-        "--jobs",
-        min=1,
-        metavar="N",
-        help="Files (of a folder), seeds, or searches for a fleet at a time.",
-    ),
-]
-Dask = Annotated[
-    str | None,
-    typer.Option(
-        "--dask", metavar="ADDRESS", help="Dask scheduler for files, seeds or a fleet, or local."
-    ),
-]
-With = Annotated[
-    Path | None,
-    typer.Option(
-        "--with", metavar="FILE", help="Scenario for what FILE leaves out, such as the vehicle."
-    ),
-]
-OwnModel = Annotated[
-    str | None,
-    typer.Option(
-        "--model", metavar="MODULE:OBJECT", help="Your own vehicle, for files that cannot state it."
-    ),
-]
-Case = Annotated[
-    int | None,
-    typer.Option("--case", min=0, metavar="N", help="Which problem of FILE, from 0."),
-]
+Given: TypeAlias = SimpleNamespace  # arguments and options of a command, by their names
+Work: TypeAlias = Callable[[Given], int]
+
+
+def command(name: str, known: str = "") -> Callable[[Work], Work]:
+    """Register the command that follows, with those entries of the table that it has.
+
+    An entry that the command knows by another name is `name:entry`.
+    """
+
+    def register(work: Work) -> Work:
+        words = (word.partition(":") for word in known.split())
+        parameters = [TABLE[entry or word].parameter(word) for word, _, entry in words]
+
+        @exits
+        def run(**given: Any) -> int:
+            return work(Given(**given))
+
+        run.__doc__ = work.__doc__
+        vars(run)["__signature__"] = inspect.Signature(parameters)
+        run.__annotations__ = {one.name: one.annotation for one in parameters}
+        group, _, last = name.rpartition(" ")
+        GROUPS[group].command(last, epilog=ending(name))(run)
+        return work
+
+    return register
 
 
 def run(argv: list[str]) -> int:
@@ -149,244 +233,125 @@ def every_command(
     """Options before the name of a command."""
 
 
-@cache_app.command("show", epilog=ending("cache show"))
-@exits
-def cache_show() -> int:
+def _parts(given: Given) -> Any:
+    from maneuver_automaton.cli.inputs import Parts
+
+    return Parts(beside=given.beside, case=given.case, model=getattr(given, "model", None))
+
+
+def _look(given: Given) -> Any:
+    from maneuver_automaton.cli.options import LookOptions
+
+    return LookOptions(title=given.title, size=given.size, style=given.style)
+
+
+@command("cache show")
+def cache_show(_: Given) -> int:
     """List what is kept on disk to be quicker the next time: compiled kernels, tables."""
     from maneuver_automaton.cli import cache_command
 
     return cache_command.show()
 
 
-@cache_app.command("clear", epilog=ending("cache clear"))
-@exits
-def cache_clear() -> int:
+@command("cache clear")
+def cache_clear(_: Given) -> int:
     """Remove it; it is made again when it is needed."""
     from maneuver_automaton.cli import cache_command
 
     return cache_command.clear()
 
 
-@app.command("compile", epilog=ending("compile"))
-@exits
-def compile_all(
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            "--jobs", min=1, metavar="N", help="Processes; by default one a core, 2 GB each."
-        ),
-    ] = None,
-) -> int:
+@command("compile", "jobs:processes")
+def compile_all(given: Given) -> int:
     """Compile all kernels now; an installation that is not editable brings them."""
     from maneuver_automaton.cli import cache_command
 
-    return cache_command.compile_all(jobs=jobs)
+    return cache_command.compile_all(jobs=given.jobs)
 
 
 @contextlib.contextmanager
-def _document(written: Path, file: Path, *, asked: bool) -> Iterator[None]:
+def _document(written: Path, given: Given) -> Iterator[None]:
     """Where --json is asked for, print a file once it is written, and nothing else to stdout."""
-    if not asked:
+    if not given.as_json:
         yield
         return
-    if file.is_dir():
-        raise InvalidScenario(f"--json: prints the document of one file, and {file} is a folder")
+    if given.file.is_dir():
+        raise InvalidScenario(
+            f"--json: prints the document of one file, and {given.file} is a folder"
+        )
     with contextlib.redirect_stdout(sys.stderr):
         yield
     sys.stdout.write(written.read_text(encoding="utf-8"))
 
 
-@app.command(epilog=ending("plan"))
-@exits
-def plan(
-    file: File,
-    out: Out = Path("out"),
-    time_limit: TimeLimit = None,
-    alternatives: Alternatives = 0,
-    plot: Plot = True,
-    animate: Animate = False,
-    quiet: Quiet = False,
-    jobs: Jobs = 1,
-    with_file: With = None,
-    case: Case = None,
-    model: OwnModel = None,
-    gap: Gap = None,
-    title: Title = None,
-    size: Size = None,
-    style: Style = "screen",
-    html: Html = False,
-    dask: Dask = None,
-    leave: Annotated[
-        bool,
-        typer.Option("--leave", help="Leave a start in contact first, by the shortest coast."),
-    ] = False,
-    as_json: Json = False,
-) -> int:
+def _run_jobs(name: str, document: str, given: Given) -> int:
+    """Plan or drive a file, or all of a folder."""
+    from maneuver_automaton.cli.jobs import run_jobs
+    from maneuver_automaton.cli.options import Budgets, Options
+
+    def stated(*names: str) -> dict[str, Any]:
+        return {name: getattr(given, name) for name in names if hasattr(given, name)}
+
+    if name == "mpc" and given.alternatives:
+        raise InvalidScenario(
+            f"--alternatives: got {given.alternatives}, but a closed loop keeps one plan a step; "
+            "leave it out, or ask plan for them"
+        )
+    options = Options(
+        budgets=Budgets(**stated("time_limit", "gap", "alternatives", "steps")),
+        look=_look(given),
+        scheduler=given.dask,
+        **stated("plot", "animate", "html", "quiet", "leave", "jobs", "seed", "seeds", "resume"),
+    )
+    with _document(given.out / document, given):
+        return run_jobs(name, given.file, given.out, options, _parts(given))
+
+
+@command(
+    "plan",
+    "file out time_limit alternatives plot animate quiet jobs beside case model gap "
+    f"{LOOK} html dask leave as_json",
+)
+def plan(given: Given) -> int:
     """Plan the problem of a file, or of every file of a folder.
 
     A folder that was interrupted goes on where it was when the same command is called again.
     """
-    from maneuver_automaton.cli.inputs import Parts
-    from maneuver_automaton.cli.jobs import run_jobs
-    from maneuver_automaton.cli.options import Budgets, LookOptions, Options
-
-    options = Options(
-        budgets=Budgets(time_limit=time_limit, gap=gap, alternatives=alternatives),
-        plot=plot,
-        animate=animate,
-        html=html,
-        look=LookOptions(title=title, size=size, style=style),
-        quiet=quiet,
-        leave=leave,
-        jobs=jobs,
-        scheduler=dask,
-    )
-    parts = Parts(beside=with_file, case=case, model=model)
-    with _document(out / "plan.json", file, asked=as_json):
-        return run_jobs("plan", file, out, options, parts)
+    return _run_jobs("plan", "plan.json", given)
 
 
-@app.command(epilog=ending("cover"))
-@exits
-def cover(
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="FIELD", help="A scenario with `field` (YAML), or GeoJSON."),
-    ],
-    out: Out = Path("out"),
-    with_file: With = None,
-    width: Annotated[
-        float | None, typer.Option("--width", metavar="M", help="Working width [m].")
-    ] = None,
-    headland: Annotated[
-        float | None, typer.Option("--headland", metavar="M", help="Of the strip to turn in [m].")
-    ] = None,
-    origin: Annotated[
-        str | None,
-        typer.Option(
-            "--origin", metavar="LAT,LON", help="Of the point 0, 0 [deg], for the GeoJSON written."
-        ),
-    ] = None,
-    time_limit: Annotated[
-        float | None,
-        typer.Option("--time-limit", metavar="S", help="For each turn [s]; left out: 1."),
-    ] = None,
-    plot: Plot = True,
-    quiet: Quiet = False,
-    jobs: Annotated[
-        int, typer.Option("--jobs", min=1, metavar="N", help="Turns that are planned at a time.")
-    ] = 1,
-    model: OwnModel = None,
-    as_json: Json = False,
-) -> int:
+@command(
+    "cover",
+    "file:field out beside width headland origin:corner time_limit:turn_limit plot quiet "
+    "jobs:turns model as_json",
+)
+def cover(given: Given) -> int:
     """Cover a field in swaths, with turns inside its headland, as one plan.
 
     Writes plan.json, field.png and field.geojson.
     """
     from maneuver_automaton.cli.cover_command import cover_file
 
-    with _document(out / "plan.json", file, asked=as_json):
-        return cover_file(
-            file,
-            out,
-            beside=with_file,
-            origin=origin,
-            model=model,
-            time_limit=time_limit,
-            jobs=jobs,
-            plot=plot,
-            quiet=quiet,
-            width_m=width,
-            headland_m=headland,
-        )
+    with _document(given.out / "plan.json", given):
+        return cover_file(given)
 
 
-@app.command(epilog=ending("mpc"))
-@exits
-def mpc(
-    file: File,
-    steps: Annotated[
-        int | None,
-        typer.Option(
-            "--steps", min=1, metavar="N", help="Steps at most (default: the scenario's)."
-        ),
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option("--seed", min=0, metavar="N", help="Seed of the disturbance."),
-    ] = None,
-    out: Out = Path("out"),
-    time_limit: TimeLimit = None,
-    gap: Gap = None,
-    alternatives: Alternatives = 0,
-    plot: Plot = True,
-    animate: Animate = False,
-    quiet: Quiet = False,
-    jobs: Jobs = 1,
-    with_file: With = None,
-    case: Case = None,
-    seeds: Annotated[
-        int | None,
-        typer.Option(
-            "--seeds", min=1, metavar="K", help="Statistics over K seeds instead of one loop."
-        ),
-    ] = None,
-    dask: Dask = None,
-    resume: Annotated[
-        Path | None,
-        typer.Option("--resume", metavar="LOG", help="Go on from a closed_loop.json."),
-    ] = None,
-    model: OwnModel = None,
-    title: Title = None,
-    size: Size = None,
-    style: Style = "screen",
-    html: Html = False,
-    as_json: Json = False,
-) -> int:
+@command(
+    "mpc",
+    "file steps seed out time_limit gap alternatives plot animate quiet jobs beside case seeds "
+    f"dask resume model {LOOK} html as_json",
+)
+def mpc(given: Given) -> int:
     """Drive a scenario, or every one of a folder, in closed loop: plan, drive a step, plan again.
 
     A folder that was interrupted goes on where it was when the same command is called again.
     """
-    from maneuver_automaton.cli.inputs import Parts
-    from maneuver_automaton.cli.jobs import run_jobs
-    from maneuver_automaton.cli.options import Budgets, LookOptions, Options
-
-    budgets = Budgets(time_limit=time_limit, gap=gap, steps=steps)
-    if alternatives:
-        raise InvalidScenario(
-            f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
-            "leave it out, or ask plan for them"
-        )
-    options = Options(
-        budgets=budgets,
-        plot=plot,
-        animate=animate,
-        html=html,
-        look=LookOptions(title=title, size=size, style=style),
-        quiet=quiet,
-        seed=seed,
-        seeds=seeds,
-        resume=resume,
-        jobs=jobs,
-        scheduler=dask,
-    )
-    parts = Parts(beside=with_file, case=case, model=model)
-    written = out / ("closed_loop.json" if seeds is None else "statistics.json")
-    with _document(written, file, asked=as_json):
-        return run_jobs("mpc", file, out, options, parts)
+    document = "closed_loop.json" if given.seeds is None else "statistics.json"
+    return _run_jobs("mpc", document, given)
 
 
-@app.command(epilog=ending("check"))
-@exits
-def check(
-    file: File,
-    with_file: With = None,
-    case: Case = None,
-    model: OwnModel = None,
-    leave: Annotated[
-        bool, typer.Option("--leave", help="The plan of one vehicle leaves a start in contact.")
-    ] = False,
-) -> int:
+@command("check", "file beside case model leave:leaves")
+def check(given: Given) -> int:
     """Report symmetry, consistency and feasibility, without a plan.
 
     FILE may be a plan.json: its plans are proven again, in the world of the file that they were
@@ -394,26 +359,12 @@ def check(
     what was driven in a closed_loop.json, of one vehicle or several, on roads too.
     """
     from maneuver_automaton.cli import check_command
-    from maneuver_automaton.cli.inputs import Parts
 
-    parts = Parts(beside=with_file, case=case, model=model)
-    return check_command.check_file(file, parts=parts, leave=leave)
+    return check_command.check_file(given.file, parts=_parts(given), leave=given.leave)
 
 
-@automaton_app.command("build", epilog=ending("automaton build"))
-@exits
-def automaton_build(
-    file: Library,
-    out: Out = Path("out"),
-    quiet: Quiet = False,
-    jobs: Annotated[
-        int, typer.Option("--jobs", min=1, metavar="N", help="Maneuvers solved at a time.")
-    ] = 1,
-    dask: Annotated[
-        str | None,
-        typer.Option("--dask", metavar="ADDRESS", help="Dask scheduler for them, or local."),
-    ] = None,
-) -> int:
+@command("automaton build", "file:library out quiet jobs:solved dask:dask_build")
+def automaton_build(given: Given) -> int:
     """Write the library of a scenario, or of a build file, as a file.
 
     It is DIR/library.json, or DIR itself if it ends in .json. A build that was killed goes on
@@ -421,34 +372,13 @@ def automaton_build(
     """
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.build(file, out, jobs=jobs, scheduler=dask, quiet=quiet)
+    return automaton_command.build(
+        given.file, given.out, jobs=given.jobs, scheduler=given.dask, quiet=given.quiet
+    )
 
 
-@automaton_app.command("design", epilog=ending("automaton design"))
-@exits
-def automaton_design(
-    file: Annotated[
-        Path, typer.Argument(metavar="FILE", help="Build file with design, or library.")
-    ],
-    out: Out = Path("out"),
-    quiet: Quiet = False,
-    plot: Annotated[
-        bool, typer.Option("--plot", help="Draw the factor over the goals, with --max-trims.")
-    ] = False,
-    within: Annotated[
-        float | None,
-        typer.Option("--within", min=1.0, metavar="T", help="Factor that words may be costlier."),
-    ] = None,
-    most: Annotated[
-        int | None, typer.Option("--most", min=1, metavar="N", help="Trims (or maneuvers) of it.")
-    ] = None,
-    max_trims: Annotated[
-        int | None, typer.Option("--max-trims", min=3, metavar="N", help="Trims of a word.")
-    ] = None,
-    radius: Annotated[
-        float | None, typer.Option("--radius", metavar="R", help="Of the disc of goals [m].")
-    ] = None,
-) -> int:
+@command("automaton design", "file:build_file out quiet plot:factor within most max_trims radius")
+def automaton_design(given: Given) -> int:
     """Write the smallest library whose words lose no more than a factor, which is proven.
 
     It is DIR/library.json, or DIR itself if it ends in .json. The options hold instead of what the
@@ -456,57 +386,36 @@ def automaton_design(
     """
     from maneuver_automaton.cli import automaton_command
 
-    given = {"within": within, "most": most, "max_trims": max_trims, "radius_m": radius}
-    instead = {key: value for key, value in given.items() if value is not None}
-    return automaton_command.design(file, out, instead=instead, quiet=quiet, plot=plot)
+    stated = {key: getattr(given, key) for key in ("within", "most", "max_trims")}
+    stated["radius_m"] = given.radius
+    instead = {key: value for key, value in stated.items() if value is not None}
+    return automaton_command.design(
+        given.file, given.out, instead=instead, quiet=given.quiet, plot=given.plot
+    )
 
 
-@automaton_app.command("show", epilog=ending("automaton show"))
-@exits
-def automaton_show(
-    file: Library,
-    coverage: Annotated[
-        bool,
-        typer.Option("--coverage", help="How well its words cover the poses around, by samples."),
-    ] = False,
-    model: OwnModel = None,
-) -> int:
+@command("automaton show", "file:library coverage model")
+def automaton_show(given: Given) -> int:
     """List the trims and maneuvers of a scenario, a library or another file of primitives."""
     from maneuver_automaton.cli import automaton_command
 
-    return automaton_command.show(file, coverage=coverage, model_text=model)
+    return automaton_command.show(given.file, coverage=given.coverage, model_text=given.model)
 
 
-@automaton_app.command("draw", epilog=ending("automaton draw"))
-@exits
-def automaton_draw(
-    file: Library,
-    out: Out = Path("out"),
-    model: OwnModel = None,
-    title: Title = None,
-    size: Size = None,
-    style: Style = "screen",
-) -> int:
+@command("automaton draw", f"file:library out model {LOOK}")
+def automaton_draw(given: Given) -> int:
     """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
 
     The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of the
     maneuvers stands beside it, its name ending in _maneuvers.
     """
     from maneuver_automaton.cli import automaton_command
-    from maneuver_automaton.cli.options import LookOptions
 
-    look = LookOptions(title=title, size=size, style=style)
-    return automaton_command.draw(file, out, look=look, model_text=model)
+    return automaton_command.draw(given.file, given.out, look=_look(given), model_text=given.model)
 
 
-@app.command(epilog=ending("convert"))
-@exits
-def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN")],
-    target: Annotated[Path, typer.Argument(metavar="OUT")],
-    with_file: With = None,
-    case: Case = None,
-) -> int:
+@command("convert", "source target beside case")
+def convert(given: Given) -> int:
     """Write a problem as a scenario, its trims listed, or a map or primitives in another format.
 
     OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with becomes
@@ -515,48 +424,22 @@ def convert(
     .zip exported by AROC.
     """
     from maneuver_automaton.cli import convert_command
-    from maneuver_automaton.cli.inputs import Parts
 
-    return convert_command.convert(source, target, parts=Parts(beside=with_file, case=case))
+    return convert_command.convert(given.source, given.target, parts=_parts(given))
 
 
-@app.command(epilog=ending("example"))
-@exits
-def example(
-    name: Annotated[
-        str | None, typer.Argument(metavar="NAME", help="Of a scenario; left out, all are listed.")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="File or folder (default: NAME.yaml)."),
-    ] = None,
-) -> int:
+@command("example", "name out:copy")
+def example(given: Given) -> int:
     """Write one of the scenarios that come with the package, with its maps, or list them."""
     from maneuver_automaton.cli import example_command
 
-    if name is None:
+    if given.name is None:
         return example_command.show()
-    return example_command.write(name, out)
+    return example_command.write(given.name, given.out)
 
 
-@app.command(epilog=ending("plot"))
-@exits
-def plot(
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="PLAN.json", help="Of plan, or a closed_loop.json of mpc."),
-    ],
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="The picture.")] = None,
-    animate: Animate = False,
-    title: Title = None,
-    size: Size = None,
-    style: Style = "screen",
-    html: Html = False,
-    with_file: Annotated[
-        Path | None,
-        typer.Option("--with", metavar="FILE", help="Scenario: its body, obstacles and goals."),
-    ] = None,
-) -> int:
+@command("plot", f"file:result out:picture animate {LOOK} html beside:world")
+def plot(given: Given) -> int:
     """Draw a plan.json, or a closed_loop.json, again: PLAN.png beside it, or the file given.
 
     With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html. These
@@ -564,53 +447,19 @@ def plot(
     closed loop alone is drawn as an arc from step to step.
     """
     from maneuver_automaton.cli import result_commands
-    from maneuver_automaton.cli.options import LookOptions
 
-    look = LookOptions(title=title, size=size, style=style)
-    return result_commands.plot(file, out, animate=animate, html=html, look=look, beside=with_file)
+    return result_commands.plot(
+        given.file,
+        given.out,
+        animate=given.animate,
+        html=given.html,
+        look=_look(given),
+        beside=given.beside,
+    )
 
 
-@app.command(epilog=ending("export"))
-@exits
-def export(
-    file: Annotated[
-        Path,
-        typer.Argument(metavar="PLAN.json", help="Of plan, or a closed_loop.json of mpc."),
-    ],
-    to: Annotated[
-        str,
-        typer.Option(
-            "--to", metavar="FORMAT", help="commonroad, csv, geojson, rerun or ros2 (a bag)."
-        ),
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="The file, or the folder of a bag."),
-    ] = None,
-    with_file: Annotated[
-        Path | None,
-        typer.Option("--with", metavar="FILE", help="Scenario that was planned or driven."),
-    ] = None,
-    case: Case = None,
-    model: OwnModel = None,
-    step: Annotated[
-        float | None,
-        typer.Option("--step", metavar="S", help="Time between rows [s] (csv, rerun, ros2)."),
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option("--rate", metavar="HZ", help="Rows per second, instead of --step."),
-    ] = None,
-    origin: Annotated[
-        str | None,
-        typer.Option(
-            "--origin",
-            metavar="LAT,LON",
-            help="Of the point 0, 0 [deg]: longitudes and latitudes as well (csv), or instead of "
-            "metres (geojson); x is east.",
-        ),
-    ] = None,
-) -> int:
+@command("export", "file:result to out:exported beside:driven_in case model step rate origin")
+def export(given: Given) -> int:
     """Write a plan.json, or a closed_loop.json, for another program.
 
     It goes to PLAN.csv, PLAN.geojson, PLAN.rrd, PLAN_ros2 or PLAN_commonroad.xml beside it, or to
@@ -618,30 +467,20 @@ def export(
     solution for CommonRoad need that.
     """
     from maneuver_automaton.cli import result_commands
-    from maneuver_automaton.cli.inputs import Parts
 
-    parts = Parts(beside=with_file, case=case, model=model)
+    step, rate = given.step, given.rate
     if rate is not None:
         if step is not None or not 0.0 < rate < math.inf:
             raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
         step = 1.0 / rate
-    return result_commands.export(file, to, out, parts=parts, step=step, origin=origin)
+    return result_commands.export(
+        given.file, given.to, given.out, parts=_parts(given), step=step, origin=given.origin
+    )
 
 
-@app.command(epilog=ending("schema"))
-@exits
-def schema(
-    document: Annotated[
-        str | None,
-        typer.Option(
-            "--document",
-            metavar="KIND",
-            help="Of a result file: plan, loop, statistics, fleet, fleet-loop, road-plan, drive, "
-            "road-fleet or road-fleet-drive.",
-        ),
-    ] = None,
-) -> int:
+@command("schema", "document")
+def schema(given: Given) -> int:
     """Print the JSON Schema of scenario files, for editors, or of a file that is written."""
     from maneuver_automaton.cli import convert_command
 
-    return convert_command.print_schema(document)
+    return convert_command.print_schema(given.document)

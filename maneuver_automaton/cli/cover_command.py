@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from types import SimpleNamespace
 
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import make_folder, not_written, user_model
@@ -15,27 +15,18 @@ from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.recording import Fact
 
 
-def cover_file(
-    file: Path,
-    out: Path,
-    *,
-    beside: Path | None,
-    origin: str | None,
-    model: str | None,
-    time_limit: float | None,
-    jobs: int,
-    plot: bool,
-    quiet: bool,
-    **stated: float | None,
-) -> int:
-    """Cover the field of a file; write plan, picture and GeoJSON; the exit code."""
-    place = None if origin is None else origin_of(origin)
-    own = None if model is None else user_model(model)
+def cover_file(given: SimpleNamespace) -> int:
+    """Cover a field as the command line says; write plan, picture and GeoJSON; the exit code."""
+    file, out, quiet = given.file, given.out, given.quiet
+    place = None if given.origin is None else origin_of(given.origin)
+    own = None if given.model is None else user_model(given.model)
+    stated = {"width_m": given.width, "headland_m": given.headland}
     with announced(quiet=quiet):
-        field = load_field(file, beside=beside, origin=place, model=own, **stated)
+        field = load_field(file, beside=given.beside, origin=place, model=own, **stated)
     make_folder(out)
+    limit = given.time_limit
     with waiting("planning swaths and turns", quiet=quiet):
-        covered = cover(field.problem, time_limit=time_limit or field.time_limit_s, jobs=jobs)
+        covered = cover(field.problem, time_limit=limit or field.time_limit_s, jobs=given.jobs)
     result, path = covered.result, out / "plan.json"
     try:
         save_plan(result, path, name=field.name)
@@ -43,7 +34,7 @@ def cover_file(
         save_field_geojson(covered, path, name=field.name, origin=field.origin)
         path = out / "field.png"
         path.unlink(missing_ok=True)
-        if plot:
+        if given.plot:
             ready_to_draw()
             from maneuver_automaton.field.picture import save_field_picture
 

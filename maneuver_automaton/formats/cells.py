@@ -23,13 +23,7 @@ SMALLEST, LARGEST = 1e-6, 1e6  # of a cell [m]
 
 
 def check_size(columns: int, rows: int, *, at: str) -> None:
-    """Refuse a map without cells, and one with more than the memory of a laptop bears.
-
-    Raises
-    ------
-    InvalidScenario
-        With `at`, the place of the size, in front.
-    """
+    """Refuse a map without cells, and one with more than the memory of a laptop bears."""
     if not (columns > 0 and rows > 0):
         raise InvalidScenario(f"{at}: got {columns} x {rows} cells, need at least one")
     if columns * rows > MAX_CELLS:
@@ -97,11 +91,6 @@ def read_grey_image(path: Path) -> GreyImage:
     """The shades of a PGM (binary or text, 8 or 16 bit), PNG or BMP.
 
     Colours count as the mean of red, green and blue.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is none of these, damaged, cut off, or has too many pixels.
     """
     if path.suffix.lower() in OTHER_IMAGES:
         return _through_pillow(path)

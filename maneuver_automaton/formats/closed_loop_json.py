@@ -242,11 +242,6 @@ def save_closed_loop(
     """Write closed_loop.json in one step; `interrupted` by a signal it says so.
 
     The `name` of the scenario heads the pictures that are drawn of the file.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
     """
     write_document(closed_loop_to_dict(loop, name=name), path, interrupted=interrupted)
 
@@ -322,11 +317,6 @@ def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
     """The closed loop of a closed_loop.json; a file states neither its library nor its obstacles.
 
     What was driven is each plan from where the vehicle was, and then what disturbed it at once.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, or was planned with another library.
     """
     steps, poses = load_steps(path, problem.automaton)
     document = read_document(path, "loop")
@@ -466,13 +456,7 @@ class StatisticsDocument(DocumentHead):
 
 
 def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bool = False) -> None:
-    """Write statistics.json in one step; `interrupted` by a signal it says so.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    """
+    """Write statistics.json in one step; `interrupted` by a signal it says so."""
     document = document_of(
         StatisticsDocument,
         statistics,

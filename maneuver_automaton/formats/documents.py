@@ -332,11 +332,6 @@ def write_document(
     """Write a document in one step: strict JSON, long lists entry by entry.
 
     Where a signal came before the work was done, the key `interrupted` says so.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
     """
     said = {**document, "interrupted": True} if interrupted else document
     write_text_atomically(Path(path), _object(said, "") + "\n")

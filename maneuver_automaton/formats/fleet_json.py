@@ -137,11 +137,6 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
     """The result of a plan.json of several vehicles, in the world that it was planned in.
 
     What the file claims is not proven again; `verify_fleet` does that.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, has other vehicles, or was planned with other libraries.
     """
     document = read_of_fleet(path, "fleet", fleet)
     stated = document["vehicles"]

@@ -225,11 +225,6 @@ def save_fleet_loop(
         written as seen from the file.
     interrupted : bool
         Whether a signal came before the loop was over, which the file says then.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
     """
     document = fleet_loop_to_dict(log, driven, name=name)
     if source is not None:
@@ -365,11 +360,6 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
     """The loop of a closed_loop.json, in the world that it was driven in.
 
     What the file claims is not proven again; `verify_driven` does that.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, has other vehicles, or was driven with other libraries.
     """
     document = read_of_fleet(path, "fleet-loop", fleet)
     stated = document["vehicles"]

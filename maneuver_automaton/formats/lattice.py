@@ -113,13 +113,7 @@ def automaton_of_lattice(
 
 
 def lattice_of_automaton(automaton: Automaton, *, kind: str) -> Lattice:
-    """The lattice that an automaton is; `kind` is the file that is wanted, for the message.
-
-    Raises
-    ------
-    InvalidLibrary
-        If it is none: another vehicle, trims that move, ends beside the grid or the headings.
-    """
+    """The lattice that an automaton is; `kind` is the file that is wanted, for the message."""
     body = automaton.model
     if not isinstance(body, LatticeBody):
         raise InvalidLibrary(

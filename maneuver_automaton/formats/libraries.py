@@ -40,13 +40,6 @@ def read_primitives(path: Path, model: Model | None = None) -> PrimitivesRead | 
     """What a file of motion primitives holds; None if it is in none of these formats.
 
     Exports of AROC do not state the vehicle: a `model` of their kind takes the place of the fitted.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, or not be used.
-    InvalidLibrary
-        If it makes no automaton.
     """
     try:
         return _read(path, model)

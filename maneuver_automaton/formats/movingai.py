@@ -122,13 +122,7 @@ def read_movingai_scenario(path: Path) -> tuple[Statement, ...]:
 
 
 def map_beside(path: Path) -> Path:
-    """The map of a .scen file: the one that its first query names, in the same folder.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is not there.
-    """
+    """The map of a .scen file: the one that its first query names, in the same folder."""
     for at, columns in _queries(path):
         beside = path.parent / _name(columns[1])
         if "\0" in columns[1] or not beside.is_file():

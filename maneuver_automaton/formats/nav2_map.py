@@ -54,13 +54,7 @@ class _Header:
 
 
 def load_nav2_map(path: Path, *, unknown: Unknown = "blocked") -> OccupancyMap:
-    """The map of a YAML file; `unknown` says how to read cells of which it knows nothing.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file or its image cannot be used: file, line, field, value, what would be right.
-    """
+    """The map of a YAML file; `unknown` says how to read cells of which it knows nothing."""
     return map_of_document(_document(path), path, unknown=unknown)
 
 
@@ -109,13 +103,7 @@ class Mask(NamedTuple):
 
 
 def load_nav2_mask(path: Path) -> Mask:
-    """The mask of a costmap filter, such as limits of speed.
-
-    Raises
-    ------
-    InvalidScenario
-        As `load_nav2_map`.
-    """
+    """The mask of a costmap filter, such as limits of speed."""
     document = _document(path)
     header = _header(document)
     image = _image(document, path, header)
@@ -143,11 +131,6 @@ def save_nav2_map(cells: OccupancyMap, path: Path) -> None:
     """Write a map as `path`, a YAML file, and an image with the ending .pgm beside it.
 
     It reads back to the same map, to the last bit.
-
-    Raises
-    ------
-    OSError
-        If the files cannot be written.
     """
     rows, columns = cells.blocked.shape
     image = path.with_suffix(".pgm")

@@ -388,23 +388,12 @@ def load_result(path: Path | str, problem: Problem) -> PlanResult:
     """The result of a plan.json; the file states neither body nor obstacles, the `problem` does.
 
     Alternatives with maneuvers are left out: the file does not say how they move.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, or was planned with another library.
     """
     return result_of(read_document(path, "plan"), problem, place=str(path))
 
 
 def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> PlanResult:
-    """The result of a document that is read already; `place` is where it stands, for messages.
-
-    Raises
-    ------
-    InvalidScenario
-        If it was planned with another library, or its samples make no plan.
-    """
+    """The result of a document that is read already; `place` is where it stands, for messages."""
     from maneuver_automaton.bounds import Narrowest  # with kernels
 
     if document.get("automaton_hash") != automaton_hash(problem.automaton):

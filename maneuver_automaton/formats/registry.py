@@ -69,8 +69,7 @@ class BuiltIn:
     test: str = ""  # of a path; empty: the ending is enough
     keys: tuple[str, ...] = ()  # of a YAML file: the words of one of these
     saves: str = ""
-    alone: bool = True  # a problem by itself, where it is found in a folder
-    count: str = ""  # problems of a path; "several": always so many that --case tells which
+    several: bool = False  # whether a file may hold several problems, so that --case tells which
 
     def recognises(self, path: Path, document: Document | None) -> bool:
         """Whether a file is in it, by its ending and its content."""
@@ -102,17 +101,12 @@ class BuiltIn:
 
 YAML, CSV = " ".join(YAML_ENDINGS), ".csv"
 BUILT_IN = (  # of one ending: the last is read where none recognises the file, and says why
-    BuiltIn("Bench-MR", CSV, "benchmr", "read_benchmr_queries", "is_queries", alone=False),
     BuiltIn("table of poses", CSV, "poses_csv", "read_poses", "is_poses"),
     BuiltIn("TPCAP", CSV, "tpcap", "read_tpcap", "is_tpcap"),
     BuiltIn("MovingAI", ".map", "movingai", "read_movingai_map", saves="save_movingai_map"),
-    BuiltIn("MovingAI", ".scen", "movingai", "read_movingai_scenario", count="several"),
+    BuiltIn("MovingAI", ".scen", "movingai", "read_movingai_scenario", several=True),
     BuiltIn("SBPL", ".cfg .env .nav2d .nav3d", "sbpl_cfg", "read_sbpl", "is_sbpl"),
-    BuiltIn(
-        "CommonRoad", ".xml", "commonroad", "read_commonroad", "is_commonroad", count="several"
-    ),
-    BuiltIn("Bench-MR", ".svg", "benchmr", "read_benchmr", "n_queries", count="n_queries"),
-    BuiltIn("Bench-MR", ".png .bmp", "benchmr", "read_benchmr_image", alone=False),
+    BuiltIn("CommonRoad", ".xml", "commonroad", "read_commonroad", "is_commonroad", several=True),
     BuiltIn("dynobench", YAML, "dynobench", "read_dynobench", keys=("robots",)),
     BuiltIn("CL-CBS", YAML, "cl_cbs", "read_cl_cbs", keys=("agents map",)),
     BuiltIn(
@@ -150,11 +144,6 @@ def format_of(path: Path, document: Document | None = None) -> FileFormat | None
     """The format of a file; None of a scenario, and of what nothing recognises.
 
     Those of other packages are asked first, and all only of files that are no scenario.
-
-    Raises
-    ------
-    InvalidScenario
-        If the ending is that of a format that is not read.
     """
     ending = path.suffix.lower()
     if document is not None and isinstance(document.value, dict) and "schema" in document.value:
@@ -179,25 +168,13 @@ def format_of(path: Path, document: Document | None = None) -> FileFormat | None
 
 
 def reader_of(path: Path) -> Reader | None:
-    """What reads a file that is no YAML; None for scenarios and all that is YAML.
-
-    Raises
-    ------
-    InvalidScenario
-        If the ending is that of a format that is not read.
-    """
+    """What reads a file that is no YAML; None for scenarios and all that is YAML."""
     found = format_of(path)
     return None if found is None else functools.partial(found.read, document=None)
 
 
 def yaml_statements(document: Document, path: Path) -> tuple[Statement, ...] | None:
-    """What a YAML file of another format states; None for a scenario.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file belongs to a problem and states none, or cannot be used.
-    """
+    """What a YAML file of another format states; None for a scenario."""
     if (found := format_of(path, document)) is not None:
         return found.read(path, document)
     if said := belongs_to(document):
@@ -230,22 +207,15 @@ def states_a_problem(path: Path, document: Document | None) -> bool:
     if ending in YAML_ENDINGS:
         return document is None or not belongs_to(document)
     try:
-        if any(one.recognises(path, None) for one in from_outside()):
-            return True
-        return any(one.alone and one.recognises(path, None) for one in BUILT_IN)
+        return any(one.recognises(path, None) for one in (*from_outside(), *BUILT_IN))
     except (OSError, InvalidScenario):
         return True
 
 
 def holds_several(path: Path) -> bool:
     """Whether a file that is no YAML may hold several problems, for one of which --case asks."""
-    for one in BUILT_IN:
-        if one.count == "several" and path.suffix.lower() in one.endings.split():
-            return True
-        if one.count and path.suffix.lower() in one.endings.split():
-            with contextlib.suppress(InvalidScenario):  # told when it is planned
-                return int(one.call(one.count, path)) > 1
-    return False
+    ending = path.suffix.lower()
+    return any(one.several and ending in one.endings.split() for one in BUILT_IN)
 
 
 def load_map(path: Path | str, *, unknown: Unknown = "blocked") -> OccupancyMap:

@@ -20,13 +20,7 @@ MAX_MAP_BYTES = 200_000_000  # of a file that holds a map, cell by cell
 def read_bytes(
     path: Path | zipfile.Path, *, most: int = MAX_BYTES, what: str = "a scenario"
 ) -> bytes:
-    """The content of a file, or of one in an archive, of at most `most` bytes: `what`.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is missing, a folder, unreadable, or too long.
-    """
+    """The content of a file, or of one in an archive, of at most `most` bytes: `what`."""
     try:
         with open_input(path) if isinstance(path, Path) else path.open("rb") as stream:
             content = stream.read(most + 1)
@@ -80,13 +74,7 @@ def lines_of(text: str) -> list[str]:
 def table_of(
     path: Path, names: Sequence[str], *, what: str, most: int = MAX_BYTES
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """Of each row of a CSV its place, for messages, and its words by the names of their columns.
-
-    Raises
-    ------
-    InvalidScenario
-        As `read_text`, and if the first line misses a name, or a row has another number of columns.
-    """
+    """Of each row of a CSV its place, for messages, and its words by the names of their columns."""
     rows = list(csv.reader(lines_of(read_text(path, most=most, what=what))))
     head = [word.strip() for word in rows[0]] if rows else []
     for name in names:

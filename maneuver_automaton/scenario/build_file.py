@@ -203,14 +203,7 @@ def is_build_file(path: Path) -> bool:
 
 
 def load_build_file(path: Path | str) -> BuildFile:
-    """Vehicle and trims of a build file.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read or used: one line with file, line, field, the value met, and
-        what would be right.
-    """
+    """Vehicle and trims of a build file."""
     return build_file_of_text(read_text(Path(path)), name=str(path))
 
 

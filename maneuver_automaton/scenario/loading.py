@@ -65,7 +65,7 @@ def load_scenario(
     ----------
     path : Path or str
         Scenario, CommonRoad scenario, TPCAP case, Nav2 map, dynobench problem, CL-CBS problem,
-        MovingAI map or queries, SBPL environment, Bench-MR world: told apart by their endings, YAML
+        MovingAI map or queries, SBPL environment: told apart by their endings, YAML
         files by their keys.
     beside : Path or str, optional
         A scenario for what the file leaves out, such as the vehicle. What the file states wins;

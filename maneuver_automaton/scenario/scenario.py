@@ -141,11 +141,6 @@ def scenario_of_document(
     """The scenario of a YAML file that was read since `begin` [s]; its vehicle is `own` if given.
 
     What is in `shared` is taken from there, and what is made is kept in it.
-
-    Raises
-    ------
-    InvalidScenario
-        As `scenario_of_text`.
     """
     check_schema(document)
     file = checked(document, ScenarioFile, _names_of(document.value, own))

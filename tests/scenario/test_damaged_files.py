@@ -14,7 +14,6 @@ from PIL import Image
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.scenario import load_scenario
 from tests.formats import (
-    test_benchmr,
     test_cl_cbs,
     test_dynobench,
     test_movingai,
@@ -63,9 +62,6 @@ FILES = {
     "text.yaml": (NAV2.replace("room.pgm", "text.pgm").encode(), "text.yaml"),
     "png.yaml": (NAV2.replace("room.pgm", "a.png").encode(), "png.yaml"),
     "bmp.yaml": (NAV2.replace("room.pgm", "a.bmp").encode(), "bmp.yaml"),
-    "worlds/yard.svg": (test_benchmr.SVG.encode(), "worlds/yard.svg"),
-    "worlds/cart.svg": (test_benchmr.ROBOT.encode(), "worlds/yard.svg"),
-    "queries.csv": (test_benchmr.QUERIES.encode(), "queries.csv"),
     "world.yaml": ((SCENARIO + WORLD).encode(), "world.yaml"),
     "fleet.yaml": (test_fleet.FLEET.encode(), "fleet.yaml"),
     "cars.yaml": (test_cl_cbs.PROBLEM.encode(), "cars.yaml"),

@@ -12,7 +12,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.scenario import load_scenario, scenario_of_text, to_yaml
 from maneuver_automaton.scenario.scenario import TPCAP
-from tests.formats import test_benchmr, test_dynobench, test_movingai, test_sbpl_cfg, test_tpcap
+from tests.formats import test_dynobench, test_movingai, test_sbpl_cfg, test_tpcap
 from tests.formats.outside import DATA, needs_data
 from tests.scenario.test_scenario import assert_same
 
@@ -56,7 +56,7 @@ def folder(tmp_path, monkeypatch):
         "image: nav.pgm\nresolution: 0.5\norigin: [1, 2, 0]\nnegate: 0\n"
         "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
     )
-    test_benchmr.yard(tmp_path)
+    Path("worlds").mkdir()
     return tmp_path
 
 
@@ -66,8 +66,6 @@ STATED = [
     ("room.cfg", None),
     ("flat.env", None),
     ("room.map.scen", 1),
-    ("worlds/yard.svg", None),
-    ("queries.csv", None),
 ]
 MAPS = ["room.map", "nav.yaml", "nav.yaml"]
 
@@ -81,7 +79,7 @@ def test_what_the_file_states_wins(folder, name, case):
     assert goal.pose[:2].tolist() != [1.5, 0.5]
     assert all(getattr(o, "name", "") != "" for o in problem.obstacles)
     assert len(problem.obstacles) <= 2
-    stated = name == "yard.yaml" or name.endswith(("svg", "queries.csv"))
+    stated = name == "yard.yaml"
     assert (scenario.footprint == ({"disc_m": 0.2},)) == (not stated)
     if name == "Case0.csv":
         assert problem.bounds.x == (-100.0, 100.0)
