@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.motion import STANDS, Motion, point_speeds
@@ -62,10 +61,6 @@ class _Single(NamedTuple):
     motion: Motion
     owner: int
     present: tuple[float, float] = (-math.inf, math.inf)  # [s]
-
-    def is_away(self, times: Array) -> NDArray[np.bool_]:
-        """Whether it is not there at times (n,) [s]."""
-        return np.asarray((times < self.present[0]) | (times > self.present[1]))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -123,7 +118,7 @@ class ObstacleDistances:
         frames = [single.motion.at(times) for single in self.singles]
         between = [
             np.where(
-                single.is_away(times),
+                (times < single.present[0]) | (times > single.present[1]),
                 math.inf,
                 np.hypot(*(SE2(frame).act(single.part.middle) - centers).T),
             )

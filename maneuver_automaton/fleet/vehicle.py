@@ -54,8 +54,8 @@ EXPANSIONS = 4000  # of the way to a refuge, and of that from there
 WAYS = 6  # alone, that are tried with rests
 QUICK = 1500  # expansions in space and time at first ...
 LONG = 20_000  # ... and where nothing else helps
-AT_ONCE = Patience(attempts=0, passes=0)
-WITH_TIME = Patience(attempts=400, passes=2)
+AT_ONCE = WordSchedule(patience=Patience(attempts=0, passes=0))
+WITH_TIME = WordSchedule(patience=Patience(attempts=400, passes=2))
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
 MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
 LONGEST = 400_000  # expansions for a way alone
@@ -277,9 +277,8 @@ class FleetMember:
                 self.alone = better
 
     def _keep_ways(
-        self, query: LatticeQuery, word: Word, budget: Budget, patience: Patience
+        self, query: LatticeQuery, word: Word, budget: Budget, schedule: WordSchedule
     ) -> None:
-        schedule = WordSchedule(patience=patience)
         better = words_of(query, budget=budget, schedule=schedule, known=word).to_the_end()
         self.expansions += better.expansions
         words = [better.word, word, *better.others, *self.ways]
@@ -356,8 +355,7 @@ class FleetMember:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
-        schedule = WordSchedule(patience=AT_ONCE)
-        best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
+        best = words_of(query, budget=budget, schedule=AT_ONCE, known=best).to_the_end().word
         if not best.cost < known:
             return None
         return self._word_found(query, best, aims)
@@ -389,7 +387,7 @@ class FleetMember:
         if not self.at_will:
             return self._found(self._planned(past, budget, improve=False))
         query = self._query(past)
-        schedule = WordSchedule(most=QUICK, patience=AT_ONCE)
+        schedule = replace(AT_ONCE, most=QUICK)
         found = words_of(query, budget=budget, schedule=schedule).to_the_end()
         self.expansions += found.first.expansions if found.first else 0
         return None if found.word is NO_WORD else self._word_found(query, found.word, aims)

@@ -160,19 +160,25 @@ class LatticeWords(PlanningStep):
                 word = with_cost(soon, query)
             found.counts.update(expansions=search.expansions)
         elif problem.moves and known:  # one with rests, if a quick search finds none
-            first = self.first_plan(query, limit, most=QUICK)
+            most = QUICK if limit.expansions is None else min(QUICK, limit.expansions)
+            first = first_plan(query, budget=replace(limit, expansions=most), table=self.table)
+            self._count(first, searches=1)
             word = first.word
             if word is None:
                 static = _among_static(query)
                 aside = along_free_path(static, self.table)
-                path = self.first_plan(static, limit, aside=aside)
+                path = first_plan(static, budget=limit, table=self.table, aside=aside)
+                self._count(path, searches=1)
                 if path.word is not None:
                     close = replace(query, around=query.scene(LEAST_MARGIN))  # through narrow bends
                     word = with_waits(query, path.word) or with_waits(close, path.word)
         if word is None:
             aside = along_free_path(query, self.table)
             proven = functools.partial(proven_apart, problem)
-            first = self.first_plan(query, limit, begun=begun, aside=aside, is_proven=proven)
+            first = first_plan(
+                query, budget=limit, table=self.table, begun=begun, aside=aside, is_proven=proven
+            )
+            self._count(first, searches=1)
             word = first.word
         if word is not None:
             self.gained(word)
@@ -232,21 +238,6 @@ class LatticeWords(PlanningStep):
         if better is not None and self.found.may_check:
             self.found.offer(better, index, proven=False)  # it ends its coasts elsewhere
 
-    def first_plan(
-        self,
-        query: LatticeQuery,
-        budget: Budget,
-        *,
-        most: int | None = None,
-        **more: Any,
-    ) -> FirstPlan:
-        """A first plan for a query, its expansions counted."""
-        limits = [one for one in (most, budget.expansions) if one is not None]
-        counted = replace(budget, expansions=min(limits, default=None))
-        found = first_plan(query, budget=counted, table=self.table, **more)
-        self._count(found.expansions, found.queries, searches=1)
-        return found
-
     def words_of(
         self,
         query: LatticeQuery,
@@ -262,12 +253,12 @@ class LatticeWords(PlanningStep):
         )
         for word in found:
             better(word)
-        self._count(found.expansions, found.queries, searches=found.passes, attempts=found.attempts)
+        self._count(found, searches=found.passes, attempts=found.attempts)
         return found
 
-    def _count(self, expansions: int, queries: int, **more: int) -> None:
-        self.spent += expansions
-        self.found.counts.update(expansions=expansions, collision_queries=queries)
+    def _count(self, search: FirstPlan | WordSearch, **more: int) -> None:
+        self.spent += search.expansions
+        self.found.counts.update(expansions=search.expansions, collision_queries=search.queries)
         if self.finds_plans:
             self.found.counts.update(more)
 

@@ -150,7 +150,9 @@ def track(
         first=functools.partial(first_plan, aside=aside, is_proven=proven),
     )
     timed = replace(budget, expansions=None)
-    found = words_of(query, budget=timed, schedule=schedule, known=word).to_the_end()
+    found = words_of(query, budget=timed, schedule=schedule, known=word)
+    for _ in found:
+        pass
     if found.word is NO_WORD:
         enclosed = found.first.enclosed if found.first else ""
         return Tracked(

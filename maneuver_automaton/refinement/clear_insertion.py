@@ -119,11 +119,6 @@ class Whole:
                 yield better
 
 
-def whole_of(query: LatticeQuery) -> Whole | None:
-    """What the searches of a query leave out; None where they use all trims there are."""
-    return Whole(query) if stands_for_more(query.problem) else None
-
-
 def _saves_trims(query: LatticeQuery) -> bool:
     """Whether one trim between two is worth more than both, as it saves a switch."""
     prices = query.library.arrays.library

@@ -121,7 +121,8 @@ def gear_sequences(
         for library in libraries:
             if budget.is_over:
                 break
-            unit = second * _unit(library)
+            # of the time in which the tightest arc turns by one radian
+            unit = second * (1.0 / float(np.abs(library.body_velocities[:, 2]).max()))
             cost = Cost(time=second, direction_change=turning * unit, switch=switching * unit)
             variant = replace(problem, automaton=library, cost=cost)
             for plan in _plans(variant, budget):
@@ -147,11 +148,6 @@ def _plans(problem: Problem, budget: Budget) -> Iterator[Plan]:
     found = words_of(query, budget=timed, schedule=schedule).to_the_end()
     words = (found.word, *found.others[:OTHERS]) if found.word is not NO_WORD else ()
     yield from (plan_of_word(query, word) for word in words)
-
-
-def _unit(library: Automaton) -> float:
-    """Time [s] in which the tightest arc turns by one radian."""
-    return 1.0 / float(np.abs(library.body_velocities[:, 2]).max())
 
 
 def _strokes(plan: Plan) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.refinement._kernels_improve import attempt_all
-from maneuver_automaton.refinement.clear_insertion import Whole, whole_of
+from maneuver_automaton.refinement.clear_insertion import Whole
 from maneuver_automaton.refinement.work import improving, shortcut, word_of
 from maneuver_automaton.search.arrays import CostTable, DistanceGrid, SearchArrays
 from maneuver_automaton.search.cost_to_go import NO_TABLE
@@ -24,6 +24,7 @@ from maneuver_automaton.search.lattice import FirstPlan, distance_grids, first_p
 from maneuver_automaton.search.lattice_pass import pass_of, with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, as_wide_as_turns
+from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.words.word import Word
 
 PRUNE = 1.08  # of a new search: its raw path is longer than the improved one
@@ -168,8 +169,8 @@ def words_of(
     time, it may last longer than the query admits: improved ones need not. The same number of
     expansions finds the same words at every call. What was found and spent is asked afterwards.
     """
-    whole = whole_of(query) if schedule.every_trim else None
-    return WordSearch(query, budget, schedule, known or NO_WORD, whole)
+    left_out = schedule.every_trim and stands_for_more(query.problem)
+    return WordSearch(query, budget, schedule, known or NO_WORD, Whole(query) if left_out else None)
 
 
 @dataclass(slots=True, eq=False)

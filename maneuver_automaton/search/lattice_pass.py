@@ -112,26 +112,23 @@ class Pass:
         while self.may_expand and self.expansions < left and not budget.is_over:
             if self.search.task.stop_at_first and self.arrays.state[layout.FOUND]:
                 break
-            self._expand(min(left - self.expansions, TIMELY), upper_bound)
+            until = min(left, self.expansions + TIMELY)
+            while self.alive and (step := self.pace.take(until - self.expansions)):
+                used = int(self.arrays.state[layout.N_NODES])
+                most = used + self.search.library.most_children * (step + 1) + 2
+                room = len(self.arrays.nodes)
+                takes = GROWN_S * max(most, 2 * room)  # [s], to copy what there is
+                self.is_late = most > room and takes > self.pace.budget.left
+                if self.is_late:
+                    break
+                self.search = self.search._replace(arrays=with_room(self.arrays, most))
+                self.alive = bool(kernels.expand(self.search, step, upper_bound))
+                found = self.search.task.stop_at_first and self.arrays.state[layout.FOUND]
+                if self.expansions >= until or found:
+                    break
             if self.search.task.ends_early and self.arrays.found[0] < upper_bound * (1.0 - LEAST):
                 break
         return _word(self) if self.arrays.state[layout.FOUND] else None
-
-    def _expand(self, n: int, upper_bound: float) -> None:
-        """Expand up to `n` more nodes, a few at a time."""
-        left, stops = self.expansions + n, self.search.task.stop_at_first
-        while self.alive and (step := self.pace.take(left - self.expansions)):
-            used = int(self.arrays.state[layout.N_NODES])
-            most = used + self.search.library.most_children * (step + 1) + 2
-            room = len(self.arrays.nodes)
-            takes = GROWN_S * max(most, 2 * room)  # [s], to copy what there is
-            self.is_late = most > room and takes > self.pace.budget.left
-            if self.is_late:
-                return
-            self.search = self.search._replace(arrays=with_room(self.arrays, most))
-            self.alive = bool(kernels.expand(self.search, step, upper_bound))
-            if self.expansions >= left or (stops and self.arrays.state[layout.FOUND]):
-                return
 
 
 def pass_of(

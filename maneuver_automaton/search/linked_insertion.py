@@ -115,7 +115,8 @@ def improve_linked_words(
     certifies more than that. The `budget` limits the time; ``search.max_expansions`` of the problem
     limits the number of words that are solved for instead, the same at every call.
     """
-    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=_used(seeds))
+    used = tuple(sorted({trim for seed in seeds for trim in seed.trims.tolist()}))
+    setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=used)
     climb = _Climb(setup, budget, most_tries)
     for seed in seeds:
         solved, changes = climb.solved, climb.changes
@@ -315,7 +316,3 @@ class _Prices:
         return np.asarray(
             self.word.cost + added + lasting * arrays.rates[chosen] + jump @ self.momentum
         )
-
-
-def _used(seeds: Sequence[Word]) -> tuple[int, ...]:
-    return tuple(sorted({trim for seed in seeds for trim in seed.trims.tolist()}))

@@ -15,10 +15,11 @@ from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Horizon, Problem
-from maneuver_automaton.refinement.clear_insertion import Whole, paced, whole_of
+from maneuver_automaton.refinement.clear_insertion import Whole, paced
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word, with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
+from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.waiting import is_free
 from maneuver_automaton.words.transitions import SWITCH
 from tests.search.cases import compiled_only
@@ -99,7 +100,7 @@ def test_nothing_more_is_tried_once_nothing_is_gained():
 def test_small_libraries_are_left_alone():
     few = Automaton.of_grid(Unicycle(), [[-1.0, 1.0], [-1.0, 0.0, 1.0]])
     query, word = begun(replace(PROBLEM, automaton=few))
-    assert whole_of(query) is None
+    assert not stands_for_more(query.problem)
     limited = replace(PROBLEM, automaton=few, horizon=Horizon(max_time=20.0))
     query, word = begun(limited)
     assert paced(query, word) == (query, word)

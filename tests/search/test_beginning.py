@@ -53,7 +53,7 @@ def assert_begun_as(one: beginning.Begun, query: LatticeQuery) -> None:
     assert search.scene.edge_window.tolist() == query.around.edge_window.tolist()
     grid = _Guides(query, NO_TABLE, None).grid(call.resolution, 1.0)
     slow = pass_of(query, call.resolution, grid=grid)
-    slow._expand(int(call.arrays.asked[0]), np.inf)
+    slow.run(int(call.arrays.asked[0]), np.inf)
     assert arrays.state[1:].tolist()[:1] == slow.arrays.state[1:].tolist()[:1]
     assert arrays.state[3:].tolist() == slow.arrays.state[3:].tolist()
     n = int(arrays.state[0])
