@@ -264,9 +264,8 @@ def _without_short(problem: Problem, plan: Plan, goal: Goal, short: int) -> Iter
         return
     moving = [one for one in problem.automaton.trims if not one.is_rest][:MOST_TRIMS]
     lasting = plan.durations + SHORT * (away == 0)
-    if away.size > 1:  # a neighbour gives what both take
-        beside = short - 1 if short else 1
-        lasting[beside] = max(lasting[beside] - 2.0 * SHORT, SHORT)
+    beside = (short - 1 if short else 1) % away.size  # a neighbour gives what both take
+    lasting[beside] = max(lasting[beside] - 2.0 * SHORT, SHORT)
     every = np.ones(away.size + 1, dtype=np.bool_)
     for at, trim in itertools.product((short, short + 1), moving):
         if trim not in plan.trims[max(at - 1, 0) : at + 1]:
