@@ -153,8 +153,7 @@ def _plan(what: str, verdict: Verdict, stated: Any) -> Finding:
     same = _agrees(stated, verdict.cost)
     clearance = None if verdict.audit is None else verdict.audit.min_clearance_m
     words = f"cost {verdict.cost:.9g}" + ("" if same else f", but the file says {stated}")
-    words = "; ".join([words, *verdict.notes])
-    return Finding(what=what, holds=same, worst=clearance, words=words)
+    return Finding(what=what, holds=same, worst=clearance, words="; ".join([words, *verdict.notes]))
 
 
 def _why_none(reason: str | None) -> str:

@@ -203,18 +203,15 @@ def with_lasting_coasts(
     """The plan without trims of less than 20 ms, as far as that is free and hardly costlier.
 
     Such a trim is left out, or lasts so long; others change as little as they can: all of them,
-    those near it, after it, or before it, whatever is free. Where the horizon states a least time,
-    be it zero, the plan stays as it is.
+    those near it, after it, or before it, whatever is free. Where that fails another trim stands
+    beside it, which takes back what it turns too far. Where the horizon states a least time, be it
+    zero, the plan stays as it is.
     """
     if not has_short_coasts(problem, plan):
         return plan
     most, failed = problem.cost_of(plan) * (1.0 + COSTLIER), 0
     while failed < min(len(short := _short(plan)), LOOKED_AT // max(len(plan.trims), 1)):
-        away = np.arange(plan.durations.size) - short[failed]
-        times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))
-        changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)
-        for some, of_these, least in itertools.product(times, changing, (0.0, SHORT)):
-            other = _with_times(problem, plan, goal, some, of_these, least)
+        for other in _without_short(problem, plan, goal, short[failed]):
             if (
                 other is not None
                 and len(_short(other)) < len(short)
@@ -226,6 +223,27 @@ def with_lasting_coasts(
                 break
         failed += 1
     return plan
+
+
+def _without_short(problem: Problem, plan: Plan, goal: Goal, short: int) -> Iterator[Plan | None]:
+    """Plans in which a short trim lasts longer or not at all; None where no times are found."""
+    away = np.arange(plan.durations.size) - short
+    times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))
+    changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)
+    for some, of_these, least in itertools.product(times, changing, (0.0, SHORT)):
+        yield _with_times(problem, plan, goal, some, of_these, least)
+    if plan.maneuvers or problem.horizon.time is not None:
+        return
+    moving = [one for one in problem.automaton.trims if not one.is_rest][:MOST_TRIMS]
+    lasting = plan.durations + SHORT * (away == 0)
+    beside = (short - 1 if short else 1) % away.size  # a neighbour gives what both take
+    lasting[beside] = max(lasting[beside] - 2.0 * SHORT, SHORT)
+    every = np.ones(away.size + 1, dtype=np.bool_)
+    for at, trim in itertools.product((short, short + 1), moving):
+        if trim not in plan.trims[max(at - 1, 0) : at + 1]:
+            trims = (*plan.trims[:at], trim, *plan.trims[at:])
+            longer = replace(plan, trims=trims, durations=np.insert(lasting, at, SHORT))
+            yield _with_times(problem, longer, goal, longer.durations, every, SHORT)
 
 
 def has_short_coasts(problem: Problem, plan: Plan) -> bool:

@@ -164,19 +164,14 @@ def plan_of(
         )
     maneuvers = [None if k == SWITCH else automaton.maneuvers[k] for k in word.transitions]
     if not any(maneuvers):
-        return Plan(start, tuple(trims), durations=durations, start_time=start_time)
-    first, last = 0, len(trims) - 1
-    while maneuvers[first] is None and durations[first] == 0.0:
-        first += 1
-    while maneuvers[last - 1] is None and durations[last] == 0.0:
-        last -= 1
-    return Plan(
-        start,
-        tuple(trims[first : last + 1]),
-        durations=durations[first : last + 1],
-        maneuvers=tuple(maneuvers[first:last]),
-        start_time=start_time,
-    )
+        return Plan(start, trims, durations=durations, start_time=start_time)
+    a, b = 0, len(trims)
+    while maneuvers[a] is None and durations[a] == 0.0:
+        a += 1
+    while maneuvers[b - 2] is None and durations[b - 1] == 0.0:
+        b -= 1
+    lasting, between = durations[a:b], tuple(maneuvers[a : b - 1])
+    return Plan(start, trims[a:b], durations=lasting, maneuvers=between, start_time=start_time)
 
 
 def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:

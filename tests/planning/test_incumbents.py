@@ -279,3 +279,12 @@ def test_plans_among_obstacles_have_no_short_trims(seed: int) -> None:
         goal = problem.goals[0]
         other = with_lasting_coasts(problem, result.plan, goal, is_free=lambda _plan: True)
         assert other is result.plan or what_is_hit(problem, other, goal)
+
+
+def test_a_short_trim_that_nothing_takes_the_place_of_gets_one_beside_it() -> None:
+    """8 ms to the left at the end: no plan of two trims ends there, one of four does."""
+    result = planning.plan(room(28), time_limit=600.0)
+    assert result.plan is not None
+    assert result.plan.word == ("right", "ahead", "right", "left")
+    assert result.plan.durations.min() >= SHORT * (1.0 - 1e-9)
+    assert result.cost == pytest.approx(9.3630916, rel=1e-6)  # that of three trims
