@@ -30,15 +30,12 @@ def save_field_picture(covered: FieldResult, path: Path, *, name: str) -> None:
     page = page_of(
         Look(title=name),
         [said, f"{100.0 * covered.covered:.3g} % inside the headland of {problem.headland:g} m"],
-        [
-            (Patch(facecolor=soil), "headland"),
-            (Patch(facecolor=green), f"worked, {problem.width:g} m wide"),
-            (line_handle(SEQUENCE[0]), "swath"),
-            (line_handle(SEQUENCE[1]), "turn"),
-            (mark_handle("s", size=6.5), "start"),
-        ],
+        [(Patch(facecolor=soil), "headland"),
+         (Patch(facecolor=green), f"worked, {problem.width:g} m wide"),
+         (line_handle(SEQUENCE[0]), "swath"), (line_handle(SEQUENCE[1]), "turn"),
+         (mark_handle("s", size=6.5), "start")],
         shape=float((high - low)[0] / (high - low)[1]),
-    )
+    )  # fmt: skip
     for area, color in ((problem.whole, soil), (covered.strips & problem.whole, green)):
         for part in shapely.get_parts(area):
             page.plane.add_patch(

@@ -7,6 +7,7 @@ from maneuver_automaton.models.cars import AcceleratingCar as AcceleratingCar
 from maneuver_automaton.models.cars import Car as Car
 from maneuver_automaton.models.cars import CarWithTrailer as CarWithTrailer
 from maneuver_automaton.models.cars import SecondOrderCar as SecondOrderCar
+from maneuver_automaton.models.cars import TractorWithTrailers as TractorWithTrailers
 from maneuver_automaton.models.dynamic import Helicopter as Helicopter
 from maneuver_automaton.models.dynamic import Hovercraft as Hovercraft
 from maneuver_automaton.models.dynamic import SingleTrack as SingleTrack
@@ -28,6 +29,5 @@ from maneuver_automaton.models.state import moved_rates as moved_rates
 from maneuver_automaton.models.state import moved_state as moved_state
 from maneuver_automaton.models.state import rollout as rollout
 from maneuver_automaton.models.state import vector_field as vector_field
-from maneuver_automaton.models.trailers import TractorWithTrailers as TractorWithTrailers
 from maneuver_automaton.models.user import UserModel as UserModel
 from maneuver_automaton.models.user import model_of_vector_field as model_of_vector_field

@@ -10,7 +10,13 @@ from maneuver_automaton.models.axles import (
     FourWheelSteeringCar,
     RearSteeredCar,
 )
-from maneuver_automaton.models.cars import AcceleratingCar, Car, CarWithTrailer, SecondOrderCar
+from maneuver_automaton.models.cars import (
+    AcceleratingCar,
+    Car,
+    CarWithTrailer,
+    SecondOrderCar,
+    TractorWithTrailers,
+)
 from maneuver_automaton.models.dynamic import Helicopter, Hovercraft, SingleTrack
 from maneuver_automaton.models.model import Model
 from maneuver_automaton.models.robots import (
@@ -19,7 +25,6 @@ from maneuver_automaton.models.robots import (
     SecondOrderUnicycle,
     Unicycle,
 )
-from maneuver_automaton.models.trailers import TractorWithTrailers
 
 KINDS: Mapping[str, Any] = {
     kind.name: kind

@@ -13,9 +13,9 @@ from matplotlib.patches import Circle
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.plotting.colors import GREY, INK
-from maneuver_automaton.plotting.ends import draw_goal, draw_headings
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import plain_page, write_figure
+from maneuver_automaton.plotting.paths import draw_goal, draw_headings
 from maneuver_automaton.plotting.style import tidy
 
 SHADES = "viridis_r"

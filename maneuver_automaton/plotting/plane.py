@@ -11,7 +11,6 @@ from matplotlib.patches import Patch
 
 from maneuver_automaton.plotting.cast import Cast, cast_of, set_view
 from maneuver_automaton.plotting.colors import INK, LANE, SEQUENCE
-from maneuver_automaton.plotting.ends import end_entries
 from maneuver_automaton.plotting.limits import (
     draw_ground,
     draw_limits,
@@ -20,7 +19,7 @@ from maneuver_automaton.plotting.limits import (
     shape_path,
 )
 from maneuver_automaton.plotting.obstacles import draw_obstacles, obstacle_entries
-from maneuver_automaton.plotting.paths import draw_path, path_entries
+from maneuver_automaton.plotting.paths import draw_path, end_entries, path_entries
 from maneuver_automaton.plotting.searches import draw_nodes
 from maneuver_automaton.plotting.style import SMALL_PT, Entries, outer_legend
 from maneuver_automaton.plotting.together import draw_vehicles, vehicle_entries
