@@ -28,7 +28,7 @@ KINDS: dict[str, Any] = {  # of values, by what stands for them; of others a tex
 NEEDED = inspect.Parameter.empty
 
 
-class Entry(NamedTuple):
+class OptionEntry(NamedTuple):
     """An argument or option of commands: its flags, what stands for its value, what it is."""
 
     flags: str  # none: an argument
@@ -52,19 +52,19 @@ class Entry(NamedTuple):
         )
 
 
-def option(flags: str, stands: str, said: str, default: Any = None, **more: Any) -> Entry:
+def option(flags: str, stands: str, said: str, default: Any = None, **more: Any) -> OptionEntry:
     """An option with a value."""
-    return Entry(flags, stands, said, default, more)
+    return OptionEntry(flags, stands, said, default, more)
 
 
-def argument(stands: str, said: str = "", default: Any = NEEDED) -> Entry:
+def argument(stands: str, said: str = "", default: Any = NEEDED) -> OptionEntry:
     """An argument."""
-    return Entry("", stands, said, default, {})
+    return OptionEntry("", stands, said, default, {})
 
 
-def flag(flags: str, said: str, *, default: bool = False) -> Entry:
+def flag(flags: str, said: str, *, default: bool = False) -> OptionEntry:
     """An option without a value."""
-    return Entry(flags, "", said, default, {})
+    return OptionEntry(flags, "", said, default, {})
 
 
 OUT, RESULT = Path("out"), "Of plan, or a closed_loop.json of mpc."

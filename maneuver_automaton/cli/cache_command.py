@@ -32,7 +32,10 @@ def show() -> int:
     for folder in _folders():
         files = files_of([folder])
         size = sum(status.st_size for _, status in files) / MEGABYTE
-        rows.append([_what(folder, now), str(len(files)), f"{size:.1f}", str(folder)])
+        what = "compiled kernels" if folder == now else "compiled kernels of another version"
+        if folder.name == FOLDER:
+            what = f"tables of the cost to go, at most {MOST_BYTES / MEGABYTE:g} MB"
+        rows.append([what, str(len(files)), f"{size:.1f}", str(folder)])
     columns = ["", "files", "MB", "folder"]
     console().print(table("", columns, rows, numbers=(1, 2)), soft_wrap=True)
     return FOUND
@@ -60,13 +63,6 @@ def _folders() -> list[Path]:
             found += sorted(user_cache_folder().glob(f"{KERNELS}*"))
         found.append(user_cache_folder() / FOLDER)
     return [folder for folder in found if folder.is_dir() and not folder.is_symlink()]
-
-
-def _what(folder: Path, now: Path | None) -> str:
-    """What a folder is for."""
-    if folder.name == FOLDER:
-        return f"tables of the cost to go, at most {MOST_BYTES / MEGABYTE:g} MB"
-    return "compiled kernels" if folder == now else "compiled kernels of another version"
 
 
 def compile_all(*, jobs: int | None) -> int:

@@ -193,6 +193,11 @@ def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: 
             raise InvalidScenario(f"{folder}: no scenario in it has a receding_horizon, need one")
     make_folder(out)
     alone = replace(options, jobs=1, scheduler=None)
+
+    def ready() -> None:  # with the kernels in the cache, or every process would compile them
+        with announced(quiet=options.quiet):
+            load_kernels("words", "insertion", "lattice", "improvement")
+
     return run_folder(
         functools.partial(_row, command=command, out=out, options=alone, folder=Path.cwd()),
         problems,
@@ -201,7 +206,7 @@ def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: 
         jobs=options.jobs,
         scheduler=options.scheduler,
         quiet=options.quiet,
-        ready=functools.partial(_compile_first, quiet=options.quiet),
+        ready=ready,
     )
 
 
@@ -233,9 +238,3 @@ def _row(
         reason = explained(error)
         return path, Row(name=path.name, code=BAD_INPUT, status="bad input", reason=reason)
     return path, outcome.row(path, known=outcome.done or command == "mpc")
-
-
-def _compile_first(*, quiet: bool) -> None:
-    """Have the kernels in the cache, or every process would compile them for itself."""
-    with announced(quiet=quiet):
-        load_kernels("words", "insertion", "lattice", "improvement")

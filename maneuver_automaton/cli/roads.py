@@ -143,7 +143,10 @@ def _drives(job: Job) -> JobResult:
     scenes, vehicle, name = _scenes(job)
     steps, quiet = job.options.budgets.steps, job.options.quiet
     limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
-    most = sum(_most_steps(scene, steps) for scene in scenes.values())
+    lasting = [min(one.last_time - one.start.time, LONGEST) for one in scenes.values()]
+    ticks = [tick_of(one.step) for one in scenes.values()]
+    ends = [max(math.ceil(s / tick), 1) for s, tick in zip(lasting, ticks, strict=True)]
+    most = sum(n if steps is None else min(steps, n) for n in ends)  # so that a bar has an end
     with progress_bar("planning before the start, then steps", most, quiet=quiet) as advance:
         try:
             drive = drive_roads(
@@ -159,13 +162,6 @@ def _drives(job: Job) -> JobResult:
         status=drive.status,
         complaints=() if drive.reached else (f"{drive.status}: {drive.reason}",),
     )
-
-
-def _most_steps(scene: RoadScene, steps: int | None) -> int:
-    """How many steps a vehicle may take, so that a bar has an end."""
-    lasting = min(scene.last_time - scene.start.time, LONGEST)
-    most = max(math.ceil(lasting / tick_of(scene.step)), 1)
-    return most if steps is None else min(steps, most)
 
 
 def _scenes(job: Job) -> tuple[dict[str, RoadScene], RoadVehicle, str]:

@@ -19,7 +19,7 @@ from maneuver_automaton.formats.closed_loop_json import (
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, simulate, simulate_many
-from maneuver_automaton.recording import Fact, recording_of
+from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.loops import causes, statistics_facts
 from maneuver_automaton.scenario import Scenario
 from maneuver_automaton.scenario.scenario import disturbance_of
@@ -51,7 +51,11 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
         result = replace(result, reason=INTERRUPTED)
     result = replace(result, timing_s={**scenario.timing_s, **result.timing_s})
     found, status, name = result.plan is not None, result.status.value, scenario.name
-
+    facts = [  # the cost with the gap, too, where that was asked for and is open
+        replace(one, note=f", gap {100.0 * (result.gap or 0.0):.2g} %")
+        for one in (() if budgets.gap is None else recording_of(result).facts)
+        if one.bound is not None and one.bound != one.value
+    ]
     return JobResult(
         name=name,
         result=result,
@@ -59,17 +63,8 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
         done=found,
         status=status,
         complaints=() if found else ("; ".join([f"{status}: {result.reason}", *result.notes]),),
-        facts=() if budgets.gap is None else _with_gap(result),
+        facts=tuple(facts),
         first_plan=result.timing_s.get("first_plan"),
-    )
-
-
-def _with_gap(result: PlanResult) -> tuple[Fact, ...]:
-    """The cost with the gap, too, where that was asked for and is open."""
-    return tuple(
-        replace(one, note=f", gap {100.0 * (result.gap or 0.0):.2g} %")
-        for one in recording_of(result).facts
-        if one.bound is not None and one.bound != one.value
     )
 
 

@@ -58,8 +58,9 @@ class Output(io.TextIOBase):
             yield
         except (OSError, ValueError) as error:
             self.failure = error if isinstance(error, OSError) else OSError(str(error))
-            with contextlib.suppress(OSError, AttributeError, ValueError):
-                _lead_nowhere(self.fileno())  # or the flush at exit would fail once more
+            suppressed = contextlib.suppress(OSError, AttributeError, ValueError)
+            with suppressed, Path(os.devnull).open("w") as nowhere:
+                os.dup2(nowhere.fileno(), self.fileno())  # or the flush at exit would fail, too
 
 
 @contextlib.contextmanager
@@ -82,8 +83,3 @@ def open_closed_streams() -> None:
         while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
             continue
         os.close(number)
-
-
-def _lead_nowhere(number: int) -> None:
-    with Path(os.devnull).open("w") as nowhere:
-        os.dup2(nowhere.fileno(), number)

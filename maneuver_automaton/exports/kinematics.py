@@ -55,7 +55,10 @@ def kinematics(rows: PlanArrays, samples: PlanArrays, model: Model | None) -> di
     if model is not None:
         rates = twist_rates(model, rows.reduced_state, rows.control)
         felt = accelerations(rows.twist, rates)
-        inertia = bool(model.reduced_names) and _has_inertia(model, rows)
+        inertia = any(  # the velocity depends on the reduced state: it changes at a finite rate
+            _derivative(model, rows.reduced_state, rows.control, along, 0.0).any()
+            for along in np.eye(len(model.reduced_names))
+        )
     columns["curvature_1_m"] = _curvature(rows, rates, model)
     if (steering := component(rows, "steering")) is not None:
         columns["steering_rad"] = steering
@@ -139,14 +142,6 @@ def _bend_at_rest(model: Model, rows: PlanArrays) -> Array:
         moves = change[:, 0] != 0.0
         bend[moves] = change[moves, 2] / change[moves, 0]
     return bend
-
-
-def _has_inertia(model: Model, rows: PlanArrays) -> bool:
-    """Whether the velocity depends on the reduced state, so that it changes at a finite rate."""
-    return any(
-        _derivative(model, rows.reduced_state, rows.control, along, 0.0).any()
-        for along in np.eye(rows.reduced_state.shape[1])
-    )
 
 
 def twist_rates(model: Model, state: Array, control: Array) -> Array:

@@ -254,20 +254,15 @@ def _ended(log: FleetLog, vehicles: Mapping[str, Any]) -> FleetStepEntry:
     values = [
         one["steps"][-1]["value"] for name, one in vehicles.items() if name not in log.broken_down
     ]
-    return {
-        "time_s": float(log.times[-1]),
-        "value": None if None in values else math.fsum(values),
-        "accumulated_cost": math.fsum(one["accumulated_cost"] for one in last),
-        "arrived": sorted(log.arrived_s),
-        "swaps": [],
-        "asked": [],
-        "void": [],
-        "refused": [],
-        "broken_guarantees": [],
-        "gap_m": None,
-        "distance_m": None,
-        "solve_s": None,
-    }
+    return entry(
+        FleetStepEntry,
+        None,
+        time_s=log.times[-1],
+        value=None if None in values else math.fsum(values),
+        accumulated_cost=math.fsum(one["accumulated_cost"] for one in last),
+        arrived=sorted(log.arrived_s),
+        **{key: [] for key in ("swaps", "asked", "void", "refused", "broken_guarantees")},
+    )
 
 
 # -- one vehicle
@@ -301,42 +296,30 @@ def _row(
     step: FleetStep, name: str, piece: Plan, cost: float, held: Plan | None, problem: Problem
 ) -> DroveEntry:
     plan, automaton = step.driven[name], problem.automaton
-    now, control = step.plans[name], step.control_of(name)
+    now = step.plans[name]
     exchanged = {one for swap in step.swaps for one in swap.names} | set(step.void)
-    return {
-        "time_s": float(step.time),
-        "pose": plan.start.tolist(),
-        "value": number(step.values[name]),
-        "accumulated_cost": cost,
-        "control": None if control is None else control.tolist(),
-        "word": list(plan.word),
-        "plan": words_of(plan, automaton),
-        "replanned": name in exchanged,
-        "number": step.number,
-        "vehicle_pose": piece.start.tolist(),
-        "measured_pose": step.poses[name].tolist(),
-        "arrival_s": number(step.arrivals[name]),
-        "off_plan_m": float(step.off_plan[name]),
-        "plan_time_s": float(plan.start_time),
-        "held": None if now is held else _held(now, automaton),
-        "driven": words_of(piece, automaton) if _is_other(piece, plan) else None,
-    }
-
-
-def _held(plan: Plan, automaton: Automaton) -> HeldEntry:
-    """The plan that is held from a step on, from where and when it began."""
-    return {
-        "time_s": float(plan.start_time),
-        "pose": plan.start.tolist(),
-        "plan": words_of(plan, automaton),
-    }
-
-
-def _is_other(piece: Plan, plan: Plan) -> bool:
-    """Whether what was driven is not the begin of the plan, but of other velocities."""
-    return any(
-        not np.array_equal(one.body_velocity, other.body_velocity)
-        for one, other in zip(piece.trims, plan.trims, strict=False)
+    other = any(  # what was driven is not the begin of the plan, but of other velocities
+        not np.array_equal(one.body_velocity, meant.body_velocity)
+        for one, meant in zip(piece.trims, plan.trims, strict=False)
+    )
+    begun = {"time_s": now.start_time, "pose": now.start, "plan": words_of(now, automaton)}
+    return entry(
+        DroveEntry,
+        step,
+        pose=plan.start,
+        value=step.values[name],
+        accumulated_cost=cost,
+        control=step.control_of(name),
+        word=plan.word,
+        plan=words_of(plan, automaton),
+        replanned=name in exchanged,
+        vehicle_pose=piece.start,
+        measured_pose=step.poses[name],
+        arrival_s=step.arrivals[name],
+        off_plan_m=step.off_plan[name],
+        plan_time_s=plan.start_time,
+        held=None if now is held else entry(HeldEntry, None, **begun),
+        driven=words_of(piece, automaton) if other else None,
     )
 
 

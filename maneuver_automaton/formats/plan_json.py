@@ -39,6 +39,7 @@ from maneuver_automaton.formats.entries import (
     Whole,
     entry,
     made,
+    of,
     says,
 )
 from maneuver_automaton.groups import group_of
@@ -149,7 +150,9 @@ class PlanDocument(DocumentHead):
     status: Annotated[str, says("how planning ended")]
     narrowest: NotRequired[Annotated[NarrowestEntry | None, says("only where one is known")]]
     cost: NotRequired[Known]
-    cost_parts: NotRequired[Annotated[CostPartsEntry, says("only where places are priced")]]
+    cost_parts: NotRequired[
+        Annotated[CostPartsEntry, of("cost_parts"), says("only where places are priced")]
+    ]
     duration_s: NotRequired[Known]
     lower_bound: NotRequired[Annotated[Known, says("no plan costs less")]]
     gap: NotRequired[Annotated[Known, says("(cost - lower_bound) / cost")]]

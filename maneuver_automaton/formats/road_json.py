@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from typing import Annotated, Literal, NotRequired
+from typing import Annotated, Any, Literal, NotRequired
 
 import numpy as np
 from pydantic import Field
@@ -16,12 +16,11 @@ from typing_extensions import TypedDict
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.formats.documents import (
     FLEET,
-    SCHEMA,
     ClearanceEntry,
     ClosestEntry,
     DocumentHead,
     ModelEntry,
-    package_version,
+    document_of,
     vehicle_entry,
 )
 from maneuver_automaton.formats.entries import Flag, Known, Number, Whole, entry, number, says
@@ -145,60 +144,48 @@ class RoadFleetDriveDocument(SeveralEntry):
 def road_plan_to_dict(result: RoadPlanResult) -> RoadPlanDocument:
     """The content of plan.json; without a plan the numbers are null and the lists empty."""
     plan, verdict = result.plan, result.verdict
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "name": result.planner.scene.name,
-        "vehicle": vehicle_entry(result.planner.vehicle.model),
-        "automaton_hash": library_hash(result.planner.library),
-        "status": "no_plan" if plan is None else "found",
-        "reason": result.reason,
-        "cost": result.cost,
-        "duration_s": None if plan is None else plan.duration,
-        "lower_bound": None,
-        "bound": None,
-        "gap": None,
-        "certificate": None,
-        "primitives": _primitives(plan),
-        "stop": _primitives(result.stop),
-        "terminal_error": None,
-        "clearance_m": None if verdict is None else number(verdict.clearance_m),
-        "trajectory": trajectory_entry(plan),
-        "audit": None if verdict is None else _audit(verdict),
-        "alternatives": [],
-        "timing_s": {"search": result.search_s},
-        "counts": {},
-        "improvements": [],
-        "notes": list(result.notes),
-    }
+    unknown = ("lower_bound", "bound", "gap", "certificate", "terminal_error")
+    return document_of(
+        RoadPlanDocument,
+        result,
+        **_library(result.planner),
+        **dict.fromkeys(unknown),
+        status="no_plan" if plan is None else "found",
+        duration_s=None if plan is None else plan.duration,
+        primitives=_primitives(plan),
+        stop=_primitives(result.stop),
+        clearance_m=None if verdict is None else verdict.clearance_m,
+        trajectory=trajectory_entry(plan),
+        audit=None if verdict is None else _audit(verdict),
+        alternatives=[],
+        timing_s={"search": result.search_s},
+        counts={},
+        improvements=[],
+    )
 
 
 def road_fleet_to_dict(result: RoadFleetResult, *, status: str, reason: str) -> RoadFleetDocument:
     """The content of plan.json for several vehicles on one road."""
     plans = result.plans.values()
     verdicts = [one.verdict for one in result.results.values() if one.verdict is not None]
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "kind": FLEET,
-        "name": result.name,
-        "status": status,
-        "reason": reason,
-        "cost": math.fsum(one.cost or 0.0 for one in result.results.values() if one.plan),
-        "sum_s": math.fsum(plan.duration for plan in plans),
-        "last_s": max((plan.start_time + plan.duration for plan in plans), default=0.0),
-        "clearance_m": {
-            "between": number(result.distance_m),
-            "to_obstacles": number(min((one.clearance_m for one in verdicts), default=math.inf)),
-        },
-        "closest": [entry(ClosestEntry, one) for one in result.pairs],
-        "order": list(result.order),
-        "timing_s": {"search": result.search_s},
-        "notes": joint_notes(result),
-        "vehicles": {
+    near = min((one.clearance_m for one in verdicts), default=math.inf)
+    return document_of(
+        RoadFleetDocument,
+        result,
+        kind=FLEET,
+        status=status,
+        reason=reason,
+        cost=math.fsum(one.cost or 0.0 for one in result.results.values() if one.plan),
+        sum_s=math.fsum(plan.duration for plan in plans),
+        last_s=max((plan.start_time + plan.duration for plan in plans), default=0.0),
+        clearance_m={"between": number(result.distance_m), "to_obstacles": number(near)},
+        closest=result.pairs,
+        timing_s={"search": result.search_s},
+        notes=joint_notes(result),
+        vehicles={
             name: {**road_plan_to_dict(one), "name": name} for name, one in result.results.items()
         },
-    }
+    )
 
 
 def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> RoadFleetDriveDocument:
@@ -211,56 +198,44 @@ def road_fleet_drive_to_dict(drive: RoadFleetDrive) -> RoadFleetDriveDocument:
     }
     driven = drive.plans.values()
     rows = drive.results.values()
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "kind": FLEET,
-        "name": drive.name,
-        "status": drive.status,
-        "reason": drive.reason,
-        "reached": drive.reached,
-        "cost": math.fsum(one["cost"] for one in vehicles.values()),
-        "duration_s": max((plan.duration for plan in driven), default=0.0),
-        "last_s": max((plan.start_time + plan.duration for plan in driven), default=0.0),
-        "planned_before_s": drive.before.search_s,
-        "clearance_m": {
-            "between": number(drive.distance_m),
-            "to_obstacles": number(min(one.verdict.clearance_m for one in rows)),
-        },
-        "closest": [entry(ClosestEntry, one) for one in drive.pairs],
-        "collisions": sum(one.verdict.collisions for one in rows),
-        "notes": joint_notes(drive),
-        "vehicles": vehicles,
-    }
+    near = min(one.verdict.clearance_m for one in rows)
+    return document_of(
+        RoadFleetDriveDocument,
+        drive,
+        kind=FLEET,
+        cost=math.fsum(one["cost"] for one in vehicles.values()),
+        duration_s=max((plan.duration for plan in driven), default=0.0),
+        last_s=max((plan.start_time + plan.duration for plan in driven), default=0.0),
+        planned_before_s=drive.before.search_s,
+        clearance_m={"between": number(drive.distance_m), "to_obstacles": number(near)},
+        closest=drive.pairs,
+        collisions=sum(one.verdict.collisions for one in rows),
+        notes=joint_notes(drive),
+        vehicles=vehicles,
+    )
 
 
 def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None) -> DriveDocument:
     """The content of closed_loop.json; `before` is the search that was made before the start."""
     spent = np.concatenate([[0.0], np.cumsum([step.applied_cost for step in drive.steps])])
     verdict, driven = drive.verdict, drive.driven
-    return {
-        "schema": SCHEMA,
-        "version": package_version(),
-        "name": drive.planner.scene.name,
-        "vehicle": vehicle_entry(drive.planner.vehicle.model),
-        "automaton_hash": library_hash(drive.planner.library),
-        "status": drive.status,
-        "reason": drive.reason,
-        "reached": drive.reached,
-        "cost": float(spent[-1]),
-        "duration_s": driven.duration,
-        "step_s": drive.planner.tick,
-        "steps_bound": None,
-        "planned_before_s": None if before is None else before.search_s,
-        "audit": {**_audit(verdict), "pieces": len(drive.steps), "failed": len(verdict.faults)},
-        "min_clearance_m": number(verdict.clearance_m),
-        "collisions": verdict.collisions,
-        "broken_guarantees": [
+    return document_of(
+        DriveDocument,
+        drive,
+        **_library(drive.planner),
+        cost=spent[-1],
+        duration_s=driven.duration,
+        step_s=drive.planner.tick,
+        steps_bound=None,
+        planned_before_s=None if before is None else before.search_s,
+        audit={**_audit(verdict), "pieces": len(drive.steps), "failed": len(verdict.faults)},
+        min_clearance_m=verdict.clearance_m,
+        collisions=verdict.collisions,
+        broken_guarantees=[
             {"step": None, "guarantee": GUARANTEES[what], "reason": reason}
             for what, reason in verdict.faults
         ],
-        "notes": list(drive.notes),
-        "steps": [
+        steps=[
             *(
                 _step(drive.planner, step, float(cost))
                 for step, cost in zip(drive.steps, spent, strict=False)
@@ -275,6 +250,15 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
                 accumulated_cost=spent[-1],
             ),
         ],
+    )
+
+
+def _library(planner: RoadPlanner) -> dict[str, Any]:
+    """The keys that name a road, a vehicle and its library."""
+    return {
+        "name": planner.scene.name,
+        "vehicle": vehicle_entry(planner.vehicle.model),
+        "automaton_hash": library_hash(planner.library),
     }
 
 

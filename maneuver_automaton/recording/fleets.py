@@ -14,7 +14,6 @@ from maneuver_automaton.fleet import (
     DrivenVerdict,
     FleetLog,
     FleetResult,
-    FleetStep,
     verify_driven,
 )
 from maneuver_automaton.fleet.driven import whole_pieces
@@ -306,7 +305,15 @@ def _steps(log: FleetLog) -> Table:
             shown(step.distance_m, 3),
             _several([" and ".join(swap.names) for swap in step.swaps]),
             str(len(step.asked)),
-            _happened(step),
+            "; ".join(
+                f"{what}: {_several(names)}"
+                for what, names in (
+                    ("plan void", step.void),
+                    ("not let in", step.refused),
+                    ("broken", [one.guarantee.value for one in step.violations]),
+                )
+                if names
+            ),
             f"{1e3 * step.solve_s:.2f}",
         ]
         for step, value, spent in zip(log.steps, log.values.tolist(), _spent(log), strict=False)
@@ -323,15 +330,6 @@ def _spent(log: FleetLog) -> Array:
         for step, cost in log.costs_of(name).items():
             spent[step + 1] += cost
     return np.cumsum(spent)
-
-
-def _happened(step: FleetStep) -> str:
-    kinds = (
-        ("plan void", step.void),
-        ("not let in", step.refused),
-        ("broken", [one.guarantee.value for one in step.violations]),
-    )
-    return "; ".join(f"{what}: {_several(names)}" for what, names in kinds if names)
 
 
 def _several(names: Sequence[str]) -> str:

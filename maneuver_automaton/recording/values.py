@@ -385,6 +385,11 @@ def world_of(*problems: Problem, margin: float = 0.0) -> Environment:
         # problems made alike hold the same shapes and maps
         same = (id(one.shape), id(one.motion)) if isinstance(one, Obstacle) else (id(one),)
         around.setdefault(same, one)
+    sides = {}
+    for axis in ("x", "y"):
+        known = [side for one in problems if (side := getattr(one.bounds, axis)) is not None]
+        if len(known) == len(problems):
+            sides[axis] = (min(low for low, _ in known), max(high for _, high in known))
     return Environment(
         obstacles=tuple(around.values()),
         zones=tuple({id(zone): zone for one in problems for zone in one.zones}.values()),
@@ -396,18 +401,9 @@ def world_of(*problems: Problem, margin: float = 0.0) -> Environment:
                 if isinstance(cost, Ground)
             }.values()
         ),
-        bounds=problems[0].bounds if len(problems) == 1 else _loosest(problems),
+        bounds=problems[0].bounds if len(problems) == 1 else Bounds(**sides),
         margin=margin,
     )
-
-
-def _loosest(problems: tuple[Problem, ...]) -> Bounds:
-    sides = {}
-    for axis in ("x", "y"):
-        known = [side for one in problems if (side := getattr(one.bounds, axis)) is not None]
-        if len(known) == len(problems):
-            sides[axis] = (min(low for low, _ in known), max(high for _, high in known))
-    return Bounds(**sides)
 
 
 def asked_for(distance: float, margin: float) -> str:

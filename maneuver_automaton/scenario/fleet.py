@@ -247,7 +247,9 @@ def fleet_of_document(
             _entry(document, k, one),
             path=path,
             begin=begin,
-            own=_if_named(own, one, file),
+            own=own
+            if own and own.name == getattr(one.vehicle or file.vehicle, "model", "")
+            else None,
             shared=shared,
         )
         for k, one in enumerate(file.vehicles)
@@ -422,12 +424,6 @@ def _entry(document: Document, k: int, entry: VehicleEntry) -> Document:
         value["start"] = {**value["start"], "time_s": entry.start_time_s}
         homes["start", "time_s"] = (*where, "start_time_s")
     return replace(document, value=value, homes=homes)
-
-
-def _if_named(own: Model | None, entry: VehicleEntry, file: FleetFile) -> Model | None:
-    """A user's model, if it is that of an entry: the others are the package's."""
-    vehicle = file.vehicle if entry.vehicle is None else entry.vehicle
-    return own if own is not None and vehicle is not None and vehicle.model == own.name else None
 
 
 def _names(document: Document, entries: Sequence[VehicleEntry]) -> tuple[str, ...]:

@@ -114,7 +114,14 @@ def stated_places(
             what = type(cost).__name__
             raise ValueError(f"cost: a scenario file states one Clearance and Ground, not {what}")
         if cost.raster is None:
-            ground += [_area(cost, shape) for shape in cost.areas]
+            for shape in cost.areas:
+                if isinstance(shape, Disc):
+                    raise ValueError(
+                        "cost: a scenario file states ground by polygons, not by a disc"
+                    )
+                per = {} if cost.per == "metre" else {"per": cost.per}
+                corners = {"polygon_m": shape.corners.tolist(), **holes_entry(shape)}
+                ground.append({**corners, "price": cost.price, **per})
             continue
         known = next((one for one in files if one.ground is cost), None)
         if known is None:
@@ -123,10 +130,3 @@ def stated_places(
         key = next(key for key in ("raster", "costmap", "elevation") if key in entry)
         ground.append(entry | {key: relative(known.path, folder)})
     return said | ({"ground": ground} if ground else {})
-
-
-def _area(cost: Ground, shape: Any) -> dict[str, Any]:
-    if isinstance(shape, Disc):
-        raise ValueError("cost: a scenario file states ground by polygons, not by a disc")
-    entry = {"polygon_m": shape.corners.tolist(), **holes_entry(shape), "price": cost.price}
-    return entry if cost.per == "metre" else {**entry, "per": cost.per}
