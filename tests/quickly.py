@@ -11,9 +11,12 @@ from hypothesis import settings
 FEW, MANY = 25, 60  # numbers that Hypothesis draws for a law, in the default run and with -m slow
 
 
-def quick_are(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
-    """The values as parameters of a test, all but `quick` of them marked as slow."""
-    return [pytest.param(one, marks=() if one in quick else pytest.mark.slow) for one in values]
+def quick_are(
+    quick: Collection[Any], values: Iterable[Any], *, exhaustive: bool = False
+) -> list[Any]:
+    """The values as parameters of a test, all but `quick` of them marked as slow, or exhaustive."""
+    slow = [pytest.mark.slow, *([pytest.mark.exhaustive] if exhaustive else [])]
+    return [pytest.param(one, marks=() if one in quick else slow) for one in values]
 
 
 def draws(many: int) -> int:

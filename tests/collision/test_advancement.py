@@ -256,7 +256,9 @@ def test_by_hand_what_is_not_there_is_not_met(present, clock, duration, free):
     assert got == pytest.approx(free, abs=2e-3)
 
 
-@pytest.mark.parametrize("name", quick_are(["car", "disc"], ["car", "truck", "disc"]))
+@pytest.mark.parametrize(
+    "name", quick_are(["car", "disc"], ["car", "truck", "disc"], exhaustive=True)
+)
 def test_free_motions_are_free_of_what_is_there(name):
     rng = np.random.default_rng([6, *name.encode()])
     footprint, met = scenes.FOOTPRINTS[name], 0

@@ -24,7 +24,7 @@ def proof(max_trims, *, scale=1.0, radius=3.0, least=1.0, tolerance=0.05, most_b
     )
 
 
-@pytest.mark.parametrize("max_trims", quick_are([5], [3, 4, 5]))
+@pytest.mark.parametrize("max_trims", quick_are([5], [3, 4, 5], exhaustive=True))
 def test_no_goal_has_a_greater_factor_than_the_proven_one(max_trims):
     proven = proof(max_trims)
     assert proven.finished

@@ -15,6 +15,7 @@ from maneuver_automaton.recording import recording_of
 from maneuver_automaton.roads import RoadBenchmark, RoadVehicle, drive_scene, road_planner
 from tests.exports.cases import assert_close, drive_on_lanes
 from tests.plotting.cases import parking_plan
+from tests.quickly import quick_are
 from tests.roads.files import LANES, car, problem, scene_of
 
 DATA = Path(__file__).parents[2] / "../shared/data/commonroad/scenarios"
@@ -111,8 +112,7 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch, tmp_path):
 @pytest.mark.parametrize(
     "name",
     [
-        pytest.param("DEU_Ffb-1_6_T-1", marks=pytest.mark.slow),
-        pytest.param("USA_US101-1_1_S-1", marks=pytest.mark.slow),
+        *quick_are((), ["DEU_Ffb-1_6_T-1", "USA_US101-1_1_S-1"], exhaustive=True),
         "ZAM_Urban-3_1",
     ],
 )

@@ -17,9 +17,11 @@ from maneuver_automaton.fleet import (
 )
 from tests.matrix.scenes import beside, pillar
 from tests.matrix.vehicles import VEHICLES
+from tests.quickly import quick_are
 
 QUICK = ("unicycle", "car", "dubins", "grid", "boat", "omni")
-ROWS = [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow]) for name in VEHICLES]
+LONGEST = ("helicopter", "glider")  # in space
+ROWS = [row for name in VEHICLES for row in quick_are(QUICK, [name], exhaustive=name in LONGEST)]
 
 
 def two_of(name: str) -> FleetProblem:

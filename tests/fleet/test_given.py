@@ -39,11 +39,14 @@ def check(name, most):
     assert result.lower_bound <= result.cost
 
 
-@pytest.mark.parametrize("name", quick_are([name for name in SMALL if "alcove" not in name], SMALL))
+@pytest.mark.parametrize(
+    "name", quick_are([name for name in SMALL if "alcove" not in name], SMALL, exhaustive=True)
+)
 def test_few_vehicles(name):
     check(name, SMALL[name])
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LARGE)
 def test_many_vehicles(name):

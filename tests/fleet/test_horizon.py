@@ -12,16 +12,12 @@ import maneuver_automaton as ma
 from maneuver_automaton import FleetHorizon, FleetProblem, simulate_fleet
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
-from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.fleet import FleetGuarantee, FleetStatus, Swap, plan_fleet
 from maneuver_automaton.fleet.agreement import _Agreement
-from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.guarantees import broken
-from maneuver_automaton.fleet.held import left_to_pay, off_plan, rest_of_plan, resting
-from maneuver_automaton.fleet.meetings import gap_between, meetings
+from maneuver_automaton.fleet.meetings import gap_between
 from maneuver_automaton.fleet.moment import Moment
 from maneuver_automaton.fleet.vehicle import OwnPlan, vehicles_of
-from maneuver_automaton.fleet.workers import PlanRequest, Terms, ToPass, answered
 from maneuver_automaton.groups import SE2
 from tests.fleet.robots import (
     at_rest,
@@ -35,7 +31,6 @@ from tests.fleet.robots import (
 from tests.quickly import quick_are
 
 LONG_S = 60.0  # [s] for a step: no clock decides
-ORIGIN = (0.0, 0.0, 0.0)
 
 
 def loop_of(fleet, **more):
@@ -139,31 +134,6 @@ def test_who_has_no_time_drives_on_beside_its_plan():
     assert log.reached
     assert [*log.violations] == []
     assert not any(step.void or step.swaps for step in log.steps)
-
-
-def test_searches_leave_time_for_what_follows_them():
-    state = FleetHorizon(crossing(), step=0.5, time_limit=1.0).state
-    assert state.kept_s == 0.5  # nothing is known yet
-    for _ in range(100):
-        state.note_end(0.1)
-    assert 0.1 < state.kept_s < 0.2
-    now = Moment(state, 0.0, {}, Budget.from_now(1.0))
-    assert now.budget.deadline - now.searches.deadline == pytest.approx(state.kept_s)
-    state.note_end(5.0)
-    assert state.kept_s < 1.0
-
-
-def test_without_time_only_the_way_alone_is_looked_for():
-    vehicle = vehicles_of(crossing())[0]
-    rest = resting(vehicle, vehicle.problem.start, 0.0)
-    stands = FleetCourse(((Disc(0.3),),), (Motion([0.0], [[0.0, 0.0, 0.0]]),))
-    other = ToPass(1, OwnPlan(rest.plan, math.inf, 0, stands), 0.0)
-    terms = Terms(0.0, 0.0, 0.0, known=math.inf, most=1500, tube_m=0.0, keep=math.inf)
-    request = PlanRequest(0, rest, (other,), terms)
-    found, alone = answered(vehicle, request, Budget.from_now(60.0), lambda one: one.course)
-    assert found.cost > alone.cost
-    found, _ = answered(vehicle, request, Budget.from_now(0.0), lambda one: one.course)
-    assert found is None
 
 
 def test_swaps_per_step_and_the_rotating_order():
@@ -300,38 +270,7 @@ def test_known():
     assert broken_by(now) == [(FleetGuarantee.KNOWN, ("a",))]
 
 
-def gap_of(courses, **more):
-    return gap_between(courses, keep=0.1, frame=ORIGIN, **more)
-
-
-def test_the_gap_that_is_proven():
-    for gap in (0.15, 0.4, 0.9):
-        now = pair(gap)
-        proven = gap_of(courses_of(now)).distance
-        assert gap - 0.05 < proven <= gap
-    now = pair(0.05)
-    assert gap_of(courses_of(now)).distance == 0.0
-
-
-def test_a_gap_that_still_holds_is_not_measured_again():
-    now = pair(0.4)
-    courses = courses_of(now)
-    proven = gap_of(courses)
-    before, after = proven.nearest.time - 0.1, proven.nearest.time + 0.1
-    assert gap_of(courses, time=before, last=proven).nearest is proven.nearest
-    assert gap_of(courses, time=after, last=proven).nearest is not proven.nearest
-    # Who holds another plan is looked at, and so is what is left where one of the nearest is gone.
-    third = FleetCourse(courses[0].shapes, (Motion([0.0], [[0.0, -0.9, 0.0]]),))
-    far = replace(third, motions=(Motion([0.0], [[0.0, -9.0, 0.0]]),))
-    near = gap_of({**courses, 2: third}, time=before, last=proven)
-    assert near.distance == pytest.approx(0.3, abs=0.02)
-    known = gap_of({**courses, 2: far}, time=before, last=proven)
-    assert known.nearest is proven.nearest
-    assert known.held[2] is far
-    assert gap_of({0: courses[0], 2: far}, time=before, last=known).distance == 1.1
-
-
-@pytest.mark.parametrize("seed", quick_are([0, 1], range(3)))
+@pytest.mark.parametrize("seed", quick_are([0, 1], range(3), exhaustive=True))
 def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
     fleet = scattered(2 + 3 * seed, seed)
     steps = loop_of(fleet, steps=60).steps
@@ -347,42 +286,3 @@ def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
 
 
 # -- what is left of a plan
-
-
-def test_what_is_left_of_a_plan():
-    now = pair()
-    vehicle, found = now.vehicles[0], now.held[0]
-    assert left_to_pay(vehicle, found, 0.5) == pytest.approx(1.5)
-    assert left_to_pay(vehicle, found, 5.0) == 0.0
-    assert math.isinf(left_to_pay(vehicle, resting(vehicle, found.plan.start, 0.0), 1.0))
-    assert rest_of_plan(vehicle, found, 0.5).start == pytest.approx([0.5, 0.0, 0.0])
-
-
-def test_how_far_a_body_is_off_its_plan():
-    now = pair()
-    vehicle, held = now.vehicles[0], now.held
-    assert off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.1, 0.0])) == pytest.approx(0.1)
-    turned = off_plan(vehicle, held[0], 1.0, np.array([1.0, 0.0, 0.2]))
-    assert turned == pytest.approx(2.0 * 0.3 * math.sin(0.1))  # a disc that turns does not move
-
-
-def test_what_is_left_of_a_course():
-    motion = Motion([0.0, 2.0, 3.0], [[0, 0, 0], [2, 0, 0], [2, 0, 1.0]], [[1, 0, 0], [0, 0, 1]])
-    course = FleetCourse(((Disc(0.3),),), (motion,))
-    for time in (0.0, 0.7, 2.0, 2.5, 3.0, 4.0):
-        (left,) = course.after(time).motions
-        assert left.time[0] == pytest.approx(time)
-        for later in np.linspace(time, 5.0, 7):
-            assert left.at(later) == pytest.approx(motion.at(later), abs=1e-12)
-
-
-@pytest.mark.parametrize("first", [0, 1])
-def test_who_begins_later_stands_at_its_start_until_then(first):
-    passing = FleetCourse(
-        ((Disc(0.3),),), (Motion([0.0, 4.0], [[-2, 0, 0], [2, 0, 0]], [[1, 0, 0]]),)
-    )
-    later = FleetCourse(
-        ((Disc(0.3),),), (Motion([9.0, 10.0], [[0, 0, 0], [0, 1, 0]], [[0, 1, 0]]),)
-    )
-    (met,) = meetings({first: passing, 1 - first: later}, keep=0.0)
-    assert met.time == pytest.approx(1.4, abs=1e-3)

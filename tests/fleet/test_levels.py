@@ -230,6 +230,7 @@ def test_a_moved_fleet_in_space_has_the_moved_plans():
             assert other.plans[name].durations == pytest.approx(plan.durations, abs=1e-5)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_helicopter_of_the_airfield_flies_as_if_it_were_alone():
     fleet = load_scenario(SCENARIOS / "fleets" / "airfield.yaml").fleet

@@ -21,8 +21,10 @@ from maneuver_automaton.fleet.workers import WorkerPool
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
+from maneuver_automaton.scenario import load_scenario
 from tests.fleet import fleets
 from tests.inertia import unicycle_automaton
+from tests.scenario.test_vehicles import SCENARIOS
 
 
 def test_cars_whose_ways_cross_let_each_other_pass():
@@ -270,3 +272,13 @@ def test_an_obstacle_of_its_own_may_pass_its_goal_later():
     too_soon = plan_fleet(fleets.fleet_of([([0, 0, 0], [4, 0, 0])]), time_limit=2.0, max_rounds=0)
     assert not verify_fleet(fleet, too_soon.plans).passed
     assert verify_fleet(fleet, result.plans).passed
+
+
+@pytest.mark.exhaustive
+@pytest.mark.slow
+def test_both_give_way_in_the_alcove():
+    """One after another the second waits until the first has gone by: 26.9 s."""
+    alcove = load_scenario(SCENARIOS / "fleets" / "alcove.yaml").fleet
+    result = plan_fleet(alcove, time_limit=60.0, max_rounds=6)
+    assert result.status is FleetStatus.FOUND
+    assert result.sum_s < 23.5

@@ -22,6 +22,7 @@ from tests.search.cases import compiled_only
 
 SCENES = all_kinematic()
 QUICK = [name for name, scene in SCENES.items() if scene.quick]
+LONGEST = "obstacles/11"  # 17 s
 MOST = 1e-3  # share by which a plan may be dearer where a reason is given
 EXACT = 1e-6  # [m or rad] durations are kept to 13 digits
 
@@ -31,7 +32,14 @@ def test_every_scene_is_kept_and_no_other():
 
 
 @compiled_only
-@pytest.mark.parametrize("name", params({name: scene.quick for name, scene in SCENES.items()}))
+@pytest.mark.parametrize(
+    "name",
+    [
+        row
+        for name, scene in SCENES.items()
+        for row in params({name: scene.quick}, exhaustive=name == LONGEST)
+    ],
+)
 def test_the_plan_is_the_same_or_cheaper(name):
     problem = against_kept(name, kept("scenes")[name], record_of(planned(name)))
     assert not problem, problem

@@ -93,7 +93,8 @@ def test_a_plan_has_the_best_of_its_times():
 @compiled_only
 def test_plans_with_maneuvers_have_slopes_too():
     here = ma.load_scenario("scenarios/robot_with_inertia.yaml").problem
-    plan = ma.plan(here, time_limit=1.0).plan
+    first = ma.SearchSettings(improve=False, polish=False)
+    plan = ma.plan(replace(here, search=first), time_limit=60.0).plan
     assert any(plan.maneuvers)
     here = replace(here, place_costs=ma.Clearance(2.0, 6.0))
     prices = TimedPrices(here.bound_place_costs, plan, here.automaton.model)

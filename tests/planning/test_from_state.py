@@ -82,11 +82,12 @@ def test_moved_problem_has_the_moved_plan() -> None:
 def test_polished_is_no_costlier_and_keeps_its_ends() -> None:
     problem = problem_of("second_order_car")
     alone = ma.plan(problem, time_limit=5.0)
-    polished = ma.plan(replace(problem, search=ma.SearchSettings()), time_limit=3.0)
+    polished = ma.plan(replace(problem, search=ma.SearchSettings()), time_limit=1.0)
     assert polished.cost <= alone.cost * (1.0 + 1e-9)
     assert polished.audit.passed
 
 
+@pytest.mark.slow
 def test_polished_is_the_optimum_of_a_straight_line() -> None:
     """From 1.3 m/s over 12 m to rest: up to 2.5 m/s at 1 m/s^2, along, and down."""
     library = ma.load_stock_library("second_order_car")

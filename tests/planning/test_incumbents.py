@@ -14,11 +14,11 @@ from maneuver_automaton import planning
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.same_motion import Likeness
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Box, Disc, Zone
+from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning.blocked import blocked_ends
 from maneuver_automaton.planning.checking import Condition, what_is_hit
-from maneuver_automaton.planning.incumbents import LATE, Candidate, Incumbents
+from maneuver_automaton.planning.incumbents import Candidate, Incumbents
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.refinement.fitting import COSTLIER, SHORT, with_lasting_coasts
@@ -122,28 +122,6 @@ def test_what_is_not_proven_free_may_hit_something_without_a_word():
     assert not found.refusals
 
 
-def test_checks_ask_the_clock_too():
-    """A few plans may be refused once the time is over; then the others are left alone."""
-    problem = replace(FREE, obstacles=(WALL,))
-    now = 1.0
-    over = Budget(began=0.0, deadline=1.0, clock=lambda: now)
-    found = Incumbents(problem, over, Workspace(problem.obstacles))
-    hits = [
-        Candidate(1.0 + k, 0, functools.partial(driven, "ahead", durations=[3.5 + 0.01 * k]))
-        for k in range(3 * LATE)
-    ]
-    found.offer_in_turn(hits)
-    assert len(found.refusals) == LATE
-    now = 2.0
-    late = Incumbents(problem, over, Workspace(problem.obstacles))
-    late.offer_in_turn(hits)
-    assert (len(late.refusals), late.unchecked) == (0, 1)
-    assert late.why_unchecked == "a plan was found too late to be checked within 1 s"
-    unhurried = incumbents(problem)
-    unhurried.offer_in_turn(hits)
-    assert len(unhurried.refusals) == 3 * LATE
-
-
 def test_what_a_search_has_noted_is_an_improvement_once():
     found = incumbents(FREE)
     found.note(9.0, at=0.5)
@@ -151,36 +129,6 @@ def test_what_a_search_has_noted_is_an_improvement_once():
     found.note(4.0, at=1.5)
     assert found.offer(AHEAD, 0)  # its end closed, it costs what the search said
     assert found.improvements == [(0.5, 9.0), (1.5, 4.0)]
-
-
-def test_no_other_plan_is_checked_where_the_time_is_over():
-    over = Budget(began=0.0, deadline=1.0, clock=lambda: 1.0)
-    found = Incumbents(FREE, over, Workspace(()), alternatives=2)
-    found.offer_in_turn([Candidate(1.0, 0, lambda plan=plan: plan) for plan in (AHEAD, TURNING)])
-    assert [one.plan for one in found.plans] == [AHEAD]
-
-
-def test_a_check_is_given_up_between_two_edges_and_not_where_others_have_delayed_it():
-    turns = driven("ahead", "left", "ahead", durations=[0.5, 0.1, 0.5])
-    problem = replace(FREE, goals=Goal(pose=turns.end), obstacles=(Disc(0.1, [0.0, 3.0]),))
-    for ticks, worked, checked in ((0.0, 0.0, True), (0.4, -math.inf, False), (0.4, 1e9, True)):
-        clock = itertools.count(0.9, ticks)
-        budget = Budget(began=0.0, deadline=1.0, clock=lambda c=clock: next(c), worked=worked)
-        found = Incumbents(problem, budget, Workspace(problem.obstacles))
-        assert found.offer(turns, 0) is checked
-        assert found.unchecked == (not checked)
-
-
-def test_the_time_of_checks_is_kept_back_from_searches():
-    ticks = itertools.count(0.0, 0.25)  # so that a check takes a quarter of a second
-    found = Incumbents(
-        FREE, Budget(began=0.0, deadline=9.0, clock=lambda: next(ticks)), Workspace(())
-    )
-    before = found.for_better.deadline
-    assert found.offer(AHEAD, 0)
-    assert found.longest_check >= 0.25
-    assert found.for_better.deadline <= 9.0 - found.longest_check < before < 9.0
-    assert found.for_first.deadline > found.for_better.deadline
 
 
 def test_a_short_trim_is_left_out_before_a_plan_is_checked() -> None:

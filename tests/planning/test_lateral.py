@@ -136,6 +136,7 @@ def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
 
 
 @compiled_only
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_zone_holds_in_its_half_of_the_plane(limited):
     zone = Zone(shape=BEYOND, max_lateral_acceleration=1.0)
@@ -168,6 +169,7 @@ def test_a_moved_problem_has_the_moved_plan():
 
 
 @compiled_only
+@pytest.mark.slow
 def test_a_car_with_a_trailer_keeps_the_limit_too():
     truck = CarWithTrailer(
         wheelbase=3.0, hitch_length=4.0, max_steering=0.6, max_speed=4.0, max_hitch=0.9

@@ -15,6 +15,7 @@ from tests.search.cases import compiled_only
 pytestmark = compiled_only
 SAME = 1e-3  # of a cost: polishing ends in one optimum with steps of another size
 SEARCH = ma.SearchSettings(max_expansions=2000)
+LONGEST = (pytest.mark.slow, pytest.mark.exhaustive)
 TURNS = ma.UserModel(
     name="turns",
     group=ma.SE2,
@@ -41,17 +42,18 @@ def problem(count: int, goal: list[float]) -> ma.Problem:
 
 
 @pytest.mark.parametrize(
-    ("goal", "optimum"),
+    ("goal", "optimum", "counts"),
     [
-        ([10.77, -4.52, -0.48], 11.83),
-        pytest.param([0.28, 10.81, -2.24], 21.951, marks=pytest.mark.slow),
+        ([10.77, -4.52, -0.48], 11.83, (3, 5)),
+        pytest.param([10.77, -4.52, -0.48], 11.83, (9,), marks=pytest.mark.slow),
+        pytest.param([0.28, 10.81, -2.24], 21.951, (3, 5, 9), marks=LONGEST),
     ],
 )
-def test_turns_of_few_curvatures_are_polished_to_those_of_many(goal, optimum):
+def test_turns_of_few_curvatures_are_polished_to_those_of_many(goal, optimum, counts):
     """The optimum: the least cost that 17 curvatures or another start have led to."""
     pytest.importorskip("casadi")
-    costs = [ma.plan(problem(count, goal), time_limit=60).cost for count in (3, 5, 9)]
-    assert costs == pytest.approx([optimum] * 3, rel=SAME)
+    costs = [ma.plan(problem(count, goal), time_limit=60).cost for count in counts]
+    assert costs == pytest.approx([optimum] * len(counts), rel=SAME)
 
 
 @pytest.mark.exhaustive

@@ -41,7 +41,8 @@ def test_a_plan_for_a_gap_that_is_too_narrow_does_not_exist(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "library", quick_are(["second_order_car"], ["second_order_car", "car_with_trailer"])
+    "library",
+    quick_are(["second_order_car"], ["second_order_car", "car_with_trailer"], exhaustive=True),
 )
 def test_the_proof_does_not_wait_until_the_time_is_over(library):
     """Also for a vehicle with inertia, of whose body alone the proof speaks."""

@@ -69,7 +69,9 @@ def test_a_tolerance_is_used_in_free_space(name):
     assert both.cost <= min(near.cost, turned.cost) + 1e-6
 
 
-@pytest.mark.parametrize("name", quick_are(["unicycle"], ["unicycle", "car", "dubins"]))
+@pytest.mark.parametrize(
+    "name", quick_are(["unicycle"], ["unicycle", "car", "dubins"], exhaustive=True)
+)
 def test_a_tolerance_is_used_among_obstacles(name):
     body = {"obstacles": [STONE], "footprint": Box([0.4, 0.3])}
     exact, near = found(to_goal(name, **body)), found(to_goal(name, FAR, TURNED, **body))

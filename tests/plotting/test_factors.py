@@ -30,6 +30,7 @@ def test_left_and_right_are_alike(words):
     assert np.allclose(factors, factors[:, ::-1], atol=1e-6)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_picture(words, tmp_path):
     save_factor_figure(words, tmp_path / "factor.png")

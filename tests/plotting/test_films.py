@@ -64,6 +64,7 @@ class TestPlans:
         shown.show(8.0)
         assert len(parts_of(shown)["trails"].get_segments()) == 4
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_films_are_small_white_and_move(self, tmp_path):
         save_film(among(), tmp_path / "plan.gif")

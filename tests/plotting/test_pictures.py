@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -15,14 +14,10 @@ from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus
-from maneuver_automaton.plotting import Look, draw_plane, figure_of, player_of, save_picture
+from maneuver_automaton.plotting import Look, draw_plane, figure_of, save_picture
 from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.colors import fleet_colors
-from maneuver_automaton.plotting.distances import distance_times, nearest_others, thinned
-from maneuver_automaton.plotting.over_time import draw_bars, draw_distances
 from maneuver_automaton.plotting.pages import DPI
 from maneuver_automaton.problem import Goal, Problem
-from maneuver_automaton.receding_horizon import Disturbance
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
 from tests.fleet import robots
@@ -40,7 +35,6 @@ from tests.plotting.cases import (
 from tests.plotting.fleets import answer, crossing, fleet_of, no_answer, row_of
 from tests.plotting.loops import (
     LOOPS,
-    flight_loop,
     helpless_loop,
     parking_loop,
     pushed_loop,
@@ -50,7 +44,6 @@ from tests.plotting.loops import (
 from tests.quickly import quick_are
 
 CAR = Box([0.9, 0.5], [0.2, 0.0])
-NOISE = Disturbance(position_m=0.01, heading_rad=0.01)
 NOBODY = fleet_of([no_answer([0, 0, 0], [1, 0, 0])], names=["a"])
 
 
@@ -272,26 +265,6 @@ class TestPages:
 
 
 class TestLoops:
-    def test_a_trim_that_goes_on_is_drawn_once(self):
-        loop = parking_loop()
-        track = cast_of(recording_of(loop)).actors[0].track
-        assert [piece.name for piece in track.pieces] == ["clockwise", "straight", "spin", "rest"]
-        assert np.allclose(track.end, loop.poses[-1], atol=1e-9)
-        _, artists = drawn(loop)
-        assert len(artists["path"].get_segments()) == 2
-        assert len(artists["spins"].get_segments()) == 1
-
-    def test_the_path_is_where_the_vehicle_was(self):
-        loop = straight_loop()
-        _, artists = drawn(loop)
-        corners = np.concatenate(artists["path"].get_segments())
-        assert np.allclose(corners[[0, -1]], loop.poses[[0, -1], :2], atol=1e-9)
-        assert len(artists["held"].get_segments()) == len(loop.steps) == 35
-        new = [step.pose[:2] for step in loop.steps if step.replanned]
-        assert len(artists["held anew"].get_segments()) == len(new)
-        assert np.allclose(artists["replanned"].get_offsets(), new)
-        assert artists["jumps"].get_segments() == []
-
     @pytest.mark.parametrize("make", [straight_loop, pushed_loop])
     def test_scales_are_equal_and_nothing_lies_outside(self, make):
         loop = of_body(make(), Box([0.5, 0.3]))
@@ -303,23 +276,6 @@ class TestLoops:
             assert left < x < right
             assert low < y < high
 
-    def test_disturbances_are_dotted_and_the_tolerance_is_a_disc(self):
-        loop = pushed_loop()
-        ax, artists = drawn(loop)
-        jumps = artists["jumps"].get_segments()
-        assert len(jumps) == len(loop.steps)
-        assert np.allclose(jumps[0], [loop.driven[0].end[:2], loop.poses[1, :2]])
-        assert artists["tolerance 0"].radius == 0.1
-        names = [text.get_text() for text in ax.get_legend().get_texts()]
-        assert {"goal tolerance", "disturbance", "replanned", "plan of a step"} <= set(names)
-
-    def test_bodies_on_top_of_each_other_are_drawn_once(self):
-        loop = straight_loop()
-        _, crowded = drawn(of_body(loop, Disc(1.0)))
-        assert len(crowded["bodies"].get_paths()) < 10
-        _, sparse = drawn(of_body(loop, Disc(0.001)))
-        assert len(sparse["bodies"].get_paths()) == len(loop.poses)
-
     def test_value_and_cost_have_a_constant_sum(self):
         loop = parking_loop()
         cost = figure_of(loop).axes[1]
@@ -327,20 +283,6 @@ class TestLoops:
         assert np.allclose(total.get_ydata(), loop.cost)
         assert np.allclose(spent.get_ydata()[[0, -1]], [0.0, loop.cost])
         assert np.allclose(total.get_xdata(), loop.times)
-
-    def test_what_noise_took_is_marked(self):
-        loop = pushed_loop()
-        taken = [step.time for step in loop.steps if step.disturbed]
-        crosses = figure_of(loop).axes[1].collections[-2].get_offsets()
-        assert taken
-        assert np.allclose(crosses[:, 0], taken)
-
-    def test_times_per_step_are_on_whole_decades(self):
-        loop = straight_loop()
-        ax = figure_of(loop).axes[-1]
-        assert ax.get_yscale() == "log"
-        assert np.allclose(ax.lines[0].get_ydata(), loop.solve_s)
-        assert np.allclose(np.log10(ax.get_ylim()), np.round(np.log10(ax.get_ylim())))
 
     def test_how_a_loop_ended(self):
         for loop, said in (
@@ -350,11 +292,6 @@ class TestLoops:
         ):
             assert texts_of(figure_of(loop))[0].startswith(said)
         assert texts_of(figure_of(parking_loop()))[1].startswith("cost 4.66158 · duration 4 s")
-
-    def test_a_flight_shows_its_altitude(self):
-        labels = [ax.get_ylabel() for ax in figure_of(flight_loop()).axes]
-        over_time = ["cost", "speed [m/s]", "turn", "climb [m/s]", "z [m]", "to decide [s]"]
-        assert labels == ["y [m]", *over_time]
 
 
 class TestFleets:
@@ -378,78 +315,6 @@ class TestFleets:
         expected += [back.pose_at(t)[:2] for t in times if 0.5 < t < 5.5]
         np.testing.assert_allclose(middles, expected, atol=1e-9)
 
-    def test_one_without_a_plan_is_hatched_at_its_start(self):
-        result = crossing()
-        _, artists = drawn(result)
-        (missing,), (wanted,) = artists["missing"].get_paths(), artists["wanted"].get_paths()
-        np.testing.assert_allclose(missing.vertices[:4].mean(axis=0), [5.0, 3.0], atol=1e-9)
-        assert artists["missing"].get_hatch()
-        np.testing.assert_allclose(wanted.vertices[:4].mean(axis=0), [0.0, 3.0], atol=1e-9)
-        assert "stuck: walls enclose the start" in texts_of(figure_of(result))
-        many = fleet_of([no_answer([0, k, 0], [1, k, 0]) for k in range(7)], names=list("abcdefg"))
-        assert "a, b, c, d and 3 more: too narrow" in texts_of(figure_of(many))
-
-    def test_points_are_marks(self):
-        ahead, lost = plan_of(["straight"], [2.0]), no_answer([0, 5, 0], [3, 5, 0])
-        _, artists = drawn(fleet_of([answer(ahead), lost], names=["a", "b"]))
-        marks = {
-            "start marks": ahead.start[:2], "goal marks": ahead.end[:2],
-            "missing marks": [0.0, 5.0], "wanted marks": [3.0, 5.0],
-        }  # fmt: skip
-        for what, place in marks.items():
-            np.testing.assert_allclose(artists[what].get_offsets(), [place])
-        assert artists["starts"].get_paths() == artists["missing"].get_paths() == []
-
-    def test_each_has_its_colour_everywhere(self):
-        result, colors = crossing(), fleet_colors(3)
-        _, artists = drawn(result)
-        bars = draw_bars(Figure().add_subplot(), cast_of(recording_of(result)))
-        for shown in (artists["paths"].get_colors(), artists["goals"].get_facecolor()):
-            np.testing.assert_allclose(shown[:, :3], colors[:2], atol=1e-3)
-        np.testing.assert_allclose(to_rgb(bars.get_facecolor()[0]), colors[0], atol=1e-3)
-
-    def test_bars_tell_drives_from_rests(self):
-        bars = draw_bars(Figure().add_subplot(), cast_of(recording_of(crossing())))
-        spans = [sorted({*path.vertices[:, 0].tolist()}) for path in bars.get_paths()]
-        assert spans == [[0.0, 4.0], [0.5, 1.5], [1.5, 5.5]]
-        shades = bars.get_facecolor()[:, :3].sum(axis=1)
-        assert shades[1] > shades[2]
-
-    def test_many_are_numbered_and_their_steps_on_request(self):
-        figure = figure_of(row_of(14))
-        assert {text.get_text() for text in figure.axes[0].texts} == {str(k + 1) for k in range(14)}
-        numbered = figure_of(crossing(), look=Look(numbered=True)).axes[0].texts
-        assert {text.get_text() for text in numbered} <= {str(k) for k in range(7)}
-        assert numbered
-
-    def test_distances_are_those_of_the_bodies(self):
-        cast = cast_of(recording_of(crossing()))
-        times = distance_times(cast.begin, cast.end)
-        least = nearest_others(cast.actors, times).min(axis=1)
-        assert least.min() == pytest.approx(1.0)
-        ax = Figure().add_subplot()
-        draw_distances(ax, cast, times, least)
-        assert ax.lines[1].get_ydata()[0] == 0.05
-        flat = np.where(np.isfinite(least), least, 9.0)
-        assert min(thinned(times, flat, most=10)[1]) == flat.min()
-
-    def test_the_picture_has_the_plane_the_bars_and_the_distances(self):
-        figure = figure_of(crossing(), look=Look(title="Crossing"))
-        plane, bars, distances = figure.axes
-        assert plane.get_xlabel() == "x [m]"
-        assert [text.get_text() for text in bars.get_yticklabels()] == ["there", "back", "stuck"]
-        assert bars.get_xlim() == distances.get_xlim()
-        assert "shapely every 0.05 s" in distances.get_title(loc="left")
-        assert figure.texts[0].get_text() == "Crossing"
-        wanted = {"there", "start", "goal", "no plan", "obstacle", "margin, 0.05 m"}
-        assert wanted | {"not there at that time"} <= set(legend_of(figure))
-
-    def test_obstacles_that_several_share_are_drawn_once(self):
-        _, artists = drawn(crossing())
-        times = cast_of(recording_of(crossing())).scene.times
-        assert len(artists["obstacles"].get_paths()) == 1
-        assert len(artists["traffic"].get_paths()) == 2 * len(times)
-
     def test_a_moved_fleet_has_the_moved_picture(self):
         by, result = SE2([3.0, -2.0, 0.7]), row_of(3)
         plans = result.plans.values()
@@ -461,9 +326,6 @@ class TestFleets:
         for one, other in zip(*paths, strict=True):
             np.testing.assert_allclose(by.act(one.vertices), other.vertices, atol=1e-9)
 
-    def test_notebooks_show_the_picture(self):
-        assert crossing()._repr_png_()[1:4] == b"PNG"
-
 
 def fleet_loop(**more):
     fleet = robots.crossing(tolerance=0.1, margin=0.2)
@@ -472,31 +334,11 @@ def fleet_loop(**more):
 
 
 @pytest.fixture(scope="module")
-def noisy():
-    return fleet_loop(disturbance=NOISE)
-
-
-@pytest.fixture(scope="module")
 def broken():
     return fleet_loop(breaks_s={"a": 2.0}, joins_s={"b": 1.0})
 
 
 class TestFleetLoops:
-    def test_all_are_where_they_were(self, noisy):
-        cast = cast_of(recording_of(noisy))
-        for one in cast.actors:
-            for piece in noisy.driven[one.name]:
-                if piece.start_time < one.arrival:
-                    at = one.mover.pose_at(piece.start_time)
-                    np.testing.assert_allclose(at, piece.start, atol=1e-12)
-            assert one.arrival == noisy.arrived_s[one.name]
-            assert all(end <= one.arrival for _, end, _ in one.spans)
-            times = [time for time, _ in one.jumps]
-            assert times == sorted(times)
-            assert 0.0 < max(np.hypot(*(line[1] - line[0])) for _, line in one.jumps) < 0.1
-        sampled = nearest_others(cast.actors, distance_times(cast.begin, cast.end)).min()
-        assert noisy.distance_m - 1e-9 <= sampled <= noisy.distance_m + 0.05
-
     def test_values_fall_by_what_is_spent(self):
         recording = recording_of(fleet_loop())
         curves = {(one.label, one.mover): one.value for one in recording.curves}
@@ -506,29 +348,12 @@ class TestFleetLoops:
         np.testing.assert_allclose(curves["value", "a"] + curves["value", "b"], values, atol=1e-9)
         assert not any(one.jumps for one in cast_of(recording).actors)
 
-    def test_the_picture(self, noisy, broken):
-        figure = figure_of(broken)
-        assert len(figure.axes) == 4
-        names = legend_of(figure)
-        assert {"a", "b", "not arrived", "plan held", "spent", "sum"} <= set(names)
-        assert "disturbance" not in names
-        assert "disturbance" in legend_of(figure_of(noisy))
-        assert "a: it broke down" in texts_of(figure)
-
     def test_who_joins_is_not_there_before(self, broken):
         a, b = cast_of(recording_of(broken)).actors
         assert not b.mover.is_there(0.5)
         assert b.mover.is_there(1.0)
         assert b.bodies_at(0.5) == []
         assert not a.mover.reached
-
-    def test_the_page(self, broken):
-        content = player_of(broken, title="A crossing").content
-        a, b = content["motions"]
-        assert (a["joins"], b["joins"]) == (False, True)
-        assert a["reason"] == "it broke down"
-        assert content["fleet"]["value"]["v"][-1] == 0.0
-        assert dict(content["facts"])["vehicles"] == "1 of 2 arrived"
 
     def test_nobody_comes_in_and_one_alone(self):
         log = fleet_loop(joins_s={"b": 1e6})

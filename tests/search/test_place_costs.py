@@ -143,7 +143,7 @@ def test_dear_ground_in_the_open_is_worth_a_detour():
 @pytest.mark.parametrize("by", [SE2([30.0, -7.0, 2.0])])
 def test_a_moved_problem_has_the_moved_plan(by):
     problem = corridor(ma.Clearance(4.0, 1.5))
-    here, there = ma.plan(problem), ma.plan(problem.moved(by))
+    here, there = (ma.plan(one, time_limit=60.0) for one in (problem, problem.moved(by)))
     assert there.plan.word == here.plan.word
     assert there.cost == pytest.approx(here.cost, rel=1e-6)
     assert math.isclose(there.plan.duration, here.plan.duration, rel_tol=1e-5)
