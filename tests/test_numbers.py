@@ -206,6 +206,8 @@ def test_no_kernel_is_compiled_for_numbers_as_people_write_them(name):
         (lambda: ma.Horizon(max_trims=2.5), "Horizon: max_trims: got 2.5, need a whole number"),
         (lambda: ma.Bounds(x=(0, "far")), "Bounds: x: got .*, need two numbers"),
         (lambda: ma.Cost(time=1j), "Cost: time: got 1j, need a number"),
+        (lambda: PLAN.sample(max_step_m=0), "plan: steps must be positive, got 0.0 m and 0.05 rad"),
+        (lambda: PLAN.sample(max_step_rad=float("nan")), "plan: steps must be positive, got 0.05"),
     ],
 )
 def test_what_is_no_number_is_named(make, message):
@@ -215,6 +217,7 @@ def test_what_is_no_number_is_named(make, message):
 
 FREE = ma.Problem(robot(Plain()), [0, 0, 0], [3, 1, 0])
 PLANNER = ma.Planner(FREE.automaton)
+PLAN = ma.Plan([0, 0, 0], FREE.automaton.trims[1:3], durations=[1, 1])
 ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "time_limit": (lambda v: ma.plan(FREE, time_limit=v).cost, 60),
     "alternatives": (lambda v: len(ma.plan(FREE, alternatives=v).alternatives), 1),
@@ -232,6 +235,10 @@ ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "step": (lambda v: ma.simulate(FREE, step=v, steps=2).cost, 1),
     "steps": (lambda v: ma.simulate(FREE, step=1, steps=v).cost, 2),
     "applied": (lambda v: analysis.discrete_index([1, 1.5, 1.7, 1.8], applied=v), 1),
+    "within": (lambda v: ma.design_library(FREE.automaton, within=v).factor, 1),
+    "most": (lambda v: ma.design_library(FREE.automaton, most=v).factor, 9),
+    "max_step_m": (lambda v: len(PLAN.sample(max_step_m=v).time), 1 / 2),
+    "max_step_rad": (lambda v: len(PLAN.sample(max_step_rad=v).time), 1 / 2),
     "horizon": (lambda v: analysis.continuous_index([1, 4], [1, 1], horizon=v, step=2), 4),
 }
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array
+from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
 from maneuver_automaton._brief import brief
 from maneuver_automaton.analysis.coverage import poses_in_ball
 from maneuver_automaton.automaton import Automaton
@@ -140,6 +140,8 @@ def design_library(
     (12, 1.04)
     """
     cost = Cost(length=1.0) if cost is None else cost
+    within, most = as_number("design: within", within), as_whole("design: most", most)
+    tolerance = as_number("design: tolerance", tolerance)
     _check(candidates, cost, within, most, max_trims)
     moving = np.flatnonzero(candidates.body_velocities.any(axis=1))
     twists = candidates.body_velocities[moving]

@@ -122,6 +122,9 @@ class LatticeWords(PlanningStep):
             found.offer_in_turn(self.candidates)
         if not found.is_enough:
             found.offer_in_turn(self.improved())
+        if self.finds_plans and self.words and not found.plans:
+            # a goal next to the start counts as met in the lattice: other words lead round to it
+            found.offer_in_turn(self._free_words(FREE_WORDS))
         if self.polish and self.words:
             self.polish.otherwise = self.offer_best_times
         if self.finds_plans and self.words:  # which words the checks did not confirm
@@ -292,12 +295,17 @@ class LatticeWords(PlanningStep):
         candidates = [_candidate(query, word) for word in (*self.words, *better.others)]
         if found.alternatives and not self.for_others.is_over:
             # words that are locally optimal in free space: collision-free ones are so here, too
-            goals, most = _goals(query), FREE_WORDS * found.alternatives
-            stages = free_words(found, goals, others=most, share=FREE_WORDS_SHARE)
-            for word, index in words_once(stages):
-                candidates.append(word_candidate(found.problem, word, index, proven=False))
+            candidates += self._free_words(FREE_WORDS * found.alternatives)
             candidates += self._detours(better.word, 2 * found.alternatives)
         return sorted(candidates, key=lambda one: one.cost)
+
+    def _free_words(self, most: int) -> list[Candidate]:
+        found = self.found
+        stages = free_words(found, _goals(self.query), others=most, share=FREE_WORDS_SHARE)
+        return [
+            word_candidate(found.problem, word, index, proven=False)
+            for word, index in words_once(stages)
+        ]
 
     def _for_the_best(self) -> Budget:
         """Budget for the improvement of the best plan."""

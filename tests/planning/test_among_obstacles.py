@@ -294,6 +294,18 @@ def test_start_is_goal(turns):
     assert waiting.plan.durations == pytest.approx([3.0])
 
 
+@pytest.mark.parametrize("off", [(0.0, 3e-9, 0.0), (-1e-8, 0.0, 0.0), (1e-9, 2e-9, 1e-9)])
+@pytest.mark.parametrize("heading", [0.0, 2.3])
+def test_what_no_check_takes_for_the_goal_yet_is_reached_once_round(off, heading):
+    always_on = Automaton.of_controls(ROBOT.model, {"S": (1, 0), "L": (1, 1), "R": (1, -1)})
+    obstacles = (Obstacle(Disc(0.5, [9.0, 9.0])),)
+    start = np.array([0.0, 0.0, heading])
+    result = found(Problem(always_on, start, start + off, obstacles=obstacles, search=QUICK))
+    assert result.cost <= 2.0 * math.pi + 1e-6  # a full turn, and what is left
+    met = found(Problem(always_on, start, start + np.array(off) / 20.0, obstacles=obstacles))
+    assert met.cost <= 1e-8
+
+
 def test_straight_on_by_hand():
     result = found(replace(BASE, goals=(Goal(pose=[-2.0, 0.0, 0.0]),)))
     assert result.plan.word == ("S-",)

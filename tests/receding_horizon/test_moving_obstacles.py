@@ -84,6 +84,16 @@ class TestWaitingAndEvading:
         assert passing.motion is not None
         assert np.hypot(*(passing.motion.at(loop.times[-1]) - loop.poses[-1])[:2]) > 0.8
 
+    @pytest.mark.parametrize("side", [(9.0, 0.0), (6.0, 6.0)])
+    def test_before_a_goal_that_becomes_occupied_it_stops(self, side):
+        stays = moving_obstacle([0.0, 5.0], [side, (6.0, 0.0)])
+        loop = simulate(among(stays), step=0.5, steps=20, time_limit=0.1)
+        assert_free(loop)
+        away = np.hypot(*(loop.poses[:, :2] - [6.0, 0.0]).T)
+        assert away[8:].max() <= away[8] + 1e-9  # on, and never back
+        assert away[-1] < 1.5
+        assert set(decisions(loop)[-4:]) == {Decision.STOPPED}
+
     def test_a_goal_that_need_not_stay_free_is_taken_at_once(self):
         passing = moving_obstacle([0.0, 7.6, 14.0], [(6.0, -7.6), (6.0, -1.0), (6.0, 5.0)])
         loop = simulate(among(passing), step=0.5, stand=0.5)
