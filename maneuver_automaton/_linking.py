@@ -27,6 +27,7 @@ from maneuver_automaton._records import hand_over_by_address
 
 CALLED = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object, ctypes.py_object, ctypes.c_void_p)
 
+COMPILED = "_ZN"  # begins the names of functions that numba compiled
 NAMES_ONLY = "maneuver_automaton.names_only"  # marks a module that defines no more than names
 
 
@@ -53,7 +54,11 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         super().finalize()
 
     def _verify_declare_only_symbols(self) -> None:
-        """What is shared stays a name, which is known by now."""
+        """Refuse a name that nothing defines; what is shared stays one, which the engine knows."""
+        for one in self._final_module.functions:
+            is_ours = one.is_declaration and one.name.startswith(COMPILED)
+            if is_ours and not self._codegen._engine.is_symbol_defined(one.name):
+                raise AssertionError(f"{self.name}: nothing defines {one.name}")
 
     def serialize_using_object_code(self) -> tuple[str, str, tuple[bytes, bytes]]:
         """Its machine code and its names; what it was made from, thrice as long, serves nobody."""

@@ -340,6 +340,7 @@ def test_what_kernels_share_is_compiled_once_and_handed_records_by_their_address
 
 
 KERNEL_IN_KERNEL = """
+from numba import types
 
 
 @kernel
@@ -355,6 +356,14 @@ def inside(x):
 @kernel
 def around(x):
     return inside(x)
+
+
+nowhere = types.ExternalFunction("_ZN7nowhere", types.float64(types.float64))
+
+
+@kernel
+def lost(x):
+    return nowhere(x[0])
 """
 
 REFUSED = """
@@ -363,10 +372,10 @@ import numpy as np
 import example_kernels
 example_kernels.reciprocals(np.array([4.0]))
 said = []
-for one in (example_kernels.twice, example_kernels.around):
+for one in (example_kernels.twice, example_kernels.around, example_kernels.lost):
     try:
         one(np.array([4.0]))
-    except TypeError as error:
+    except (AssertionError, TypeError) as error:
         said.append(str(error))
 print(json.dumps(said))
 """
@@ -381,6 +390,7 @@ def test_a_kernel_that_calls_a_kernel_is_refused_compiled_now_or_before(example)
         assert run(REFUSED, example, NUMBA_CACHE_DIR=example / "cache") == [
             "twice: calls reciprocals, which is for Python to call",
             "inside: calls reciprocals, which is for Python to call",
+            "lost: nothing defines _ZN7nowhere",
         ]
 
 

@@ -338,7 +338,7 @@ def attempt_all(one: Improving, uniform: Array, normal: Array) -> float:
         new_cost = whole_cost(one, word.new, size)
         if not new_cost < cost - GAIN * cost:
             continue
-        # What comes after the section is driven at other times: the dearest test, so the last.
+        # What comes after the section is driven at other times: the costliest test, so the last.
         if changes and not still_free(one, size, section.begin):
             continue
         take(word, size)

@@ -14,7 +14,7 @@ from maneuver_automaton.search.arrays import DistanceGrid
 BLOCKED, SETTLED, REACHED = 1, 2, 3  # marks of a cell; 0 is one that nothing is known of
 STRAIGHT, DIAGONAL = 29, 41  # a step to a neighbour, in units: 41 / 29 is 0.03 % below sqrt(2)
 DETOUR = 4  # [sides of the grid] that are preferred to a path through a wall thinner than a cell
-NARROW = 4  # how much dearer a cell is whose middle is no place for the vehicle
+NARROW = 4  # how much costlier a cell is whose middle is no place for the vehicle
 BUCKETS = 256  # a power of two, more than ``NARROW * DIAGONAL + DIAGONAL``, see `_queue`
 LISTED, N_SETTLED, AT_RIM, FAR, WRITTEN, NOW = range(6)  # places in `grid.state`
 

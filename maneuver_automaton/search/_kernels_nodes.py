@@ -40,6 +40,7 @@ EMPTY = -1  # no key, in a set of keys
 MOST_SIDES = 1 << 15  # cells along a side that have numbers of their own
 MOST_KEYS = 1 << 62  # numbers of cells: they are signed and have 64 bits
 COASTED, ROOTED = -1, -2  # in place of the maneuver that leads to a node
+SIDE_BY_SIDE = 2  # binary digits of a key that number the rows of one line of the cache
 NODE_BITS = 0x7FFFFFFF  # of an entry of the hash table: the node; above them the search
 X, Y, HEADING, Z, COST, TIME, COAST, RUN, CLEARANCE = range(9)
 PARENT, TRIM, GEAR, COUNT, ROOT, EDGE, CLOSED = range(7)
@@ -125,10 +126,14 @@ def first_slot(key: int, mask: int) -> int:
 
     Source: Knuth (1998), *The art of computer programming 3*, Sec. 6.4, Fibonacci hashing.
     """
+    # Neighbours along a row of cells stay side by side: one line of the processor's cache holds
+    # four rows of the table, and to wait for memory is most of what a look-up costs.
+    block = key >> SIDE_BY_SIDE
     # The high digits of a key (class, time, heading) are folded onto the low ones (place): cells of
     # one place could share a row otherwise. 31 bits times 32 bits stay below the sign.
-    mixed = (key ^ (key >> 23) ^ (key >> 41)) & 0x7FFFFFFF
-    return ((mixed * 0x9E3779B1) >> 15) & mask
+    mixed = (block ^ (block >> 23) ^ (block >> 41)) & 0x7FFFFFFF
+    within = key & ((1 << SIDE_BY_SIDE) - 1)
+    return ((((mixed * 0x9E3779B1) >> 15) << SIDE_BY_SIDE) | within) & mask
 
 
 @bare_inner_kernel

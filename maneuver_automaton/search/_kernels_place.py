@@ -2,7 +2,7 @@
 
 Prices are integrals over time by Gauss's rule with two points a step. A step is so short that no
 point of the vehicle moves farther than `place.step`, which goes with the cells of the raster and
-with the distance within which obstacles are dear: so costs of parts add up to those of the whole.
+with the distance within which obstacles are costly: so costs of parts add up to those of the whole.
 """
 
 from __future__ import annotations

@@ -150,16 +150,16 @@ def polish(
     """Refine times to machine precision, check that they are locally optimal, and record them.
 
     Without linear conditions, a start with at most one time free lies next to its solution, and
-    Newton changes its cost by next to nothing. A start much dearer than all words asked for
+    Newton changes its cost by next to nothing. A start much costlier than all words asked for
     need not be refined: most of the time would go there.
     """
     m = problem.library.targets.size
     if n <= 4 and m == 0:
-        dearest = found.best[found.best.size - 1]
+        costliest = found.best[found.best.size - 1]
         cost = problem.terms.pad_cost + word_extra(problem, word, n)
         for i in range(n):
             cost += problem.library.rates[word[i]] * times[i]
-        if cost > dearest + NEXT * (1.0 + abs(dearest)):
+        if cost > costliest + NEXT * (1.0 + abs(costliest)):
             return
     some = columns_of(problem.library, word, n)
     if isolated == 0:

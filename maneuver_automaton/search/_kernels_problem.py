@@ -53,7 +53,7 @@ class ScanSettings(NamedTuple):
     """How closely the free time of a word is looked at."""
 
     nodes: int  # of the grid
-    slack: float  # share by which a grid node may be dearer than the upper bound, and be looked at
+    slack: float  # share by which a grid node may cost more than the upper bound, and be looked at
     tolerance: float  # of the steering function, relative
 
 
@@ -236,7 +236,7 @@ def look_ahead(
 ) -> None:
     """Fill in the distance, turn and conditions that a word's transitions leave to its trims.
 
-    That takes no pose, and most words are too dear already then.
+    That takes no pose, and most words are too costly already then.
     """
     for k in range(seen.fixed.size):
         seen.fixed[k] = problem.fixed[k]

@@ -55,7 +55,7 @@ def any_node_may_do(
     At one of them it costs little more than the upper bound and, where a time is to be met, at one
     of them, maybe another, the last condition comes near to its target. That is no proof, but takes
     a tenth of the time that the reduced gradients and the bisection take. To climb is no reason:
-    of words that climb too many were left out, and plans came out 3 % dearer.
+    of words that climb too many were left out, and plans came out 3 % costlier.
     """
     times, out, _ = room
     q = 6 - triple[0] - triple[1] - triple[2]  # the position of four that is not solved for

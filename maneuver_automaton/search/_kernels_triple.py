@@ -109,17 +109,13 @@ def solve_triple(
     z = (z - lead[0]) * unit(-lead[1])
     heading -= lead[1]
     a, b, c = word[triple[0]], word[triple[1]], word[triple[2]]
-    steer(
+    trims = (
         (complex(twists[a, 0], twists[a, 1]), twists[a, 2]),
-        between_1,
         (complex(twists[b, 0], twists[b, 1]), twists[b, 2]),
-        between_2,
         (complex(twists[c, 0], twists[c, 1]), twists[c, 2]),
-        (z, heading),
-        tolerance,
-        out,
-        -math.inf,
     )
+    aim = (z, heading, unit(heading))
+    steer(trims, (between_1, between_2), aim, (tolerance, -math.inf), out)
 
 
 @by_value

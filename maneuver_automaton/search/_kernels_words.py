@@ -237,7 +237,7 @@ def first_of_class(links: Links, wanted: int) -> int:
 def promising(
     problem: WordProblem, left: WordProblem, word: IntArray, n: int, upper_bound: float
 ) -> bool:
-    """Whether a word can be cheaper than the dearest of the solutions asked for.
+    """Whether a word can be cheaper than the costliest of the solutions asked for.
 
     Lower bounds that hold for any times, of what its transitions have `left` to its trims: distance
     and turn at the best price per metre and radian, each linear condition at the best per unit.
@@ -368,7 +368,7 @@ def prepare_word(
     """Fill `triple`: 0 nothing to do, 1 a word that cannot span, 2 one that can.
 
     The word is one that is seen: whether its trims span, and what its transitions leave of the
-    distance, shows only there. The lower bound of its cost comes before all that is dear.
+    distance, shows only there. The lower bound of its cost comes before all that is costly.
     """
     blocks = word_blocks(problem, word, n)
     if blocks == 0 or not time_left(problem) > 0.0:
@@ -406,7 +406,7 @@ def word_blocks(problem: WordProblem, word: IntArray, n: int) -> int:
 
 @inner_kernel
 def tied_to_best(found: Found, tie: float) -> float:
-    """Largest cost that counts as equal to the dearest solution asked for."""
+    """Largest cost that counts as equal to the costliest solution asked for."""
     best: float = found.best[found.best.size - 1]
     return best + tie * (1.0 + abs(best))
 
@@ -438,7 +438,9 @@ def scan_mode(
         if (scan == 0 and n > 2 + problem.library.targets.size) or (scan == 1 and n < 3):
             continue
         portion = portions[0] if scan == 0 or n == 3 else portions[1]
-        number = 0
+        # No plain 0: until all is known of the loop numba takes it for a constant, and compiles
+        # `propose_words`, which takes half a minute, for words from number 0 as well.
+        number = 0 * last
         while number < last:
             if number == left_out:
                 number += each

@@ -27,7 +27,7 @@ from maneuver_automaton.words._kernels_library import (
     step_of,
     time_between,
 )
-from maneuver_automaton.words._kernels_steering import length, steer, steer_one, steer_two
+from maneuver_automaton.words._kernels_steering import length, steer, steer_one, steer_two, unit
 from maneuver_automaton.words.library import LibraryArrays, Scratch
 
 WHOLE = 1e-9  # share of a full turn that counts as none
@@ -46,10 +46,11 @@ def trim_and_gear(trim: int, gear: int) -> tuple[int, int]:
 @inner_kernel
 def seen(
     x: float, y: float, heading: float, to_x: float, to_y: float, to_heading: float
-) -> tuple[complex, float]:
-    """A pose seen from another, as a displacement (complex place, heading)."""
+) -> tuple[complex, float, complex]:
+    """A pose seen from another: complex place, heading, and the heading as a complex number."""
     place = complex(to_x - x, to_y - y) * complex(math.cos(heading), -math.sin(heading))
-    return place, to_heading - heading
+    turn = to_heading - heading
+    return place, turn, unit(turn)
 
 
 @bare_inner_kernel
@@ -220,34 +221,15 @@ def candidates(
                     continue
             branches = scratch.branches
             n_branches = 1
-            if n_trims == 3 and one_class:  # displacements known to be none cost no time
-                nothing = (0j, 0.0)
-                first, second, third = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
-                least = -lib.rounding.tolerance  # no branch with a time below is of use
-                steer(
-                    first,
-                    nothing,
-                    second,
-                    nothing,
-                    third,
-                    rel,
-                    lib.rounding.tolerance,
-                    branches,
-                    least,
-                )
-                n_branches = 2
-            elif n_trims == 3:
-                steer(
-                    motion_of(lib, a),
-                    step_of(lib, a, b),
-                    motion_of(lib, b),
-                    step_of(lib, b, c),
-                    motion_of(lib, c),
-                    rel,
-                    lib.rounding.tolerance,
-                    branches,
-                    -lib.rounding.tolerance,
-                )
+            if n_trims == 3:
+                motions = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
+                nothing = (0j, 0.0)  # displacements known to be none cost no time
+                steps = (nothing, nothing)
+                if not one_class:
+                    steps = (step_of(lib, a, b), step_of(lib, b, c))
+                # No branch with a time below the least is of use.
+                limits = (lib.rounding.tolerance, -lib.rounding.tolerance)
+                steer(motions, steps, rel, limits, branches)
                 n_branches = 2
             elif n_trims == 2:
                 steer_two(

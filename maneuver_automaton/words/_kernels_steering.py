@@ -115,10 +115,12 @@ def straight_time(goal: complex, velocity: complex) -> float:
 
 
 @bare_inner_kernel
-def steer_one(trim: tuple[complex, float], goal: tuple[complex, float], out: Array) -> None:
+def steer_one(
+    trim: tuple[complex, float], goal: tuple[complex, float, complex], out: Array
+) -> None:
     """Fill `out` (3,) with the time of one trim that may meet `goal`; NaN if none can."""
     v, w = trim
-    z, heading = goal
+    z, heading, _ = goal
     out[0], out[1], out[2] = math.nan, 0.0, 0.0
     if w != 0.0:
         out[0] = turn_time(heading, w)
@@ -131,7 +133,7 @@ def steer_two(
     a: tuple[complex, float],
     step: tuple[complex, float],
     b: tuple[complex, float],
-    goal: tuple[complex, float],
+    goal: tuple[complex, float, complex],
     tolerance: float,
     out: Array,
 ) -> None:
@@ -139,11 +141,11 @@ def steer_two(
     v_a, w_a = a
     d, e = step
     v_b, w_b = b
-    z, heading = goal
+    z, heading, facing = goal
     out[0], out[1], out[2] = math.nan, math.nan, 0.0
     if w_a != 0.0 and w_b != 0.0:
         r_a, r_b = radius_of(v_a, w_a), radius_of(v_b, w_b)
-        arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * unit(heading)
+        arm, aim = r_a + d - r_b * unit(e), z + r_a - r_b * facing
         if length(arm) > tolerance * (length(r_a) + length(r_b) + length(d)):
             angle = phase(aim) - phase(arm)
             out[0] = turn_time(angle, w_a)
@@ -152,44 +154,41 @@ def steer_two(
         angle = heading - e
         r_a = radius_of(v_a, w_a)
         out[0] = turn_time(angle, w_a)
-        out[1] = straight_time(z - r_a * (unit(angle) - 1.0) - d * unit(angle), v_b * unit(heading))
+        out[1] = straight_time(z - r_a * (unit(angle) - 1.0) - d * unit(angle), v_b * facing)
     elif w_b != 0.0 and length(v_a) > 0.0:
         r_b = radius_of(v_b, w_b)
-        out[0] = straight_time(z - d - r_b * (unit(heading) - unit(e)), v_a)
+        out[0] = straight_time(z - d - r_b * (facing - unit(e)), v_a)
         out[1] = turn_time(heading - e, w_b)
     elif w_a == 0.0 and w_b == 0.0 and length(v_a) > 0.0 and length(v_b) > 0.0:
-        out[0], out[1] = two_lines(z - d, v_a, v_b * unit(heading), tolerance)
+        out[0], out[1] = two_lines(z - d, v_a, v_b * facing, tolerance)
 
 
 @bare_inner_kernel
 def steer(
-    a: tuple[complex, float],
-    step_ab: tuple[complex, float],
-    b: tuple[complex, float],
-    step_bc: tuple[complex, float],
-    c: tuple[complex, float],
-    goal: tuple[complex, float],
-    tolerance: float,
+    word: tuple[tuple[complex, float], tuple[complex, float], tuple[complex, float]],
+    steps: tuple[tuple[complex, float], tuple[complex, float]],
+    goal: tuple[complex, float, complex],
+    limits: tuple[float, float],
     out: Array,
-    least: float,
 ) -> None:
     """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
 
+    `word` are the three trims, `steps` the displacements between them, `goal` the place, the
+    heading, and the heading as a number of length one: many words lead to one goal, and the sine
+    costs as much as the rest of some of them. `limits` are the tolerance and the least time.
+
     Row 0 and row 1 are two branches, each continuous in all arguments. Turning times lie in
     [0, one turn); straight times may be negative, which the caller rejects. Between two turns, or
-    beside them, one below `least` counts as none at all.
+    beside them, one below the least counts as none at all.
     """
-    v_a, w_a = a
-    d_1, e_1 = step_ab
-    v_b, w_b = b
-    d_2, e_2 = step_bc
-    v_c, w_c = c
-    z, heading = goal
+    (v_a, w_a), (v_b, w_b), (v_c, w_c) = word
+    (d_1, e_1), (d_2, e_2) = steps
+    z, heading, turn_3 = goal
+    tolerance, least = limits
     for row in range(2):
         for k in range(3):
             out[row, k] = math.nan
     turn_1 = unit(e_1) if e_1 != 0.0 else 1.0 + 0j
-    turn_3 = unit(heading)
     # A turn by the angle h, of radius r as a vector, moves the pose by ``r (e^{i h} - 1)``.
     r_a, r_b, r_c = radius_of(v_a, w_a), radius_of(v_b, w_b), radius_of(v_c, w_c)
     # The end of the word, with the centres collected: ``at_1 e^{i h_1} + at_2 e^{i h_2}`` plus what
@@ -287,15 +286,15 @@ def steer_batch(
     for row in range(k):
         i, j, l = triples[row, 0], triples[row, 1], triples[row, 2]  # noqa: E741
         first, second = displacements[row, 0], displacements[row, 1]
-        steer(
+        trims = (
             (complex(twists[i, 0], twists[i, 1]), twists[i, 2]),
-            (complex(first[0], first[1]), first[2]),
             (complex(twists[j, 0], twists[j, 1]), twists[j, 2]),
-            (complex(second[0], second[1]), second[2]),
             (complex(twists[l, 0], twists[l, 1]), twists[l, 2]),
-            (complex(goals[row, 0], goals[row, 1]), goals[row, 2]),
-            tolerance,
-            times[row],
-            -math.inf,
         )
+        steps = (
+            (complex(first[0], first[1]), first[2]),
+            (complex(second[0], second[1]), second[2]),
+        )
+        goal = (complex(goals[row, 0], goals[row, 1]), goals[row, 2], unit(goals[row, 2]))
+        steer(trims, steps, goal, (tolerance, -math.inf), times[row])
     return times
