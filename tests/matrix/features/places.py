@@ -20,7 +20,6 @@ from tests.matrix.rows import Engine, feature, without
 from tests.matrix.scenes import base, heading_midway, midway, passing, pillar
 from tests.matrix.vehicles import Vehicle
 
-
 # The first two find none in this scene within 20 s beside other work; the others were not tried.
 NO_WAY_ROUND = {
     *("second_order_unicycle", "car_with_trailer"),
