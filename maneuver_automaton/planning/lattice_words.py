@@ -17,7 +17,8 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Disc, Obstacle
+from maneuver_automaton.collision import Disc, Obstacle, OccupancyMap
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
 from maneuver_automaton.planning.checking import Condition, load_checks
@@ -46,7 +47,7 @@ from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery, 
 from maneuver_automaton.search.lattice_trims import stands_for_more
 from maneuver_automaton.search.scene import Ends
 from maneuver_automaton.search.waiting import with_waits
-from maneuver_automaton.words.word import Word
+from maneuver_automaton.words.word import Word, with_price
 
 SOME = Patience(attempts=400, passes=0)  # of a plan beside such a disc
 BRIEF = Patience(attempts=1000, passes=3)  # of the path among static obstacles
@@ -58,6 +59,9 @@ BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, where the
 ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the first
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
+ROUND_SHARE, COUNTED_ROUND = 0.3, 0.7  # of the time left, of expansions: round dear places
+DEAR = 0.2  # share of the greatest rate above which places are closed then
+PAID = 0.02  # share of a cost that its places have to cost for that
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
 MOST_DETOURS = 8  # known paths beside which others are looked for
@@ -280,6 +284,8 @@ class LatticeWords(PlanningStep):
         query, found = self.query, self.found
         if query.problem.moves and self.finds_plans:
             self._let_pass()
+        if query.problem.place_costs:
+            self._go_round()
         better = self.words_of(
             query,
             self._for_the_best(),
@@ -335,6 +341,30 @@ class LatticeWords(PlanningStep):
             if timed is not None and timed.cost < self.words[-1].cost:
                 self.gained(timed)
 
+    def _go_round(self) -> None:
+        """Note a word that leads round all dear places, if it costs less than what is known.
+
+        Estimates of the search are too low there to find a way round: it expands the places first.
+        """
+        query, best = self.query, self.words[-1]
+        invariant = with_price(query.library.priced, best).cost
+        if best.cost - invariant <= PAID * best.cost:
+            return
+        problem, left = with_dear_places_closed(query), self.for_others
+        if problem is None:
+            return
+        most = None if left.expansions is None else int(COUNTED_ROUND * left.expansions)
+        left = replace(left.part(ROUND_SHARE), expansions=most)
+        goals, library = _goals(query), query.library
+        closed = lattice_query(problem, goals, prepared=query.prepared, library=library)
+        closed = closed if self.finds_plans else late_at_first(closed)
+        word = self.words_of(closed, left, patience=AT_ONCE).word
+        if word is NO_WORD:
+            return
+        word = self.words_of(query, left, known=word, patience=AT_ONCE).word
+        if word.cost < best.cost:
+            self.gained(word)
+
     def _detours(self, best: Word, most: int) -> Iterator[Candidate]:
         """Up to `most` plans round other sides of the obstacles: a disc blocks each known path."""
         query = self.query
@@ -381,6 +411,25 @@ def _goals(query: LatticeQuery) -> list[int]:
 def _candidate(query: LatticeQuery, word: Word) -> Candidate:
     make = functools.partial(plan_of_word, query, word)
     return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
+
+
+def with_dear_places_closed(query: LatticeQuery) -> Problem | None:
+    """The problem with obstacles in place of what costs much, whatever the heading; if ends allow.
+
+    Near obstacles nothing is closed.
+    """
+    place, problem = query.around.place, query.problem
+    if not place.value.size:
+        return None
+    per_metre, per_second = place.value[:2].min(axis=(0, 1)), place.value[2:].min(axis=1).sum(0)
+    rates = per_metre + per_second
+    middle = SE2(query.world.frame) @ SE2([place.origin_x, place.origin_y, 0.0])
+    corner = middle @ SE2([-0.5 * place.cell, -0.5 * place.cell, 0.0])
+    dear = OccupancyMap(
+        rates > DEAR * rates.max(), resolution=place.cell, origin=corner.pose, name="dear places"
+    )
+    closed = replace(problem, obstacles=(*problem.obstacles, dear), place_costs=())
+    return closed if blocked_ends(closed) is None else None
 
 
 def with_way_blocked(problem: Problem, known: Plan) -> Iterator[Problem]:

@@ -59,6 +59,31 @@ def test_on_a_state_lattice(place):
     assert result.lower_bound <= result.cost < 8.0 + price_of_places(vehicle, problem, plain.plan)
 
 
+class Marsh:
+    """A user's own cost: dear in a strip across the way, in whatever direction it is crossed."""
+
+    per = "metre"
+
+    def rates(self, poses, velocities):
+        x, y = poses[..., 0], poses[..., 1]
+        return 20.0 * ((np.abs(x - 2.0) < 0.4) & (np.abs(y) < 1.0))
+
+
+CELLS = Ground.of_raster(np.full((10, 4), 20.0), resolution=0.2, origin=[1.6, -1.0, 0.0])
+
+
+@pytest.mark.parametrize("place", [Marsh(), CELLS], ids=["own", "raster"])
+def test_the_way_round_what_is_dear(place):
+    """Along the straight line the places cost 16; round them the way is 1 m longer."""
+    vehicle = VEHICLES["unicycle"]
+    search = SearchSettings(max_expansions=6000)
+    problem = vehicle.problem(goals=[4.0, 0.0, 0.0], place_costs=place, search=search)
+    result = plan(problem, time_limit=TIME_LIMIT)
+    obeys(vehicle, problem, found(result))
+    assert result.cost - cost_of(problem.cost, result.plan) < 0.1 * result.cost
+    assert result.cost < 6.0
+
+
 def test_each_of_a_fleet_pays_for_its_own_places():
     vehicle = VEHICLES["unicycle"]
     search = SearchSettings(max_expansions=600)
