@@ -94,6 +94,20 @@ def jacobian(
     return np.array(columns).T
 
 
+def hessian(
+    twists: ArrayLike, times: ArrayLike, price: ArrayLike, displacements: ArrayLike | None = None
+) -> Array:
+    """Second derivatives (n, n) of ``price . end`` by the times, by differences of differences."""
+    t = np.asarray(times, dtype=np.float64)
+    p, step = np.asarray(price, dtype=np.float64), 1e-4
+    rows = []
+    for shift in step * np.eye(t.size):
+        later = jacobian(twists, t + shift, displacements, step=step)
+        earlier = jacobian(twists, t - shift, displacements, step=step)
+        rows.append(p @ (later - earlier) / (2.0 * step))
+    return np.array(rows)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Word:
     """A word whose best times are asked for: complex numbers, one line per formula."""

@@ -6,6 +6,7 @@ import itertools
 import math
 
 import numpy as np
+import shapely
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
@@ -57,6 +58,22 @@ def grid_distances(open_: Array, price: Array, cell: float, seeds: list[tuple[in
     sources = [int(number[seed]) for seed in seeds]
     away = dijkstra(graph, indices=sources, min_only=True).reshape(open_.shape)
     return np.where(open_, away, np.inf)
+
+
+def shortest_way(solids: shapely.Geometry, start: Array, goal: Array) -> float:
+    """Length [m] of the shortest way of a point around polygons: over corners in sight."""
+    parts = [p for p in shapely.get_parts(shapely.union_all(solids)) if not p.is_empty]
+    corners = [shapely.get_coordinates(part)[:-1] for part in parts]
+    points = np.concatenate([[start, goal], *corners])
+    blocked = shapely.union_all(parts).buffer(-1e-7)
+    shapely.prepare(blocked)
+    n = len(points)
+    i, j = np.triu_indices(n, 1)
+    lines = shapely.linestrings(np.stack([points[i], points[j]], axis=1))
+    clear = ~shapely.intersects(blocked, lines)
+    lengths = np.hypot(*(points[i] - points[j]).T)
+    graph = coo_array((lengths[clear] + 1e-300, (i[clear], j[clear])), shape=(n, n)).tocsr()
+    return float(dijkstra(graph, directed=False, indices=0)[1])
 
 
 class Heap:

@@ -423,8 +423,8 @@ def with_dear_places_closed(query: LatticeQuery) -> Problem | None:
         return None
     per_metre, per_second = place.value[:2].min(axis=(0, 1)), place.value[2:].min(axis=1).sum(0)
     rates = per_metre + per_second
-    middle = SE2(query.world.frame) @ SE2([place.origin_x, place.origin_y, 0.0])
-    corner = middle @ SE2([-0.5 * place.cell, -0.5 * place.cell, 0.0])
+    middle = SE2(query.world.frame) @ SE2(np.array([place.origin_x, place.origin_y, 0.0]))
+    corner = middle @ SE2(np.array([-0.5 * place.cell, -0.5 * place.cell, 0.0]))
     dear = OccupancyMap(
         rates > DEAR * rates.max(), resolution=place.cell, origin=corner.pose, name="dear places"
     )
