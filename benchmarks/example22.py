@@ -17,7 +17,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from maneuver_automaton.optimal_control import Grid, Guess, solve, solve_uniform_effort_example
+from maneuver_automaton.optimal_control import Guess, TimeGrid, solve, solve_uniform_effort_example
 from maneuver_automaton.optimal_control.uniform_effort import (
     DURATION_S,
     END,
@@ -86,7 +86,7 @@ def smoothing() -> None:
     print("smoothing of the norm: J without it, and what it adds")
     for amount in (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 0.0):
         guess = Guess(state=np.array([START, END]), control=np.full((1, 2), -0.02), duration=50.0)
-        found = solve(example_problem(smoothing=amount), Grid(n_nodes=200), guess=guess)
+        found = solve(example_problem(smoothing=amount), TimeGrid(n_nodes=200), guess=guess)
         cost = found.integrals["cost"][-1]
         print(f"  {amount:7.0e}  {cost:.10f}  {found.cost - cost:.1e}  {found.iterations} it")
 

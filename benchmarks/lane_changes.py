@@ -17,7 +17,7 @@ import numpy as np
 
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.optimal_control import Grid, OptimalControlProblem, moving_frame, solve
+from maneuver_automaton.optimal_control import OptimalControlProblem, TimeGrid, moving_frame, solve
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.plan import prepare
@@ -72,7 +72,7 @@ def direct_solution(problem: Problem):
         state_limits=np.concatenate([free, model.reduced_limits]),
         control_limits=model.control_limits,
     )
-    return solve(asked, Grid(n_nodes=NODES, rule="rk4"))
+    return solve(asked, TimeGrid(n_nodes=NODES, rule="rk4"))
 
 
 def measured(problem: Problem, seconds: float) -> Row:

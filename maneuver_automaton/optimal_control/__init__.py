@@ -9,11 +9,11 @@ from maneuver_automaton.optimal_control.maneuvers import TransferSettings as Tra
 from maneuver_automaton.optimal_control.maneuvers import solve_transfer as solve_transfer
 from maneuver_automaton.optimal_control.maneuvers import transfer_program as transfer_program
 from maneuver_automaton.optimal_control.polishing import polish as polish
-from maneuver_automaton.optimal_control.problem import Grid as Grid
 from maneuver_automaton.optimal_control.problem import Guess as Guess
 from maneuver_automaton.optimal_control.problem import (
     OptimalControlProblem as OptimalControlProblem,
 )
+from maneuver_automaton.optimal_control.problem import TimeGrid as TimeGrid
 from maneuver_automaton.optimal_control.problem import moving_frame as moving_frame
 from maneuver_automaton.optimal_control.problem import straight_guess as straight_guess
 from maneuver_automaton.optimal_control.scene import BodyPart as BodyPart

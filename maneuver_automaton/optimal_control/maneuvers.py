@@ -29,8 +29,8 @@ from maneuver_automaton.optimal_control.ipopt import (
     numpy_on_symbols,
 )
 from maneuver_automaton.optimal_control.problem import (
-    Grid,
     OptimalControlProblem,
+    TimeGrid,
     control_scale,
     resampled,
 )
@@ -181,7 +181,7 @@ def transfer_program(
             objective.effort * sum((u_i / s) ** 2 for u_i, s in zip(u, scale, strict=True))
         ),
     )
-    one = transcribe(problem, Grid(n_nodes=steps + 1, rule="rk4", held=steps))
+    one = transcribe(problem, TimeGrid(n_nodes=steps + 1, rule="rk4", held=steps))
     beyond = casadi.SX(0, 1)
     if math.isfinite(lateral_limit(model)):
         with numpy_on_symbols(casadi):  # with the control before and after each node

@@ -16,9 +16,9 @@ from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
 from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
 from maneuver_automaton.optimal_control.problem import (
-    Grid,
     OptimalControlProblem,
     RunningCost,
+    TimeGrid,
     control_scale,
     moving_frame,
 )
@@ -203,7 +203,7 @@ def program_of(
         problem=problem,
         dof=model.group.dof,
         n_intervals=count,
-        bounds=bounds_of(problem, Grid(n_nodes=count + 1, rule="rk4")),
+        bounds=bounds_of(problem, TimeGrid(n_nodes=count + 1, rule="rk4")),
         blocks=tuple(_blocks(problem, model, scene, settings, kinds, gears, count)),
         path=_path(casadi, model, scene),
         paced=paced,
@@ -327,7 +327,7 @@ def _kinds(
     own = problem.n_controls
     if paced:
         problem = _paced(problem, 1.0)
-    written = transcribe(problem, Grid(n_nodes=2, rule="rk4"))
+    written = transcribe(problem, TimeGrid(n_nodes=2, rule="rk4"))
     sizes = (problem.n_states, problem.n_states, problem.n_controls)
     first, last, control = (casadi.SX.sym(name, k) for name, k in zip("abu", sizes, strict=True))
     duration, share = casadi.SX.sym("T"), casadi.SX.sym("share")

@@ -39,7 +39,7 @@ from maneuver_automaton.optimal_control.polish_program import (
     guard_blocks,
     program_of,
 )
-from maneuver_automaton.optimal_control.problem import Grid, Guess, RunningCost, resampled
+from maneuver_automaton.optimal_control.problem import Guess, RunningCost, TimeGrid, resampled
 from maneuver_automaton.optimal_control.scene import (
     MotionEnds,
     PartPose,
@@ -354,7 +354,8 @@ def solve_from(
 def _point_at(program: PolishProgram, values: Array) -> Point:
     """Numbers of the variables but those of lines, as states, controls and durations."""
     n = program.n_intervals
-    state, control, duration = unpacked(program.problem, Grid(n_nodes=n + 1, rule="rk4"), values)
+    times = TimeGrid(n_nodes=n + 1, rule="rk4")
+    state, control, duration = unpacked(program.problem, times, values)
     durations = np.full(n, duration / n)
     if program.paced:
         return Point(state, control[:, :-1], durations * control[:, -1])

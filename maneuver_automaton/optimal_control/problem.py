@@ -120,12 +120,12 @@ class OptimalControlProblem:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Grid:
+class TimeGrid:
     """Where the problem is looked at: equidistant nodes, and the rule that joins them.
 
     Examples
     --------
-    >>> Grid(n_nodes=50).n_controls, Grid(n_nodes=50, rule="rk4").n_controls
+    >>> TimeGrid(n_nodes=50).n_controls, TimeGrid(n_nodes=50, rule="rk4").n_controls
     (50, 49)
     """
 

@@ -20,9 +20,9 @@ from maneuver_automaton.optimal_control.ipopt import (
     numpy_on_symbols,
 )
 from maneuver_automaton.optimal_control.problem import (
-    Grid,
     Guess,
     OptimalControlProblem,
+    TimeGrid,
     increments,
     limits_of,
     resampled,
@@ -69,7 +69,7 @@ class Evaluation:
 
 
 def evaluate(
-    problem: OptimalControlProblem, grid: Grid, *, state: Array, control: Array, duration: float
+    problem: OptimalControlProblem, grid: TimeGrid, *, state: Array, control: Array, duration: float
 ) -> Evaluation:
     """Cost, defects and violations of states (n, n_x) and controls (m, n_u) on a grid.
 
@@ -80,7 +80,7 @@ def evaluate(
     >>> cart = OptimalControlProblem(
     ...     state_names=("x",), control_names=("u",), dynamics=lambda x, u: [u[0]],
     ...     start=(0.0,), end=(1.0,), duration=(1.0, 1.0), stage_cost=lambda x, u: u[0] ** 2)
-    >>> found = evaluate(cart, Grid(n_nodes=2), state=np.array([[0.0], [1.0]]),
+    >>> found = evaluate(cart, TimeGrid(n_nodes=2), state=np.array([[0.0], [1.0]]),
     ...                  control=np.ones((2, 1)), duration=1.0)
     >>> found.cost, found.worst_defect, found.worst_violation
     (1.0, 0.0, 0.0)
@@ -148,7 +148,7 @@ class Transcription:
     """
 
     problem: OptimalControlProblem
-    grid: Grid
+    grid: TimeGrid
     state: Any  # (n_x, n) symbols
     control: Any  # (n_u, n) symbols, or (n_u, n - 1)
     duration: Any  # one symbol [s]
@@ -165,7 +165,7 @@ class Transcription:
         return casadi.vertcat(casadi.vec(self.state), casadi.vec(self.control), self.duration)
 
 
-def transcribe(problem: OptimalControlProblem, grid: Grid) -> Transcription:
+def transcribe(problem: OptimalControlProblem, grid: TimeGrid) -> Transcription:
     """Write a problem down on a grid, in symbols, without a loop over the nodes.
 
     Source: Betts (2010), *Practical Methods for Optimal Control*, Ch. 4.
@@ -221,7 +221,7 @@ def transcribe(problem: OptimalControlProblem, grid: Grid) -> Transcription:
 
 def solve(
     problem: OptimalControlProblem,
-    grid: Grid,
+    grid: TimeGrid,
     *,
     guess: Guess | None = None,
     settings: SolverSettings | None = None,
@@ -232,7 +232,7 @@ def solve(
     ----------
     problem : OptimalControlProblem
         What to solve.
-    grid : Grid
+    grid : TimeGrid
         Nodes and rule.
     guess : Guess, optional
         Where to begin; `straight_guess` if left out.
@@ -257,7 +257,7 @@ def solve(
     ...     state_names=("position", "speed"), control_names=("push",),
     ...     dynamics=lambda x, u: [x[1], u[0]], stage_cost=lambda x, u: 1.0,
     ...     start=(0.0, 0.0), end=(1.0, 0.0), duration=(0.1, 10.0), control_limits=[[-1.0, 1.0]])
-    >>> found = solve(cart, Grid(n_nodes=41, rule="rk4"))
+    >>> found = solve(cart, TimeGrid(n_nodes=41, rule="rk4"))
     >>> found.status.value, round(found.duration, 6)  # full ahead, full back: 2 sqrt(1)
     ('solved', 2.0)
     """
@@ -301,7 +301,7 @@ def _row(casadi: Any, value: Any, count: int) -> Any:
 
 
 def unpacked(
-    problem: OptimalControlProblem, grid: Grid, values: Array
+    problem: OptimalControlProblem, grid: TimeGrid, values: Array
 ) -> tuple[Array, Array, float]:
     """States (n, n_x), controls (m, n_u) and duration from the values of all variables."""
     split = grid.n_nodes * problem.n_states
@@ -310,7 +310,7 @@ def unpacked(
     return state, control, float(values[-1])
 
 
-def bounds_of(problem: OptimalControlProblem, grid: Grid) -> Array:
+def bounds_of(problem: OptimalControlProblem, grid: TimeGrid) -> Array:
     """Limits (variables, 2) of all variables; fixed ones have both alike."""
     limits = limits_of(problem.state_limits, problem.n_states)
     states = np.tile(limits, (grid.n_nodes, 1, 1))

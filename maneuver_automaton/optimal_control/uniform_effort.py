@@ -13,11 +13,11 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.ipopt import SolverSettings
 from maneuver_automaton.optimal_control.problem import (
-    Grid,
     Guess,
     OptimalControlProblem,
     Rule,
     RunningCost,
+    TimeGrid,
     moving_frame,
 )
 from maneuver_automaton.optimal_control.transcription import OptimalControlSolution, solve
@@ -117,7 +117,7 @@ def solve_uniform_effort_example(
     >>> round(found.cost, 4), found.inner_spread < 0.01
     (0.5141, True)
     """
-    grid = Grid(n_nodes=n_nodes, rule=rule)
+    grid = TimeGrid(n_nodes=n_nodes, rule=rule)
     least = 2 * END_NODES + 1 + n_nodes - grid.n_controls
     if n_nodes < least:
         raise ValueError(f"uniform effort example: n_nodes must be at least {least}, got {n_nodes}")

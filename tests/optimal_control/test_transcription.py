@@ -13,11 +13,11 @@ from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import SE2, SE2xR, translations
 from maneuver_automaton.models import Car, Unicycle, UserModel, rollout
 from maneuver_automaton.optimal_control import (
-    Grid,
     Guess,
     OptimalControlProblem,
     SolverSettings,
     SolveStatus,
+    TimeGrid,
     moving_frame,
     solve,
     straight_guess,
@@ -59,7 +59,7 @@ def unicycle_problem(**changes):
 @pytest.mark.parametrize("rule", RULES)
 def test_least_push_is_a_straight_line_in_time(rule):
     # u = 1.5 (1 - t), cost 12 d^2 / T^3 = 1.5
-    found = solve(cart(), Grid(n_nodes=201, rule=rule))
+    found = solve(cart(), TimeGrid(n_nodes=201, rule=rule))
     assert found.status is SolveStatus.SOLVED
     assert found.cost == pytest.approx(1.5, abs=1e-3)
     assert found.worst_defect < 1e-9
@@ -71,7 +71,7 @@ def test_least_push_is_a_straight_line_in_time(rule):
 
 def test_least_time_with_a_limited_push():
     problem = cart(duration=(0.1, 10.0), stage_cost=lambda x, u: 1.0, control_limits=[[-1.0, 0.5]])
-    found = solve(problem, Grid(n_nodes=61, rule="rk4"))
+    found = solve(problem, TimeGrid(n_nodes=61, rule="rk4"))
     # accelerate at 1/2, brake at 1: peak speed sqrt(2 / 3), T = 2 / peak
     assert found.cost == pytest.approx(found.duration, rel=1e-13)
     assert found.duration == pytest.approx(2.0 / np.sqrt(2.0 / 3.0), abs=1e-6)
@@ -81,7 +81,7 @@ def test_least_time_with_a_limited_push():
 
 def test_state_limits_hold_at_every_node():
     problem = cart(state_limits=[[-np.inf, np.inf], [-np.inf, 0.6]])
-    found = solve(problem, Grid(n_nodes=81, rule="rk4"))
+    found = solve(problem, TimeGrid(n_nodes=81, rule="rk4"))
     assert found.state[:, 1].max() <= 0.6
     assert found.state[:, 1].max() == pytest.approx(0.6, abs=1e-6)
     assert found.cost > 1.5
@@ -89,17 +89,17 @@ def test_state_limits_hold_at_every_node():
 
 def test_free_components_are_chosen():
     # to 1 m in 2 s without braking: cost 3 d^2 / T^3
-    found = solve(cart(end=(1.0, None)), Grid(n_nodes=201, rule="rk4"))
+    found = solve(cart(end=(1.0, None)), TimeGrid(n_nodes=201, rule="rk4"))
     assert found.cost == pytest.approx(3.0 / 8.0, abs=1e-4)
     assert found.state[-1, 1] == pytest.approx(0.75, abs=1e-4)
-    start = solve(cart(start=(None, 0.0)), Grid(n_nodes=21, rule="rk4"))
+    start = solve(cart(start=(None, 0.0)), TimeGrid(n_nodes=21, rule="rk4"))
     assert start.cost == pytest.approx(0.0, abs=1e-9)
     assert start.state[0, 0] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("rule", RULES)
 def test_a_cost_that_is_a_state_is_the_same_as_an_integral(rule):
-    grid = Grid(n_nodes=30, rule=rule)
+    grid = TimeGrid(n_nodes=30, rule=rule)
     as_cost = solve(cart(integrals={"push": lambda x, u: u[0] ** 2}), grid)
     as_state = solve(
         cart(
@@ -118,7 +118,7 @@ def test_a_cost_that_is_a_state_is_the_same_as_an_integral(rule):
 
 
 def test_rk4_controls_drive_the_model_where_they_say():
-    found = solve(unicycle_problem(), Grid(n_nodes=41, rule="rk4"), guess=sideways_guess())
+    found = solve(unicycle_problem(), TimeGrid(n_nodes=41, rule="rk4"), guess=sideways_guess())
     state = found.state[0]
     for k, control in enumerate(found.control):
         state = rollout(Unicycle(), state, control=control, times=found.time[k : k + 2])[-1]
@@ -132,7 +132,7 @@ def sideways_guess():
 
 def test_a_moved_problem_has_the_moved_solution():
     by = SE2([3.0, -2.0, 1.1])
-    grid, guess = Grid(n_nodes=30, rule="rk4"), sideways_guess()
+    grid, guess = TimeGrid(n_nodes=30, rule="rk4"), sideways_guess()
     here = solve(unicycle_problem(), grid, guess=guess)
     ends = {
         name: tuple((by @ SE2(getattr(unicycle_problem(), name))).pose) for name in ("start", "end")
@@ -149,8 +149,8 @@ def test_a_moved_problem_has_the_moved_solution():
 
 
 def test_a_coarse_solution_is_a_guess_for_a_fine_grid():
-    coarse = solve(unicycle_problem(), Grid(n_nodes=20, rule="rk4"), guess=sideways_guess())
-    fine = solve(unicycle_problem(), Grid(n_nodes=80, rule="rk4"), guess=coarse.as_guess)
+    coarse = solve(unicycle_problem(), TimeGrid(n_nodes=20, rule="rk4"), guess=sideways_guess())
+    fine = solve(unicycle_problem(), TimeGrid(n_nodes=80, rule="rk4"), guess=coarse.as_guess)
     assert fine.status is SolveStatus.SOLVED
     assert fine.cost <= coarse.cost
     assert fine.cost == pytest.approx(coarse.cost, rel=1e-2)
@@ -191,14 +191,14 @@ def test_the_formulas_for_the_solver_are_those_of_the_models():
 
 def test_what_cannot_be_is_a_status():
     hopeless = cart(control_limits=[[-0.1, 0.1]])
-    found = solve(hopeless, Grid(n_nodes=20, rule="rk4"))
+    found = solve(hopeless, TimeGrid(n_nodes=20, rule="rk4"))
     assert found.status is SolveStatus.INFEASIBLE
     assert found.worst_defect > 1e-3
 
 
 def test_a_budget_is_a_status():
     settings = SolverSettings(max_iterations=1)
-    grid = Grid(n_nodes=30, rule="rk4")
+    grid = TimeGrid(n_nodes=30, rule="rk4")
     found = solve(unicycle_problem(), grid, guess=sideways_guess(), settings=settings)
     assert found.status is SolveStatus.OUT_OF_BUDGET
     assert found.reason == "Maximum_Iterations_Exceeded"
@@ -209,13 +209,13 @@ def test_success_of_the_solver_is_not_believed():
     def liar(x, u):
         return [x[1], u[0] if isinstance(u[0], casadi.SX) else u[0] + 0.1]
 
-    found = solve(cart(dynamics=liar), Grid(n_nodes=20))
+    found = solve(cart(dynamics=liar), TimeGrid(n_nodes=20))
     assert found.status is SolveStatus.FAILED
     assert found.reason.startswith("Solve_Succeeded, but the numbers do not hold: defect 0.01")
 
 
 def test_the_program_starts_with_the_defects():
-    program = transcribe(unicycle_problem(), Grid(n_nodes=11, rule="rk4"))
+    program = transcribe(unicycle_problem(), TimeGrid(n_nodes=11, rule="rk4"))
     assert program.constraints.shape == (30, 1)
     assert program.limits.shape == (30, 2)
     assert program.bounds.shape == (11 * 3 + 10 * 2 + 1, 2)
@@ -247,7 +247,7 @@ def test_without_casadi_it_is_named(monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(MissingExtra) as error:
-        solve(cart(), Grid(n_nodes=5))
+        solve(cart(), TimeGrid(n_nodes=5))
     assert str(error.value) == (
         "optimal control needs CasADi, which cannot be imported (casadi): pip install casadi"
     )
@@ -282,10 +282,10 @@ def test_a_wrong_problem_is_refused(changes, message):
 
 def test_wrong_grids_settings_and_guesses_are_refused():
     with pytest.raises(ValueError) as error:
-        Grid(n_nodes=1)
+        TimeGrid(n_nodes=1)
     assert str(error.value) == "grid: n_nodes must be at least 2, got 1"
     with pytest.raises(ValueError) as error:
-        Grid(n_nodes=5, rule="euler")
+        TimeGrid(n_nodes=5, rule="euler")
     assert str(error.value) == "grid: rule must be trapezoidal or rk4, got 'euler'"
     with pytest.raises(ValueError) as error:
         SolverSettings(tolerance=0.0)
@@ -295,13 +295,13 @@ def test_wrong_grids_settings_and_guesses_are_refused():
     assert str(error.value).startswith("guess: state has shape (0, 2), need at least one row")
     wide = Guess(state=np.zeros((2, 3)), control=np.zeros((1, 1)), duration=1.0)
     with pytest.raises(ValueError) as error:
-        solve(cart(), Grid(n_nodes=5), guess=wide)
+        solve(cart(), TimeGrid(n_nodes=5), guess=wide)
     assert str(error.value) == "guess: state has 3 columns, need 2 (position, speed)"
 
 
 def test_the_number_of_rates_is_checked():
     with pytest.raises(ValueError) as error:
-        transcribe(cart(dynamics=lambda x, u: [x[1]]), Grid(n_nodes=5))
+        transcribe(cart(dynamics=lambda x, u: [x[1]]), TimeGrid(n_nodes=5))
     assert str(error.value) == (
         "optimal control: the dynamics return 1 rates, need 2 (position, speed)"
     )
