@@ -102,7 +102,7 @@ def test_a_vehicle_is_written_as_one_alone(log):
 @pytest.mark.slow
 def test_vehicles_with_inertia_and_other_kinds(tmp_path):
     scenario = load_scenario(SCENARIOS / "fleets" / "airfield.yaml")
-    log = simulate_fleet(scenario.fleet, step=1.0, steps=12, first_time_limit=1.0)
+    log = simulate_fleet(scenario.fleet, step=1.0, steps=3, first_time_limit=1.0)
     path = tmp_path / "closed_loop.json"
     save_fleet_loop(log, path, driven=verify_driven(log))
     again = load_fleet_loop(path, scenario.fleet)
