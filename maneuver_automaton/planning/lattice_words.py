@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
-from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc, Obstacle, OccupancyMap
@@ -60,6 +61,7 @@ ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the 
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
 ROUND_SHARE, COUNTED_ROUND = 0.3, 0.7  # of the time left, of expansions: round dear places
+STEERED_SHARE = 0.3  # of the time and of the expansions left: as if steering at rest cost nothing
 DEAR = 0.2  # share of the greatest rate above which places are closed then
 PAID = 0.02  # share of a cost that its places have to cost for that
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
@@ -96,6 +98,8 @@ class LatticeWords(PlanningStep):
             if horizon.time or horizon.max_time or library.per_metre == 0.0:
                 in_time = replace(problem, cost=BY_TIME)
                 lattice_library(in_time, goals, prepared=workspace.prepared)
+            if (freely := _steered_freely(problem)) is not None:
+                lattice_library(freely, goals, prepared=workspace.prepared)
         elif problem.start.size == 3:
             cost_to_go_table(problem, prepared=workspace.prepared)
             if stands_for_more(problem):
@@ -286,11 +290,16 @@ class LatticeWords(PlanningStep):
             self._let_pass()
         if query.problem.place_costs:
             self._go_round()
+        own = self.words[-1]  # where others are improved from, too: they lead to other minima
+        if (freely := _steered_freely(query.problem)) is not None:
+            # of all that turn at rest the priced search finds few: it takes them one by one
+            at_will = lattice_query(freely, _goals(query), prepared=query.prepared)
+            self._by_way_of(at_will, STEERED_SHARE, counted=STEERED_SHARE)
         better = self.words_of(
             query,
             self._for_the_best(),
-            known=self.words[-1],
-            better=self.gained,
+            known=own,
+            better=self._gained_if_cheaper,
             patience=Patience(),
             floor=found.ended.bound.value - query.padding if found.ended.bound else -math.inf,
             every_trim=True,
@@ -346,23 +355,33 @@ class LatticeWords(PlanningStep):
 
         Estimates of the search are too low there to find a way round: it expands the places first.
         """
-        query, best = self.query, self.words[-1]
+        query, best, found = self.query, self.words[-1], self.found
+        if (problem := with_dear_places_closed(query)) is None:
+            return
         invariant = with_price(query.library.priced, best).cost
-        if best.cost - invariant <= PAID * best.cost:
-            return
-        problem, left = with_dear_places_closed(query), self.for_others
-        if problem is None:
-            return
-        most = None if left.expansions is None else int(COUNTED_ROUND * left.expansions)
-        left = replace(left.part(ROUND_SHARE), expansions=most)
-        goals, library = _goals(query), query.library
-        closed = lattice_query(problem, goals, prepared=query.prepared, library=library)
-        closed = closed if self.finds_plans else late_at_first(closed)
-        word = self.words_of(closed, left, patience=AT_ONCE).word
+        if best.cost - invariant > PAID * best.cost:
+            closed = lattice_query(
+                problem, _goals(query), prepared=query.prepared, library=query.library
+            )
+            self._by_way_of(closed, ROUND_SHARE, counted=COUNTED_ROUND)
+        if self.polish and found.plans:
+            paid = sum(one.price for one in query.problem.place_prices_of(found.plans[0].plan))
+            self.polish.instead = problem if paid <= PAID * found.cost else None
+
+    def _by_way_of(self, other: LatticeQuery, share: float, *, counted: float) -> None:
+        """Note the word of another query with the same maneuvers, if it costs less than known."""
+        query, left = self.query, self.for_others
+        most = None if left.expansions is None else int(counted * left.expansions)
+        left = replace(left.part(share), expansions=most)
+        other = other if self.finds_plans else late_at_first(other)
+        word = self.words_of(other, left, patience=AT_ONCE).word
         if word is NO_WORD:
             return
         word = self.words_of(query, left, known=word, patience=AT_ONCE).word
-        if word.cost < best.cost:
+        self._gained_if_cheaper(word)
+
+    def _gained_if_cheaper(self, word: Word) -> None:
+        if word.cost < self.words[-1].cost:
             self.gained(word)
 
     def _detours(self, best: Word, most: int) -> Iterator[Candidate]:
@@ -394,6 +413,19 @@ def late_at_first(query: LatticeQuery) -> LatticeQuery:
     close = functools.partial(np.allclose, rtol=1e-9, atol=1e-12)
     timed = close(rates, rates[0]) and close(edges.cost, rates[0] * edges.time)
     return replace(query, most_time=math.inf) if timed else query
+
+
+def _steered_freely(problem: Problem) -> Problem | None:
+    """The problem without the price of steering at rest; None where there is none to pay."""
+    if not 0.0 < getattr(problem.automaton.model, "steering_at_rest", 0.0) < math.inf:
+        return None
+    return replace(problem, automaton=_at_will(problem.automaton))
+
+
+@kept_by_first
+def _at_will(automaton: Automaton) -> Automaton:
+    model: Any = automaton.model
+    return replace(automaton, model=replace(model, steering_at_rest=0.0))
 
 
 def _among_static(query: LatticeQuery) -> LatticeQuery:

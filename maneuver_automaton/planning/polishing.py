@@ -113,6 +113,7 @@ class Polish(PlanningStep):
     guesses: list[Aimed] = field(default_factory=list)  # along kinematic plans that are known
     otherwise: Callable[[], None] | None = None  # offers what there is where nothing is gained
     tried: float = math.inf  # cost of the cheapest plan when all guesses were tried before
+    instead: Problem | None = None  # to be solved: of prices of places the solver knows nothing
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """The solver, and tables of the kinematic libraries."""
@@ -141,6 +142,7 @@ class Polish(PlanningStep):
         if budget.is_over or why_not_polished(problem):
             return not budget.is_over
         price = polished_price(problem)
+        problem = self.instead or problem
         known = _worth_polishing(found, price)
         if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
             return True  # it is there already
