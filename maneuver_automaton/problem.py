@@ -27,7 +27,7 @@ from maneuver_automaton.collision import (
     as_obstacles,
 )
 from maneuver_automaton.costs import Cost, StageCost, prices_switches
-from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations
+from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations, group_of
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.place_prices import PlacePrice, price_along
@@ -320,6 +320,7 @@ class Problem:
         self._settle_states()
         if self.automaton.translated is not None:
             self._give_headings(self.automaton.translated)
+        self._check_group()
         self._check_ends()
         check_size("margin", self.margin)
         if self.horizon.time is not None and dof > 2:
@@ -385,6 +386,16 @@ class Problem:
                     f"via {k}: the {automaton.model.name} has no trim that stands still, so it "
                     "cannot stop there"
                 )
+
+    def _check_group(self) -> None:
+        """Poses are those of SE2 or SE2xR: what plans knows no other product of groups."""
+        model = self.automaton.model
+        group, known, twist = model.group, group_of(model.group.dof), np.ones(model.group.dof)
+        if group is not known and (group.exp(twist).pose != known.exp(twist).pose).any():
+            raise ValueError(
+                f"the {model.name} moves in {group.__name__}, and plans are for SE2, SE2xR and "
+                "translations of the plane and of space"
+            )
 
     def _check_start(self) -> None:
         dof = self.automaton.model.group.dof

@@ -11,11 +11,11 @@ import numpy as np
 from maneuver_automaton._arrays import Array, as_number
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control import (
-    Grid,
     Guess,
     OptimalControlProblem,
     OptimalControlSolution,
     SolverSettings,
+    TimeGrid,
     moving_frame,
     solve,
 )
@@ -196,7 +196,7 @@ def _optimum(
     state = np.stack([np.interp(at, word.time, column) for column in rows.T], axis=-1)
     control = word.control[np.searchsorted(word.time, at[:-1], side="right") - 1]
     guess = Guess(state=state, control=control, duration=duration)
-    return solve(problem, Grid(n_nodes=n_nodes, rule="rk4"), guess=guess, settings=settings)
+    return solve(problem, TimeGrid(n_nodes=n_nodes, rule="rk4"), guess=guess, settings=settings)
 
 
 def _course_cost(model: Model, course: Trajectory, stage_cost: RunningCost) -> float:

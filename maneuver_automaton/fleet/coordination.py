@@ -49,6 +49,7 @@ MOST_QUERIES = 30  # searches for one vehicle, of one tree
 LOOKS = 400  # at a conflict, to see how long it lasts
 WORTH = 1e-6  # share of the value that another leaf has to save
 MOST_ASIDE = 3  # times that one vehicle makes room for others
+MOST_PLACES = 8  # aside, of which one with a way home from there is looked for
 BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
 
 
@@ -372,19 +373,31 @@ class _Floor:
         beside = [
             body for i, one in self._courses().items() if i not in (j, k) for body in one.arrived
         ]
+        found, tried = None, 0
         for goal in vehicle.refuges(before, way, beside, self._clock):
-            if self.budget.is_over:
-                return False
+            if self.budget.is_over or tried == MOST_PLACES:
+                break
             leg = self._leg(j, others, aim=goal)
             if leg is None:
                 continue
             there = replace(leg.course, until=math.inf).after(leg.arrival)
-            if not meetings({j: there, k: way.course}, keep=self.margin):
-                self.asides[j] += 1
-                self.waiting += [] if j in self.waiting else [j]
-                self._drive(j, leg, leaves=False)
-                return True
-        return False
+            if meetings({j: there, k: way.course}, keep=self.margin):
+                continue
+            found, tried = found or leg, tried + 1
+            if self._leads_home(j, leg, k, way):
+                found = leg
+                break
+        if found is not None:
+            self.asides[j] += 1
+            self.waiting += [] if j in self.waiting else [j]
+            self._drive(j, found, leaves=False)
+        return found is not None
+
+    def _leads_home(self, j: int, aside: OwnPlan, k: int, way: OwnPlan) -> bool:
+        """Whether one that drove aside gets home when another one, and others, have arrived."""
+        there = {i: one for i, one in self._courses().items() if i not in (j, *self.waiting)}
+        arrived = [body for one in ({**there, k: way.course}).values() for body in one.arrived]
+        return self.vehicles[j].leg(aside, arrived, self._clock, self.budget) is not None
 
     def _drive(self, k: int, leg: OwnPlan, *, leaves: bool) -> None:
         """Drive a leg, as soon as all that was driven before allows."""

@@ -35,7 +35,7 @@ from maneuver_automaton.fleet.workers import How, PoolTask, WorkerPool
 Objective = Literal["sum", "last"]
 
 ALONE_SHARE = 0.5  # of the time, for all ways alone
-ORDERS_SHARE = 0.7  # of the time left, for orders of the vehicles before they drive by turns
+ORDERS_SHARE = 0.7  # of the time left, for one order of the vehicles before they drive by turns
 WORTH = 1e-6  # share of the objective that another plan has to save
 LARGEST_GROUP = 4  # vehicles that are planned anew together
 AT_ONCE: tuple[How, ...] = ("in turn", "by priorities", "by conflicts")
@@ -193,17 +193,18 @@ class _FleetSearch:
         until = self.budget.stage(ORDERS_SHARE)
         rng = np.random.default_rng(self.seed)
         drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
-        best = self._in_orders(drawn[:1], until)
-        if len(best) < len(able):
-            best = self._one_at_a_time(able, 0, rng, best)
-        if len(best) < len(able):
-            best = self._in_orders(drawn[1:], until, best)
-        n_th = 0
-        while len(best) < len(able) and not self.budget.is_over and max_rounds is None:
-            n_th += 1  # all the time there is for those that have no plan
+        best, to_come, n_th = self._in_orders(drawn[:1], until), drawn[1:], 0
+        # All the time there is for those that have no plan, in turn by both ways.
+        while len(best) < len(able) and not self.budget.is_over:
             best = self._one_at_a_time(able, n_th, rng, best)
-            again = [self._order_of(rest, n_th, rng) for _ in range(self.pool.jobs)]
-            best = self._in_orders(again, self.budget, best)
+            if len(best) == len(able) or not (to_come or max_rounds is None):
+                break
+            n_th += 1
+            some = to_come[: self.pool.jobs] or [
+                self._order_of(rest, n_th, rng) for _ in range(self.pool.jobs)
+            ]
+            del to_come[: self.pool.jobs]
+            best = self._in_orders(some, self.budget, best)
         self.held = best
         for k in able:
             if k not in best:

@@ -116,7 +116,9 @@ def refuges(problem: Problem, query: LatticeQuery, way: Plan, *, off: bool = Fal
     bearing, turned = rng.uniform(-math.pi, math.pi, (2, SAMPLES))
     turned[: int(AS_NOW * SAMPLES)] = 0.0
     heading, bearing = bases[:, 2] + turned, bases[:, 2] + bearing
-    if problem.automaton.translated is not None:
+    automaton = problem.automaton
+    changes = [*automaton.body_velocities[:, 2], *(m.displacement[2] for m in automaton.maneuvers)]
+    if automaton.translated is not None or not any(changes):
         heading[:] = problem.start[2]
     poses = np.column_stack(
         [bases[:, 0] + away * np.cos(bearing), bases[:, 1] + away * np.sin(bearing), heading]

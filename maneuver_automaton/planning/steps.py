@@ -16,6 +16,7 @@ import numpy as np
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import CONVERGED, POLISHED, UNFINISHED, Likeness
+from maneuver_automaton.automaton.validation import trims_between
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models.speeds import steers_at_rest
 from maneuver_automaton.planning.along_paths import AlongPaths
@@ -295,6 +296,8 @@ def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:
         return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
     if found.why_refused:
         return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
+    if unlinked := _why_unlinked(found.problem):
+        return PlanStatus.NO_PLAN, unlinked
     near = ""
     if first and math.isfinite(first.nearest[0]):
         near = "; the nearest node is {:.3g} m and {:.3g} rad off".format(*first.nearest)
@@ -304,3 +307,21 @@ def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:
     return PlanStatus.OUT_OF_BUDGET, (
         f"no plan within {found.budget.seconds:.4g} s and {spent}{found.ended.remark}{near}"
     )
+
+
+def _why_unlinked(problem: Problem) -> str:
+    """Why no word of the library may lead to a goal, by its trims alone; empty if some may."""
+    automaton = problem.automaton
+    if not problem.has_inertia or problem.has_states:
+        return ""
+    start, lasts = problem.first_trim, [problem.last_trim(goal) for goal in problem.goals]
+    index = automaton.index_of
+    between = trims_between(automaton, index(start.name), [index(one.name) for one in lasts])
+    if not between.size:
+        named = " or ".join(dict.fromkeys(repr(one.name) for one in lasts))
+        return f"no maneuvers of the library lead from trim {start.name!r} to {named}"
+    if automaton.maneuvers or between.size > 1:
+        return ""
+    hit = " or meets an obstacle" if problem.obstacles or problem.zones else ""
+    coast = f"to coast in trim {start.name!r} leads to no goal{hit}"
+    return f"the library has no maneuvers, and {coast}"

@@ -182,7 +182,7 @@ def _short_words(
         angles = np.array([between, h - between]) * np.sign(w[[i, j]])
         angles = np.remainder(angles + NONE, math.tau) - NONE
         times = np.where(turns[[i, j]], angles / np.abs(w[[i, j]]), times)
-    times[~(np.abs(times) > NONE)] = 0.0
+    times[~((np.abs(times) > NONE) & (np.abs(times) < np.inf))] = 0.0
     group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
     ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
     off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])

@@ -107,6 +107,32 @@ def test_all_change_places_where_nobody_has_a_way():
     assert is_good(fleet, result)
 
 
+def test_one_waits_in_a_bay_until_two_have_passed():
+    """It drives aside to where it gets home from, not behind the goals of the others.
+
+    A vehicle that never turns keeps its heading there.
+    """
+    walls = [
+        Box([13.0, 1.0], [4.5, -1.12]),
+        Box([5.5, 1.0], [0.72, 1.12]),
+        Box([6.4, 1.0], [7.9, 1.12]),
+        Box([1.4, 1.0], [4.1, 2.45]),
+        Box([0.3, 1.2], [-2.35, 0.0]),
+        Box([0.8, 1.2], [11.7, 0.0]),
+    ]
+    ends = [([0, 0, 0], [9, 0, 0]), ([9, 0, 0], [0, 0, 0]), ([-1, 0, 0], [7.9, 0, 0])]
+    problems = [
+        Problem(KINDS["translations"], a, b, footprint=Disc(0.39), obstacles=walls) for a, b in ends
+    ]
+    fleet = FleetProblem(problems)
+    one = vehicles_of(fleet)[0]
+    one.plan_alone(Budget.from_now(60.0))
+    aims = one.refuges(None, one.alone, (), 0.0)
+    assert aims
+    assert all(aim.pose[2] == 0.0 for aim in aims)
+    assert is_good(fleet, plan_fleet(fleet, time_limit=120.0, max_rounds=0))
+
+
 def test_a_goal_where_another_one_stays_takes_no_search():
     here = [3.0, 0.0, 0.0]
     one, other = vehicles_of(fleet_of("inertia", [([0, 0, 0], here), (here, here)]))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
+from maneuver_automaton.planning import PlanStatus
 from maneuver_automaton.planning.polishing import NUMBERS_ALONE, _body_parts, why_not_polished
 
 LENGTH, HITCH = 2.5, 3.0
@@ -64,6 +65,52 @@ def test_trims_without_maneuvers_coast():
     result = ma.plan(problem)
     assert result.cost == pytest.approx(5.0, abs=1e-9)
     assert result.plan.word == (ahead,)
+
+
+def test_trims_without_maneuvers_say_why_they_do_not_lead_there():
+    robot = ma.SecondOrderUnicycle(
+        max_speed=1, max_turn_rate=1, max_acceleration=1, max_angular_acceleration=1
+    )
+    library = ma.Automaton(robot, ma.trims_of(robot, {"speed": [0, 1], "turn_rate": [0]}).trims)
+    rest, ahead = library.trim_names
+
+    def asked(pose, last, **more):
+        goal = ma.Goal(pose, trim=last)
+        return ma.plan(ma.Problem(library, [0, 0, 0], goal, start_trim=ahead, **more))
+
+    for pose, last, why in (
+        ([5, 0, 0], rest, f"no maneuvers of the library lead from trim {ahead!r} to {rest!r}"),
+        ([5, 1, 0], ahead, f"has no maneuvers, and to coast in trim {ahead!r} leads to no goal"),
+    ):
+        result = asked(pose, last)
+        assert (result.status, why in result.reason) == (PlanStatus.NO_PLAN, True)
+    hit = asked([5, 0, 0], ahead, obstacles=[ma.Disc(0.5, [2, 0])], footprint=ma.Disc(0.2))
+    assert hit.status is PlanStatus.NO_PLAN
+    assert hit.reason.endswith("leads to no goal or meets an obstacle")
+
+
+def crane(n):
+    model = ma.UserModel(
+        name="crane",
+        group=ma.translations(n),
+        control_names=("v_x", "v_y", "v_z", "v_a")[:n],
+        velocity=lambda z, u: [*u],
+    )
+    axes = np.concatenate([np.eye(n), -np.eye(n)])
+    return ma.Automaton.of_controls(model, {str(row): row for row in axes})
+
+
+@pytest.mark.parametrize("goal", [[1, 2, 3], [0, 0, -2], [1, 0, 3]])
+def test_a_vehicle_that_rises_on_the_spot(goal):
+    """By hand: the sum of the ways along the axes at 1 m/s."""
+    problem = ma.Problem(crane(3), [0, 0, 0], goal)
+    assert ma.plan(problem).cost == pytest.approx(np.abs(goal).sum(), abs=1e-9)
+    assert ma.lower_bound(problem, time_limit=1.0).value <= np.abs(goal).sum()
+
+
+def test_other_groups_are_not_planned_in():
+    with pytest.raises(ValueError, match="the crane moves in Translations4, and plans are for SE2"):
+        ma.Problem(crane(4), [0, 0, 0, 0], [1, 2, 3, 4])
 
 
 def test_a_vehicle_without_inertia_is_not_polished_beyond_its_library():

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
@@ -23,6 +24,7 @@ from maneuver_automaton.exports import open_result
 from maneuver_automaton.formats import load_plans
 from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting import films
 from maneuver_automaton.roads import RoadVehicle, drive_roads, judged, plan_roads
 from maneuver_automaton.roads.several import driving
 from tests.plotting.player.browser import browser, opened
@@ -311,6 +313,26 @@ class TestCommands:
         assert run(["mpc", "road.xml", "--steps", "3", "--quiet", "--no-plot"]) == 1
         assert capsys.readouterr().err.startswith("road.xml: steps_spent: 100: no goal was reached")
         assert not Path("out/closed_loop.png").exists()
+
+    @pytest.mark.parametrize(("command", "name"), [("plan", "plan"), ("mpc", "closed_loop")])
+    def test_a_film_of_a_file(self, folder, made, command, name, monkeypatch):
+        """Drawn again from what was saved: all bodies, and the traffic, where they are then."""
+        monkeypatch.setattr(films, "MOST_FRAMES", 4)
+        shutil.copytree(made(command)[0], folder, dirs_exist_ok=True)
+        file = Path(f"out/{name}.json")
+        assert run(["plot", str(file), "--animate", "--out", "again.gif"]) == 0
+        with Image.open("again.gif") as pictures:
+            assert 2 <= pictures.n_frames <= 4
+        result = open_result(file).result()
+        shown = films.film_of(result)
+        traffic, bodies = shown.moving[0], shown.moving[5]
+        for time in (0.0, 1.5):
+            shown.show(time)
+            seen = [path.vertices[:4].mean(axis=0) for path in bodies.get_paths()]
+            poses = SE2(np.array([plan.pose_at(time)[:3] for plan in result.plans.values()]))
+            np.testing.assert_allclose(seen, poses.act(RoadVehicle().footprint.center), atol=1e-9)
+            (slow,) = (path.vertices[:4].mean(axis=0) for path in traffic.get_paths())
+            np.testing.assert_allclose(slow, [60.0 + 6.0 * time, 2.0], atol=1e-9)
 
     @pytest.mark.parametrize("command", ["plan", "mpc"])
     def test_a_page(self, made, command):
