@@ -74,7 +74,11 @@ def kept_by_first(
 
     @functools.wraps(make)
     def once(owner: _Owner, /, *args: _P.args, **more: _P.kwargs) -> _T:
-        return _kept_by(owner, once, functools.partial(make, owner))(*args, **more)
+        try:  # short, for steps of a loop call it some ten times
+            remembers: Callable[..., _T] = owner.__dict__["_kept"][once]
+        except KeyError:
+            remembers = _kept_by(owner, once, functools.partial(make, owner))
+        return remembers(*args, **more)
 
     return once
 

@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -142,7 +142,8 @@ def commonroad_primitives_text(file: RoadPrimitives) -> str:
     older = file.vehicle is None
     lines = ['<?xml version="1.0" ?>']
     if not older:
-        lines += [f"<{ROOT}>", f"   <VehicleType>{escape(file.vehicle or '')}</VehicleType>"]
+        vehicle = escape(file.vehicle or "", quote=False)
+        lines += [f"<{ROOT}>", f"   <VehicleType>{vehicle}</VehicleType>"]
     pad = "" if older else "   "
     lines.append(f"{pad}<{OLDER_ROOT}>")
     for one in file.primitives:

@@ -148,8 +148,11 @@ def bounded(problem: Problem) -> bool:
     )
 
 
-def cost_until(problem: Problem, plan: Plan, until: float) -> float:
-    """Cost of the first `until` seconds of a plan, the switches in them included."""
+def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | None = None) -> float:
+    """Cost of the first `until` seconds of a plan, the switches in them included.
+
+    `whole`: the cost of the plan without that of places, where it is known.
+    """
     if problem.place_costs:
         first = first_part(plan, until)
         places = sum(one.price for one in problem.place_prices_of(first))
@@ -159,7 +162,9 @@ def cost_until(problem: Problem, plan: Plan, until: float) -> float:
         return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
     left = last_times(plan.durations.tolist(), until)
     trims, times = merged(plan.trims[len(plan.trims) - len(left) :], left)
-    return problem.cost_of(plan) - problem.cost_of_trims(trims, np.array(times))
+    if whole is None:
+        whole = problem.cost_of(plan)
+    return whole - problem.cost_of_trims(trims, np.array(times))
 
 
 def _cost_of_first(problem: Problem, plan: Plan, until: float) -> float:
@@ -172,7 +177,7 @@ def _cost_of_first(problem: Problem, plan: Plan, until: float) -> float:
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
     """Whether the word of `plan` is the rest of the last one, with or without a rest to pad it."""
-    return rest is not None and _moving(plan) == _moving(rest)
+    return rest is not None and (plan is rest or _moving(plan) == _moving(rest))
 
 
 def within(pose: Array, goal: Goal) -> bool:

@@ -321,7 +321,9 @@ class RecedingHorizon:
         bound = self._bound(chosen, search, now)
         known = decision.leads or (search.knows_all and not here.via)
         value = chosen.cost if known else bound
-        applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
+        lasting = plan.duration
+        applied = min(delta, lasting) if lasting > NOTHING else delta
+        whole = chosen.cost if plan is chosen.plan and decision.leads else None
         step = Step(
             time=here.start_time,
             pose=here.start,
@@ -329,7 +331,7 @@ class RecedingHorizon:
             goal_index=chosen.goal_index,
             value=value,
             applied=applied,
-            applied_cost=cost_until(here, plan, applied),
+            applied_cost=cost_until(here, plan, applied, whole=whole),
             accumulated_cost=_accumulated(now),
             origin=chosen.origin,
             replanned=last is not None and not same,
