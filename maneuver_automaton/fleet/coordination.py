@@ -370,21 +370,21 @@ class _Floor:
         if vehicle.problem.automaton.rest is None:
             return False
         others = self._standing(but=j)
-        beside = [
-            body for i, one in self._courses().items() if i not in (j, k) for body in one.arrived
-        ]
-        found, tried = None, 0
+        there = {i: one.arrived for i, one in self._courses().items() if i not in (j, k)}
+        beside = list(itertools.chain(*there.values()))
+        homes = (bodies for i, bodies in there.items() if i not in self.waiting)
+        arrived, found, tried = [*way.course.arrived, *itertools.chain(*homes)], None, 0
         for goal in vehicle.refuges(before, way, beside, self._clock):
             if self.budget.is_over or tried == MOST_PLACES:
                 break
             leg = self._leg(j, others, aim=goal)
             if leg is None:
                 continue
-            there = replace(leg.course, until=math.inf).after(leg.arrival)
-            if meetings({j: there, k: way.course}, keep=self.margin):
+            stays = replace(leg.course, until=math.inf).after(leg.arrival)
+            if meetings({j: stays, k: way.course}, keep=self.margin):
                 continue
             found, tried = found or leg, tried + 1
-            if self._leads_home(j, leg, k, way):
+            if vehicle.leg(leg, arrived, self._clock, self.budget) is not None:  # home from there
                 found = leg
                 break
         if found is not None:
@@ -392,12 +392,6 @@ class _Floor:
             self.waiting += [] if j in self.waiting else [j]
             self._drive(j, found, leaves=False)
         return found is not None
-
-    def _leads_home(self, j: int, aside: OwnPlan, k: int, way: OwnPlan) -> bool:
-        """Whether one that drove aside gets home when another one, and others, have arrived."""
-        there = {i: one for i, one in self._courses().items() if i not in (j, *self.waiting)}
-        arrived = [body for one in ({**there, k: way.course}).values() for body in one.arrived]
-        return self.vehicles[j].leg(aside, arrived, self._clock, self.budget) is not None
 
     def _drive(self, k: int, leg: OwnPlan, *, leaves: bool) -> None:
         """Drive a leg, as soon as all that was driven before allows."""

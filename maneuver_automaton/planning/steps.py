@@ -323,5 +323,6 @@ def _why_unlinked(problem: Problem) -> str:
     if automaton.maneuvers or between.size > 1:
         return ""
     hit = " or meets an obstacle" if problem.obstacles or problem.zones else ""
-    coast = f"to coast in trim {start.name!r} leads to no goal{hit}"
-    return f"the library has no maneuvers, and {coast}"
+    return (
+        f"the library has no maneuvers, and to coast in trim {start.name!r} leads to no goal{hit}"
+    )
