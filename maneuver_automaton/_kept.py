@@ -35,11 +35,10 @@ class _Kept(dict[Hashable, Any]):
 
 def _kept_by(owner: Any, kind: Hashable, make: Callable[..., _T]) -> Callable[..., _T]:
     """The function that remembers results of a kind for an owner."""
-    kept: _Kept = owner.__dict__.setdefault("_kept", _Kept())
+    kept: dict[Hashable, Callable[..., _T]] = owner.__dict__.setdefault("_kept", _Kept())
     if kind not in kept:
         kept[kind] = functools.lru_cache(MOST)(make)
-    remembers: Callable[..., _T] = kept[kind]
-    return remembers
+    return kept[kind]
 
 
 def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
@@ -74,11 +73,8 @@ def kept_by_first(
 
     @functools.wraps(make)
     def once(owner: _Owner, /, *args: _P.args, **more: _P.kwargs) -> _T:
-        try:  # short, for steps of a loop call it some ten times
-            remembers: Callable[..., _T] = owner.__dict__["_kept"][once]
-        except KeyError:
-            remembers = _kept_by(owner, once, functools.partial(make, owner))
-        return remembers(*args, **more)
+        known: Callable[..., _T] | None = owner.__dict__.get("_kept", {}).get(once)
+        return (known or _kept_by(owner, once, functools.partial(make, owner)))(*args, **more)
 
     return once
 

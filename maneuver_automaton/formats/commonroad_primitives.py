@@ -142,8 +142,7 @@ def commonroad_primitives_text(file: RoadPrimitives) -> str:
     older = file.vehicle is None
     lines = ['<?xml version="1.0" ?>']
     if not older:
-        vehicle = escape(file.vehicle or "", quote=False)
-        lines += [f"<{ROOT}>", f"   <VehicleType>{vehicle}</VehicleType>"]
+        lines += [f"<{ROOT}>", f"   <VehicleType>{escape(file.vehicle or '', False)}</VehicleType>"]
     pad = "" if older else "   "
     lines.append(f"{pad}<{OLDER_ROOT}>")
     for one in file.primitives:

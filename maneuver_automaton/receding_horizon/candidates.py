@@ -149,10 +149,7 @@ def bounded(problem: Problem) -> bool:
 
 
 def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | None = None) -> float:
-    """Cost of the first `until` seconds of a plan, the switches in them included.
-
-    `whole`: the cost of the plan without that of places, where it is known.
-    """
+    """Cost of a plan's first `until` seconds, with their switches; `whole`: its own, if known."""
     if problem.place_costs:
         first = first_part(plan, until)
         places = sum(one.price for one in problem.place_prices_of(first))
@@ -162,8 +159,7 @@ def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | Non
         return problem.cost_of(plan) - problem.cost_of(rest_of(plan, until, start=plan.start))
     left = last_times(plan.durations.tolist(), until)
     trims, times = merged(plan.trims[len(plan.trims) - len(left) :], left)
-    if whole is None:
-        whole = problem.cost_of(plan)
+    whole = problem.cost_of(plan) if whole is None else whole
     return whole - problem.cost_of_trims(trims, np.array(times))
 
 

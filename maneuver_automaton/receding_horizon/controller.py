@@ -310,8 +310,7 @@ class RecedingHorizon:
         return replace(last, plan=plan, applied=passed, applied_cost=spent)
 
     def _logged(self, chosen: StepPlan, search: StepSearch, now: Situation) -> Step:
-        here, last, delta = now.here, now.last, self.settings.step
-        plan = chosen.plan
+        here, last, delta, plan = now.here, now.last, self.settings.step, chosen.plan
         if plan.maneuvers:
             most = min(plan.duration / delta, MOST_AHEAD)
             instants = here.start_time + delta * np.arange(1, 2 + most)
@@ -321,8 +320,7 @@ class RecedingHorizon:
         bound = self._bound(chosen, search, now)
         known = decision.leads or (search.knows_all and not here.via)
         value = chosen.cost if known else bound
-        lasting = plan.duration
-        applied = min(delta, lasting) if lasting > NOTHING else delta
+        applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
         whole = chosen.cost if plan is chosen.plan and decision.leads else None
         step = Step(
             time=here.start_time,
@@ -383,11 +381,8 @@ class RecedingHorizon:
         """No plan to any goal costs less."""
         if now.exhaustive:
             return chosen.cost
-        if (
-            self.settings.continuous
-        ):  # trims at another pace may cost less than those of the library
-            here = now.here
-            return min(self.promises.effort_bound(here.start, goal) for goal in here.goals)
+        if self.settings.continuous:  # at another pace trims may cost less than the library's
+            return min(self.promises.effort_bound(now.here.start, goal) for goal in now.here.goals)
         least, moving = search.lower_bound(), now.as_it_moves
         if self.proven is None or moving is None:
             return least

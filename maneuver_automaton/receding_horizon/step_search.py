@@ -196,7 +196,7 @@ class StepSearch:
                 f"no plan was found that takes at most {limit:g} s; the one applied takes "
                 f"{lasting:.6g} s",
             )
-        return self._known_free(best, shifted=None if kept is None else kept.cost)
+        return self._known_free(replace(best, shifted_value=None if kept is None else kept.cost))
 
     def is_safe(self, plan: Plan) -> bool:
         """Whether a plan stays inside the bounds, is free, and can be followed by a free motion."""
@@ -208,16 +208,12 @@ class StepSearch:
             self.unsafe.append(plan)
         return False
 
-    def _known_free(self, chosen: StepPlan, *, shifted: float | None = None) -> StepPlan:
+    def _known_free(self, chosen: StepPlan) -> StepPlan:
         """What is applied, with the time until which it is known to be free [s]."""
         until, plan = self.free_until, chosen.plan
         if until is not None and plan.trims and not plan.trims[-1].is_rest:
             until = min(until, plan.start_time + plan.duration)
-        if shifted is None:
-            shifted = chosen.shifted_value
-        if until == chosen.free_until and shifted == chosen.shifted_value:
-            return chosen
-        return replace(chosen, free_until=until, shifted_value=shifted)
+        return chosen if until == chosen.free_until else replace(chosen, free_until=until)
 
     def _there(self) -> StepPlan | None:
         """At the goal, or within it if that is to be held: rest, if that is safe."""
@@ -252,10 +248,8 @@ class StepSearch:
                 continue
             one = now.candidate(plan, last.goal_index, origin)
             same = [trim.name for trim in plan.trims] == [trim.name for trim in rest.trims]
-            if self.improves:
-                return one
             cost = one.cost if one.plan is plan else now.here.cost_of(plan)
-            if same and cost <= last.value:
+            if self.improves or (same and cost <= last.value):
                 return one
             safe.append(one)
         near = within(rest.end, now.here.goals[last.goal_index])
