@@ -194,16 +194,16 @@ class _FleetSearch:
         rng = np.random.default_rng(self.seed)
         drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
         best, to_come, n_th = self._in_orders(drawn[:1], until), drawn[1:], 0
-        # All the time there is for those that have no plan, in turn by both ways.
+        # All the time there is for those that have no plan, in turn by both ways: orders are many
+        # and quick, so ever more of them stand between two turns, however many processes there are.
         while len(best) < len(able) and not self.budget.is_over:
             best = self._one_at_a_time(able, n_th, rng, best)
             if len(best) == len(able) or not (to_come or max_rounds is None):
                 break
             n_th += 1
-            some = to_come[: self.pool.jobs] or [
-                self._order_of(rest, n_th, rng) for _ in range(self.pool.jobs)
-            ]
-            del to_come[: self.pool.jobs]
+            some, to_come = to_come[: 2**n_th], to_come[2**n_th :]
+            if not some:
+                some = [self._order_of(rest, n_th, rng) for _ in range(self.pool.jobs)]
             best = self._in_orders(some, self.budget, best)
         self.held = best
         for k in able:
