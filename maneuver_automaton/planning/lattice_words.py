@@ -293,8 +293,8 @@ class LatticeWords(PlanningStep):
         own = self.words[-1]  # where others are improved from, too: they lead to other minima
         if (freely := _steered_freely(query.problem)) is not None:
             # of all that turn at rest the priced search finds few: it takes them one by one
-            at_will = lattice_query(freely, _goals(query), prepared=query.prepared)
-            self._by_way_of(at_will, STEERED_SHARE, counted=STEERED_SHARE)
+            other = lattice_query(freely, _goals(query), prepared=query.prepared)
+            self._by_way_of(other, STEERED_SHARE, counted=STEERED_SHARE)
         better = self.words_of(
             query,
             self._for_the_best(),
@@ -356,10 +356,11 @@ class LatticeWords(PlanningStep):
         Estimates of the search are too low there to find a way round: it expands the places first.
         """
         query, best, found = self.query, self.words[-1], self.found
-        if (problem := with_dear_places_closed(query)) is None:
+        pays = best.cost - with_price(query.library.priced, best).cost > PAID * best.cost
+        problem = with_dear_places_closed(query) if pays or self.polish else None
+        if problem is None:
             return
-        invariant = with_price(query.library.priced, best).cost
-        if best.cost - invariant > PAID * best.cost:
+        if pays:
             closed = lattice_query(
                 problem, _goals(query), prepared=query.prepared, library=query.library
             )
@@ -419,11 +420,11 @@ def _steered_freely(problem: Problem) -> Problem | None:
     """The problem without the price of steering at rest; None where there is none to pay."""
     if not 0.0 < getattr(problem.automaton.model, "steering_at_rest", 0.0) < math.inf:
         return None
-    return replace(problem, automaton=_at_will(problem.automaton))
+    return replace(problem, automaton=_without_price_at_rest(problem.automaton))
 
 
 @kept_by_first
-def _at_will(automaton: Automaton) -> Automaton:
+def _without_price_at_rest(automaton: Automaton) -> Automaton:
     model: Any = automaton.model
     return replace(automaton, model=replace(model, steering_at_rest=0.0))
 
@@ -455,6 +456,8 @@ def with_dear_places_closed(query: LatticeQuery) -> Problem | None:
         return None
     per_metre, per_second = place.value[:2].min(axis=(0, 1)), place.value[2:].min(axis=1).sum(0)
     rates = per_metre + per_second
+    if not rates.max() > 0.0:
+        return None
     middle = SE2(query.world.frame) @ SE2(np.array([place.origin_x, place.origin_y, 0.0]))
     corner = middle @ SE2(np.array([-0.5 * place.cell, -0.5 * place.cell, 0.0]))
     dear = OccupancyMap(
