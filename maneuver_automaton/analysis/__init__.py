@@ -47,9 +47,7 @@ from maneuver_automaton.analysis.symmetry import check_constraint as check_const
 from maneuver_automaton.analysis.symmetry import check_flow as check_flow
 from maneuver_automaton.analysis.symmetry import check_stage_cost as check_stage_cost
 from maneuver_automaton.analysis.symmetry import check_vector_field as check_vector_field
-from maneuver_automaton.analysis.symmetry import (
-    same_motion_primitive as same_motion_primitive,
-)
+from maneuver_automaton.analysis.symmetry import same_motion_primitive as same_motion_primitive
 from maneuver_automaton.analysis.turnpike import Turnpike as Turnpike
 from maneuver_automaton.analysis.turnpike import TurnpikeCase as TurnpikeCase
 from maneuver_automaton.analysis.turnpike import turnpike as turnpike

@@ -19,9 +19,7 @@ from maneuver_automaton.models.model import OnLattice as OnLattice
 from maneuver_automaton.models.model import OnlyTranslated as OnlyTranslated
 from maneuver_automaton.models.robots import LatticeBody as LatticeBody
 from maneuver_automaton.models.robots import Omnidirectional as Omnidirectional
-from maneuver_automaton.models.robots import (
-    SecondOrderUnicycle as SecondOrderUnicycle,
-)
+from maneuver_automaton.models.robots import SecondOrderUnicycle as SecondOrderUnicycle
 from maneuver_automaton.models.robots import Unicycle as Unicycle
 from maneuver_automaton.models.state import VectorField as VectorField
 from maneuver_automaton.models.state import equivariance_defect as equivariance_defect
