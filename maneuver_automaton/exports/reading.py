@@ -28,13 +28,7 @@ from maneuver_automaton.formats.plan_json import (
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, Recording, recording_of
 from maneuver_automaton.recording.values import mover_of, world_of
-from maneuver_automaton.roads import (
-    RoadFleetResult,
-    RoadPlanner,
-    RoadPlanResult,
-    RoadVerdict,
-    road_planner,
-)
+from maneuver_automaton.roads import RoadFleetResult, RoadPlanResult, road_planner
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.several import judged_together, nearest_pairs
 from maneuver_automaton.scenario import (
@@ -233,7 +227,12 @@ def _driven_on_roads(file: ResultFile) -> RoadFleetResult:
     its = next(iter(roads.values())).vehicle
     verdicts = judged_together(scenes, its, plans)
     results = {
-        name: _answer(road_planner(scenes[name], its), plans.get(name), one, verdicts.get(name))
+        name: RoadPlanResult(
+            planner=road_planner(scenes[name], its),
+            plan=plans.get(name),
+            verdict=verdicts.get(name),
+            reason=str(one.get("reason") or ""),
+        )
         for name, one in stated.items()
     }
     return RoadFleetResult(
@@ -242,18 +241,6 @@ def _driven_on_roads(file: ResultFile) -> RoadFleetResult:
         pairs=nearest_pairs(its, plans),
         order=tuple(stated),
         search_s=0.0,
-    )
-
-
-def _answer(
-    planner: RoadPlanner,
-    plan: Plan | None,
-    document: Mapping[str, Any],
-    verdict: RoadVerdict | None = None,
-) -> RoadPlanResult:
-    reason = str(document.get("reason") or "")
-    return RoadPlanResult(
-        planner=planner, decision=None, plan=plan, verdict=verdict, reason=reason, search_s=0.0
     )
 
 
@@ -314,8 +301,8 @@ def _on_road(file: ResultFile) -> Recording:
     plan = _plan_on_road(file.path, document, road)
     if plan is None:
         raise InvalidScenario(f"{file.path}: holds no plan, its status is {document['status']!r}")
-    found = _answer(road_planner(road.scene, road.vehicle), plan, document)
-    recording = recording_of(found)
+    planner, why = road_planner(road.scene, road.vehicle), str(document.get("reason") or "")
+    recording = recording_of(RoadPlanResult(planner=planner, plan=plan, reason=why))
     reached = "steps" not in document or bool(document["reached"])
     mover = replace(recording.movers[0], cost=document.get("cost"), reached=reached)
     return replace(recording, movers=(mover,))

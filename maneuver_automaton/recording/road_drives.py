@@ -74,7 +74,6 @@ def _plan(result: RoadPlanResult) -> Recording:
 
 def _drive(drive: RoadDrive) -> Recording:
     replanned = sum(step.replanned for step in drive.steps)
-    cost = math.fsum(step.applied_cost for step in drive.steps)
     scene, end = drive.planner.scene, drive.driven.switching_times[-1]
     goal = f"reached at {end:.6g} s" if drive.reached else f"{drive.status}: {drive.reason}"
     return Recording(
@@ -85,7 +84,7 @@ def _drive(drive: RoadDrive) -> Recording:
         ending="goal reached" if drive.reached else drive.reason,
         facts=(
             Fact(label="goal", value=goal),
-            Fact(label="cost", value=cost, digits=6, heads=False),
+            Fact(label="cost", value=drive.cost, digits=6, heads=False),
             Fact(label="duration", value=drive.driven.duration, unit="s"),
             Fact(label="steps", value=f"{len(drive.steps)}, {replanned} replanned"),
             Fact(label="collisions", value=str(len(drive.verdict.hit)), heads=False),
@@ -182,12 +181,7 @@ def _room(verdict: RoadVerdict) -> list[Fact]:
 
 def _of_all(result: RoadFleetResult | RoadFleetDrive, plans: Sequence[Plan]) -> list[Fact]:
     """Cost of all, the longest drive, and how near any two came."""
-    cost = math.fsum(
-        math.fsum(step.applied_cost for step in one.steps)
-        if isinstance(one, RoadDrive)
-        else one.cost or 0.0
-        for one in result.results.values()
-    )
+    cost = math.fsum(one.cost or 0.0 for one in result.results.values())
     longest = max((plan.duration for plan in plans), default=0.0)
     facts = [
         Fact(label="cost", value=cost, digits=6, heads=False),
@@ -227,9 +221,8 @@ def _planned(one: RoadPlanResult) -> list[str]:
 
 def _ended(one: RoadDrive) -> list[str]:
     """Status, cost and arrival of a drive."""
-    cost = math.fsum(step.applied_cost for step in one.steps)
     until = one.driven.start_time + one.driven.duration
-    return [one.status, f"{cost:.6g}", f"{until:.6g}" if one.reached else ""]
+    return [one.status, f"{one.cost:.6g}", f"{until:.6g}" if one.reached else ""]
 
 
 def _world(scene: RoadScene, planned: Mapping[str, Any] | tuple[()]) -> Environment:

@@ -5,6 +5,7 @@ The loop plans, drives one tick, and plans again.
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -74,6 +75,11 @@ class RoadDrive(Played):
         after = [_state_after(self.planner, s.state, s.control) for s in self.steps[-1:]]
         states = [*(step.state for step in self.steps), *after]
         return self.planner.notes(np.array(states or [self.planner.start_state]))
+
+    @property
+    def cost(self) -> float:
+        """Cost of what was driven."""
+        return math.fsum(step.applied_cost for step in self.steps)
 
     @property
     def solve_s(self) -> Array:
@@ -236,11 +242,11 @@ class RoadPlanResult(Played):
     """A plan to a goal and the verdict on it, or why there is none."""
 
     planner: RoadPlanner
-    decision: RoadDecision | None  # for `drive_scene` to begin with
-    plan: Plan | None  # to the goal, in the coordinates and on the clock of the scene
-    verdict: RoadVerdict | None
-    reason: str  # empty if there is a plan
-    search_s: float  # [s]
+    decision: RoadDecision | None = None  # for `drive_scene` to begin with
+    plan: Plan | None = None  # to the goal, in the coordinates and on the clock of the scene
+    verdict: RoadVerdict | None = None
+    reason: str = ""  # empty if there is a plan
+    search_s: float = 0.0  # [s]
 
     __repr__ = brief
 
@@ -283,7 +289,7 @@ def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPl
     """A plan within limits of speed, looked for in half of the time [s]; else one beyond them."""
     begin = time.perf_counter()
     if (why := planner.hopeless()) is not None:
-        return _without(planner, why[1])
+        return RoadPlanResult(planner=planner, reason=why[1])
     limited = bool(np.isfinite(planner.route.limit).any())
     with patient():
         widths = WIDTHS if planner.limits_leave_time else WIDTHS[:2]
@@ -299,7 +305,7 @@ def _wider(
     planner: RoadPlanner, give_up: float, deadline: float, widths: Sequence[int], *, loop: bool
 ) -> RoadPlanResult:
     """The better one of the first search that finds a plan, and of the next wider one."""
-    best, driven = _without(planner, ""), ""
+    best, driven = RoadPlanResult(planner=planner), ""
     for width in widths:
         over = give_up if best.plan is None else deadline
         if width != widths[0] and (stopped() or time.perf_counter() > over):
@@ -329,7 +335,7 @@ def _driven(planner: RoadPlanner, deadline: float) -> tuple[RoadPlanResult, str]
     drive = driver.drive(planner.scene)
     if not drive.reached:
         said = f"; driven step by step until {planner.time_of(driver.tick):.6g} s: {drive.status}"
-        return _without(planner, ""), f"{said}, {drive.reason}"
+        return RoadPlanResult(planner=planner), f"{said}, {drive.reason}"
     controls = np.array([step.control for step in driver.done]).reshape(-1, 2)
     plan = planner.of_controls(planner.start_state, 0, controls, len(controls), reaches=True)
     return _judged(planner, plan), ""
@@ -345,7 +351,7 @@ def _searched(planner: RoadPlanner) -> RoadPlanResult:
             f"no goal is reached until {planner.time_of(planner.last_tick):.6g} s by any of the"
             f" words searched, {planner.settings.width} at a time{_how_near(planner, found)}"
         )
-        return _without(planner, reason)
+        return RoadPlanResult(planner=planner, reason=reason)
     return _judged(planner, found)
 
 
@@ -356,16 +362,9 @@ def _judged(planner: RoadPlanner, found: RoadDecision) -> RoadPlanResult:
     verdict = judged(planner.scene, planner.vehicle, plan)
     if not verdict.clean:
         said = "; ".join(words for _, words in verdict.faults)
-        return _without(planner, f"the plan that was found fails the judge: {said}")
-    return RoadPlanResult(
-        planner=planner, decision=found, plan=plan, verdict=verdict, reason="", search_s=0.0
-    )
-
-
-def _without(planner: RoadPlanner, reason: str) -> RoadPlanResult:
-    return RoadPlanResult(
-        planner=planner, decision=None, plan=None, verdict=None, reason=reason, search_s=0.0
-    )
+        reason = f"the plan that was found fails the judge: {said}"
+        return RoadPlanResult(planner=planner, reason=reason)
+    return RoadPlanResult(planner=planner, decision=found, plan=plan, verdict=verdict)
 
 
 def _past_stops(planner: RoadPlanner, state: Array, tick: int) -> RoadDecision | None:
