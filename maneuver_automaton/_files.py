@@ -30,7 +30,10 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
     """
     target = path.resolve()  # a link keeps pointing where it points
     target.parent.mkdir(parents=True, exist_ok=True)
-    _sweep(target.parent)
+    for part in target.parent.glob(f"{PART}*"):  # left by processes that were killed
+        with contextlib.suppress(OSError):
+            if time.time() - part.stat().st_mtime > OLD:
+                part.unlink()
     beside = target.parent / f"{PART}{uuid.uuid4().hex}"
     try:
         with beside.open("xb") as stream:
@@ -40,18 +43,12 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
         with contextlib.suppress(FileNotFoundError):
             beside.chmod(target.stat().st_mode & 0o777)  # keep the permissions of what is replaced
         beside.replace(target)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             beside.unlink()
+        if isinstance(error, OSError):
+            error.filename = str(path)  # not of the part, of which nobody knows
         raise
-
-
-def _sweep(folder: Path) -> None:
-    """Remove what processes left that were killed while they wrote."""
-    for part in folder.glob(f"{PART}*"):
-        with contextlib.suppress(OSError):
-            if time.time() - part.stat().st_mtime > OLD:
-                part.unlink()
 
 
 def write_text_atomically(path: Path, text: str) -> None:

@@ -17,8 +17,8 @@ from maneuver_automaton.cli.inputs import (
     automaton_of,
     make_folder,
     named_automaton,
-    not_written,
     target,
+    writing,
 )
 from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw
@@ -41,16 +41,10 @@ def build(
     with waiting("making the library", quiet=quiet):
         automaton = automaton_of(file)
     make_folder(path.parent)
-    _save(automaton, path)
+    with writing(path):
+        save_library(automaton, path)
     _print_library(path, automaton, quiet=quiet)
     return FOUND
-
-
-def _save(automaton: Automaton, path: Path) -> None:
-    try:
-        save_library(automaton, path)
-    except OSError as error:
-        raise not_written(path, error) from error
 
 
 def _build_maneuvers(
@@ -66,15 +60,13 @@ def _build_maneuvers(
         if pairs
         else waiting("joining the trims", quiet=quiet)
     )
-    with shown as advance:
+    with writing(path), shown as advance:
         count = None if advance is None else counted(advance)
         try:
             built = build_file.build(asked, path, jobs=jobs, scheduler=scheduler, progress=count)
         except KeyboardInterrupt:
             complain(f"{file}: interrupted: called again, the build goes on after what is done")
             raise
-        except OSError as error:
-            raise not_written(Path(error.filename or path), error) from error
         except ManeuverAutomatonError:
             raise
         except ValueError as error:
@@ -159,15 +151,13 @@ def draw(file: Path, out: Path, *, look: LookOptions, model_text: str | None = N
     path = target(out, "automaton.png")
     make_folder(path.parent)
     plotting = ready_to_draw()
-    try:
+    with writing(path):
         plotting.save_automaton_figure(automaton, path, look=look.look(name))
         console().print(str(path), soft_wrap=True)
         if automaton.maneuvers:
             path = path.with_name(f"{path.stem}_maneuvers{path.suffix}")
             plotting.save_maneuvers_figure(automaton, path, look=look.look(name))
             console().print(str(path), soft_wrap=True)
-    except OSError as error:
-        raise not_written(path, error) from error
     return FOUND
 
 
@@ -230,7 +220,8 @@ def design(
     make_folder(path.parent)
     with waiting("choosing trims, and proving their factor", quiet=quiet):
         designed = design_of_file(file, instead=instead)
-    _save(designed.automaton, path)
+    with writing(path):
+        save_library(designed.automaton, path)
     if not quiet:
         _print_designed(path, designed)
     if plot:
@@ -261,7 +252,8 @@ def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bo
             done = disperse_library(library, most=int(instead["most"]))
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
-    _save(done.automaton, path)
+    with writing(path):
+        save_library(done.automaton, path)
     if not quiet:
         console().print(
             f"{path}: {len(done.automaton.maneuvers)} of {done.maneuvers} maneuvers, hash "
@@ -278,10 +270,8 @@ def _draw_factor(designed: DesignedLibrary, path: Path, *, quiet: bool) -> None:
         complain(f"{path}: not drawn: the factor of words of any length is one for all goals")
         return
     plotting = ready_to_draw()
-    try:
+    with writing(path):
         plotting.save_factor_figure(designed.words, path)
-    except OSError as error:
-        raise not_written(path, error) from error
     if not quiet:
         console().print(str(path), soft_wrap=True)
 

@@ -17,7 +17,7 @@ from maneuver_automaton._kernel_folders import (
 )
 from maneuver_automaton._kernel_list import listed
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain
-from maneuver_automaton.cli.inputs import not_written
+from maneuver_automaton.cli.inputs import writing
 from maneuver_automaton.cli.terminal import console, table
 from maneuver_automaton.search.cost_to_go import FOLDER, MOST_BYTES
 
@@ -46,10 +46,8 @@ def clear() -> int:
     folders = _folders()
     size = sum(status.st_size for _, status in files_of(folders)) / MEGABYTE
     for folder in folders:
-        try:
+        with writing(folder):
             shutil.rmtree(folder)
-        except OSError as error:
-            raise not_written(Path(error.filename or folder), error) from error
     console().print(f"{size:.1f} MB removed", soft_wrap=True)
     return FOUND
 

@@ -15,8 +15,8 @@ from maneuver_automaton.cli.inputs import (
     Parts,
     automaton_of,
     make_folder,
-    not_written,
     problem_of,
+    writing,
 )
 from maneuver_automaton.cli.terminal import console, print_written
 from maneuver_automaton.collision import AnyObstacle, OccupancyMap
@@ -49,7 +49,7 @@ def convert(source: Path, target: Path, *, parts: Parts) -> int:
             f"({', '.join(YAML_ENDINGS)}), a MovingAI map (.map), or "
             "primitives (.json, .nav2.json, .mprim, .xml)"
         )
-    try:
+    with writing(target):
         if ending not in YAML_ENDINGS:
             cells = _only_map(source, parts)
             make_folder(target.parent)
@@ -59,8 +59,6 @@ def convert(source: Path, target: Path, *, parts: Parts) -> int:
             save_nav2_map(plain, target)
         else:
             _write_scenario(problem_of(source, parts), source, target)
-    except OSError as error:
-        raise not_written(Path(error.filename or target), error) from error
     print_written(target)
     return FOUND
 
@@ -69,16 +67,15 @@ def _convert_library(source: Path, target: Path, write: Callable[[Automaton, Pat
     """Write primitives, or the automaton of a scenario; say what is not as the source says."""
     read = read_primitives(source)
     automaton = automaton_of(source) if read is None else read.automaton
+    make_folder(target.parent)
     try:
-        make_folder(target.parent)
-        if read is not None and write_again(read, target):
-            print_written(target)
-            return FOUND
-        write(automaton, target)
+        with writing(target):
+            if read is not None and write_again(read, target):
+                print_written(target)
+                return FOUND
+            write(automaton, target)
     except InvalidLibrary as error:
         raise InvalidLibrary(f"{target}: {error}") from error
-    except OSError as error:
-        raise not_written(Path(error.filename or target), error) from error
     print_written(target)
     if read is not None and read.remark:
         console().print(f"{source}: {read.remark}", soft_wrap=True)

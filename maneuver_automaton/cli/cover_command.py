@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
-from maneuver_automaton.cli.inputs import make_folder, not_written, user_model
+from maneuver_automaton.cli.inputs import make_folder, user_model, writing
 from maneuver_automaton.cli.pictures import ready_to_draw
 from maneuver_automaton.cli.result_commands import origin_of
 from maneuver_automaton.cli.terminal import announced, print_result, waiting
@@ -27,20 +27,16 @@ def cover_file(given: SimpleNamespace) -> int:
     limit = given.time_limit
     with waiting("planning swaths and turns", quiet=quiet):
         covered = cover(field.problem, time_limit=limit or field.time_limit_s, jobs=given.jobs)
-    result, path = covered.result, out / "plan.json"
-    try:
-        save_plan(result, path, name=field.name)
-        path = out / "field.geojson"
-        save_field_geojson(covered, path, name=field.name, origin=field.origin)
-        path = out / "field.png"
-        path.unlink(missing_ok=True)
+    result = covered.result
+    with writing(out):
+        save_plan(result, out / "plan.json", name=field.name)
+        save_field_geojson(covered, out / "field.geojson", name=field.name, origin=field.origin)
+        (out / "field.png").unlink(missing_ok=True)
         if given.plot:
             ready_to_draw()
             from maneuver_automaton.field.picture import save_field_picture
 
-            save_field_picture(covered, path, name=field.name)
-    except OSError as error:
-        raise not_written(path, error) from error
+            save_field_picture(covered, out / "field.png", name=field.name)
     if not quiet and result.plan is not None:
         print_result(field.name, [], (*_facts(covered), Fact(label="written to", value=str(out))))
     if result.plan is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import maneuver_automaton
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.cli.guard import FOUND
-from maneuver_automaton.cli.inputs import make_folder, not_written
+from maneuver_automaton.cli.inputs import make_folder, writing
 from maneuver_automaton.cli.terminal import console
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.text_source import read_text
@@ -52,10 +52,8 @@ def write(name: str, out: Path | None) -> int:
             )
     for original, copy in copies:
         make_folder(copy.parent)
-        try:
+        with writing(copy):
             write_bytes_atomically(copy, original.read_bytes())
-        except OSError as error:
-            raise not_written(copy, error) from error
     command = "mpc" if "receding_horizon" in _content(source) else "plan"
     said = f"{target}: {_content(source)['name']}; next: maneuver-automaton {command} {target}"
     console().print(said, soft_wrap=True, markup=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
@@ -18,8 +17,8 @@ from maneuver_automaton.fleet import (
     verify_driven,
 )
 from maneuver_automaton.fleet.held import fleet_with_room, tube_of
-from maneuver_automaton.formats.fleet_json import reason_of, save_fleet
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, save_fleet_loop
+from maneuver_automaton.formats.fleet_json import fleet_to_dict, reason_of
+from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict, load_fleet_loop
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.recording.fleets import judged_facts
 from maneuver_automaton.scenario import FleetScenario
@@ -54,18 +53,13 @@ def planned(job: Job, scenario: FleetScenario) -> JobResult:
     return JobResult(
         name=name,
         result=result,
-        save=lambda path: save_fleet(
-            result, path, name=name, source=_source(job), interrupted=stopped()
-        ),
+        document=fleet_to_dict(result, name=name),
+        several=True,
         done=whole,
         status=result.status.value,
         complaints=() if whole else (f"{result.status.value}: {why}{reason_of(result)}",),
         first_plan=result.timing_s.get("first_plan"),
     )
-
-
-def _source(job: Job) -> dict[str, Any]:
-    return {"file": job.path, "with": job.parts.beside, "case": job.parts.case}
 
 
 def given_up(scenario: FleetScenario) -> FleetResult:
@@ -100,9 +94,8 @@ def driven(job: Job, scenario: FleetScenario) -> JobResult:
     return JobResult(
         name=name,
         result=log,
-        save=lambda path: save_fleet_loop(
-            log, path, driven=verdict, name=name, source=_source(job), interrupted=stopped()
-        ),
+        document=fleet_loop_to_dict(log, verdict, name=name),
+        several=True,
         done=log.reached and verdict.passed and not broken,
         status=log.status,
         complaints=tuple(complaints),

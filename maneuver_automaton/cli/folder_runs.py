@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import check_scheduler, in_parallel
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
-from maneuver_automaton.cli.inputs import Parts, not_written
+from maneuver_automaton.cli.inputs import Parts, writing
 from maneuver_automaton.cli.terminal import console, progress_bar, table
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.movingai import map_beside
@@ -144,10 +144,8 @@ def _kept(out: Path, keys: dict[Path, str]) -> dict[Path, Row]:
 @contextlib.contextmanager
 def _journal(out: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
     """What writes a line to the journal and sees to it that it is on the disk."""
-    try:
+    with writing(out):
         stream = (out / JOURNAL).open("a", encoding="utf-8")
-    except OSError as error:
-        raise not_written(out / JOURNAL, error) from error
 
     def write(entry: dict[str, Any]) -> None:
         stream.write(json.dumps(entry) + "\n")

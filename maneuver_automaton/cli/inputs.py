@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import difflib
 import functools
 import importlib
 import inspect
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,17 +108,21 @@ def target(out: Path, name: str) -> Path:
 
 def make_folder(folder: Path) -> None:
     """Make the folder of the results, before work is spent on them."""
+    with writing(folder):
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except ValueError as error:  # a name that no system has
+            raise OSError(str(error)) from error
+
+
+@contextlib.contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Tell in one line which file cannot be written: the one that failed, else `path`."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except (OSError, ValueError) as error:
-        raise not_written(folder, error) from error
-
-
-def not_written(path: Path, error: Exception) -> InvalidScenario:
-    """One line for a file that cannot be written."""
-    return InvalidScenario(
-        f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}"
-    )
+        yield
+    except OSError as error:
+        said = error.strerror or error
+        raise InvalidScenario(f"{error.filename or path}: cannot be written: {said}") from error
 
 
 def opened(path: Path, parts: Parts) -> exports.ResultFile:

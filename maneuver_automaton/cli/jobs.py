@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,15 +17,16 @@ from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, ex
 from maneuver_automaton.cli.inputs import (
     Parts,
     make_folder,
-    not_written,
     problem_of,
     states_several,
+    writing,
 )
 from maneuver_automaton.cli.options import Options, refuse_unknown
 from maneuver_automaton.cli.pictures import draughtsman, draw
 from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import is_road
+from maneuver_automaton.formats.documents import write_document
 from maneuver_automaton.recording import Fact, recording_of, tables_of
 from maneuver_automaton.scenario import FleetScenario
 
@@ -46,7 +47,8 @@ class JobResult:
 
     name: str  # of the scenario
     result: Any  # what is drawn; None: nothing
-    save: Callable[[Path], None]  # writes its document
+    document: Mapping[str, Any]
+    several: bool = False  # vehicles: the document names the files that it was made from
     done: bool  # whether all is as asked
     status: str
     complaints: tuple[str, ...] = ()  # a line each
@@ -54,7 +56,7 @@ class JobResult:
     measured: tuple[Any, ...] = ()  # again, of all that was driven
     remarks: tuple[str, ...] = ()  # a line each, below the facts
     first_plan: float | None = None  # [s]
-    document: str = ""  # its name; empty: that of the command
+    file: str = ""  # the name of its document; empty: that of the command
 
     @functools.cached_property
     def told(self) -> tuple[Fact, ...]:
@@ -109,8 +111,15 @@ class Job:
         work = getattr(importlib.import_module(f"{__package__}.{home}"), WORK[self.command])
         with announced(quiet=self.options.quiet):
             outcome: JobResult = work(self, scenario)
-        with _writing(out):
-            outcome.save(out / f"{outcome.document or DOCUMENTS[self.command]}.json")
+        with writing(out):
+            file = out / f"{outcome.file or DOCUMENTS[self.command]}.json"
+            source = {"file": self.path, "with": self.parts.beside, "case": self.parts.case}
+            write_document(
+                outcome.document,
+                file,
+                source=source if outcome.several else None,
+                interrupted=stopped(),
+            )
             for name in PICTURES[self.command] if outcome.result is not None else ():
                 (out / name).unlink(missing_ok=True)  # of an earlier one
         return outcome
@@ -132,7 +141,7 @@ class Job:
         options = self.options
         wanted = options.plot or options.animate or options.html
         if wanted and outcome.result is not None and not stopped():
-            with _writing(out):
+            with writing(out):
                 draw(outcome.result, outcome.name, out / DOCUMENTS[self.command], options)
 
     def wrong(self, error: ValueError, about: str = "") -> InvalidScenario:
@@ -142,14 +151,6 @@ class Job:
         said = str(error).removeprefix("receding horizon: ")
         said = said.removeprefix("fleet horizon: ").removeprefix("fleet: ")
         return InvalidScenario(f"{self.path}: {about}{said}")
-
-
-@contextlib.contextmanager
-def _writing(out: Path) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise not_written(Path(error.filename or out), error) from error
 
 
 def run_jobs(command: str, path: Path, out: Path, options: Options, parts: Parts) -> int:

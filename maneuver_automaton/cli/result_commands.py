@@ -13,9 +13,9 @@ from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import (
     Parts,
     make_folder,
-    not_written,
     opened,
     user_model,
+    writing,
 )
 from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
@@ -80,11 +80,10 @@ def export(
     write: Callable[..., None] = getattr(exports, form.function)
     make_folder(path.parent)
     try:
-        write(recording, path, **options)
+        with writing(path):
+            write(recording, path, **options)
     except ManeuverAutomatonError:
         raise
-    except OSError as error:
-        raise not_written(path, error) from error
     except ValueError as error:
         raise InvalidScenario(f"{file}: {error}") from error
     print_written(path)
@@ -141,20 +140,17 @@ def plot(
     with _named(file):
         result, name = _result_of(file, beside)
     make_folder(path.parent)
-    try:
-        with _named(file):
-            if isinstance(result, dict):
-                _draw_motion(result, path, what, look)
-            elif what == "page":
-                result.player(title=look.title or name).save(path)
-            elif what == "picture":
-                ready_to_draw().save_picture(result, path, look=look.look(name))
-            elif why := why_no_film(recording_of(result)):
-                raise ValueError(why)
-            else:
-                save_film(recording_of(result), path, look.look(name))
-    except OSError as error:
-        raise not_written(path, error) from error
+    with writing(path), _named(file):
+        if isinstance(result, dict):
+            _draw_motion(result, path, what, look)
+        elif what == "page":
+            result.player(title=look.title or name).save(path)
+        elif what == "picture":
+            ready_to_draw().save_picture(result, path, look=look.look(name))
+        elif why := why_no_film(recording_of(result)):
+            raise ValueError(why)
+        else:
+            save_film(recording_of(result), path, look.look(name))
     print_written(path)
     return FOUND
 

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.guard import complain
@@ -14,7 +11,6 @@ from maneuver_automaton.cli.inputs import states_several
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.terminal import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.documents import source_entry, write_document
 from maneuver_automaton.formats.road_json import (
     road_drive_to_dict,
     road_fleet_drive_to_dict,
@@ -56,7 +52,7 @@ def planned(job: Job, _: None) -> JobResult:
     return JobResult(
         name=found.scene.name,
         result=result,
-        save=_save(road_plan_to_dict(result) | {"status": status}),
+        document=road_plan_to_dict(result) | {"status": status},
         done=result.plan is not None,
         status=status,
         complaints=()
@@ -99,7 +95,7 @@ def driven(job: Job, _: None) -> JobResult:
     return JobResult(
         name=found.scene.name,
         result=drive,
-        save=_save(road_drive_to_dict(drive, before=before)),
+        document=road_drive_to_dict(drive, before=before),
         done=drive.reached,
         status=drive.status,
         complaints=() if drive.reached else (f"{drive.status}: {drive.reason}",),
@@ -130,7 +126,8 @@ def _plans(job: Job) -> JobResult:
     return JobResult(
         name=result.name,
         result=result,
-        save=_save(road_fleet_to_dict(result, status=status, reason=reason), job),
+        document=road_fleet_to_dict(result, status=status, reason=reason),
+        several=True,
         done=result.found,
         status=status,
         complaints=() if result.found else (f"{status}: {said}{reason}",),
@@ -157,7 +154,8 @@ def _drives(job: Job) -> JobResult:
     return JobResult(
         name=drive.name,
         result=drive,
-        save=_save(road_fleet_drive_to_dict(drive), job),
+        document=road_fleet_drive_to_dict(drive),
+        several=True,
         done=drive.reached,
         status=drive.status,
         complaints=() if drive.reached else (f"{drive.status}: {drive.reason}",),
@@ -174,16 +172,3 @@ def _scenes(job: Job) -> tuple[dict[str, RoadScene], RoadVehicle, str]:
     if len(scenes) < len(drives):
         raise InvalidScenario(f"{job.path}: two planning problems have one id, need distinct ids")
     return scenes, drives[0].vehicle, drives[0].name.removesuffix(" case 0")
-
-
-def _save(said: Mapping[str, object], job: Job | None = None) -> Callable[[Path], None]:
-    """What writes a document; one of several vehicles names the files of its `job`."""
-
-    def save(path: Path) -> None:
-        document: dict[str, Any] = dict(said)
-        if job is not None:
-            made_from = {"file": job.path, "with": job.parts.beside, "case": None}
-            document["source"] = source_entry(made_from, path)
-        write_document(document, path, interrupted=stopped())
-
-    return save

@@ -12,11 +12,11 @@ from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.terminal import counted, has_terminal, progress_bar, waiting
 from maneuver_automaton.formats.closed_loop_json import (
+    closed_loop_to_dict,
     load_steps,
-    save_closed_loop,
-    save_statistics,
+    statistics_to_dict,
 )
-from maneuver_automaton.formats.plan_json import save_plan
+from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.receding_horizon import ClosedLoop, Guarantee, simulate, simulate_many
 from maneuver_automaton.recording import recording_of
@@ -59,7 +59,7 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
     return JobResult(
         name=name,
         result=result,
-        save=lambda path: save_plan(result, path, name=name, interrupted=stopped()),
+        document=plan_to_dict(result, name=name),
         done=found,
         status=status,
         complaints=() if found else ("; ".join([f"{status}: {result.reason}", *result.notes]),),
@@ -145,7 +145,7 @@ def _driven(loop: ClosedLoop, name: str) -> JobResult:
     return JobResult(
         name=name,
         result=loop,
-        save=lambda path: save_closed_loop(loop, path, name=name, interrupted=stopped()),
+        document=closed_loop_to_dict(loop, name=name),
         done=loop.reached and not any(loop.collisions),
         status=loop.status,
         complaints=(*broken, *disturbed, *missed),
@@ -171,10 +171,10 @@ def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
     return JobResult(
         name=scenario.name,
         result=None,  # the motion of no loop is kept
-        save=lambda path: save_statistics(statistics, path, interrupted=stopped()),
+        document=statistics_to_dict(statistics),
         done=all(one.reached and not any(one.collisions) for one in statistics.outcomes),
         status=f"{count} loops",
         facts=statistics_facts(statistics),
         remarks=tuple(causes(statistics)),
-        document="statistics",
+        file="statistics",
     )

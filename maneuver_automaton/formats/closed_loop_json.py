@@ -455,9 +455,9 @@ class StatisticsDocument(DocumentHead):
     loops: Annotated[list[OutcomeEntry], Field(min_length=1)]
 
 
-def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bool = False) -> None:
-    """Write statistics.json in one step; `interrupted` by a signal it says so."""
-    document = document_of(
+def statistics_to_dict(statistics: Statistics) -> StatisticsDocument:
+    """The content of statistics.json, as plain values."""
+    return document_of(
         StatisticsDocument,
         statistics,
         loops_run=len(statistics.outcomes),
@@ -471,7 +471,6 @@ def save_statistics(statistics: Statistics, path: Path | str, *, interrupted: bo
             for one in statistics.outcomes
         ],
     )
-    write_document(document, path, interrupted=interrupted)
 
 
 def load_statistics(path: Path | str) -> Statistics:

@@ -108,15 +108,6 @@ def vehicle_entry(model: Model) -> ModelEntry:
     }
 
 
-def source_entry(source: Mapping[str, Any], path: Path) -> SourceEntry:
-    """The files that results in the file `path` were made from, as seen from it."""
-    seen = {
-        key: relative(value, path.parent) if isinstance(value, Path) else value
-        for key, value in source.items()
-    }
-    return cast("SourceEntry", seen)
-
-
 # -- reading
 
 
@@ -327,13 +318,25 @@ def library_entries(automaton: Automaton) -> dict[str, Any]:
 
 
 def write_document(
-    document: Mapping[str, Any], path: Path | str, *, interrupted: bool = False
+    document: Mapping[str, Any],
+    path: Path | str,
+    *,
+    source: Mapping[str, Any] | None = None,
+    interrupted: bool = False,
 ) -> None:
     """Write a document in one step: strict JSON, long lists entry by entry.
 
-    Where a signal came before the work was done, the key `interrupted` says so.
+    The key `source` names the files that it was made from, as seen from it. Where a signal came
+    before the work was done, the key `interrupted` says so.
     """
-    said = {**document, "interrupted": True} if interrupted else document
+    said = dict(document)
+    if source is not None:
+        said["source"] = {
+            key: relative(value, Path(path).parent) if isinstance(value, Path) else value
+            for key, value in source.items()
+        }
+    if interrupted:
+        said["interrupted"] = True
     write_text_atomically(Path(path), _object(said, "") + "\n")
 
 

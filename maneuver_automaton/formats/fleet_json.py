@@ -15,7 +15,6 @@ from maneuver_automaton.formats.documents import (
     DocumentHead,
     document_of,
     read_document,
-    source_entry,
     told_of,
     write_document,
 )
@@ -128,9 +127,7 @@ def save_fleet(
         If the file cannot be written.
     """
     document = fleet_to_dict(result, name=name)
-    if source is not None:
-        document["source"] = source_entry(source, Path(path))
-    write_document(document, path, interrupted=interrupted)
+    write_document(document, path, source=source, interrupted=interrupted)
 
 
 def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:

@@ -37,10 +37,8 @@ from maneuver_automaton.formats.documents import (
     DocumentHead,
     ModelEntry,
     document_of,
-    source_entry,
     told_of,
     vehicle_entry,
-    write_document,
 )
 from maneuver_automaton.formats.entries import (
     Flag,
@@ -199,37 +197,6 @@ def fleet_loop_to_dict(
         vehicles=vehicles,
         steps=_steps(log, vehicles),
     )
-
-
-def save_fleet_loop(
-    log: FleetLog,
-    path: Path | str,
-    *,
-    driven: DrivenVerdict,
-    name: str = "",
-    source: Mapping[str, Any] | None = None,
-    interrupted: bool = False,
-) -> None:
-    """Write closed_loop.json of several vehicles in one step.
-
-    Parameters
-    ----------
-    log : FleetLog
-    path : Path or str
-    driven : DrivenVerdict
-        What `verify_driven` says of it.
-    name : str
-        Of the scenario, which heads pictures.
-    source : mapping, optional
-        The files that it was driven from, for `check` and `plot`: `file`, `with`, `case`. Paths are
-        written as seen from the file.
-    interrupted : bool
-        Whether a signal came before the loop was over, which the file says then.
-    """
-    document = fleet_loop_to_dict(log, driven, name=name)
-    if source is not None:
-        document["source"] = source_entry(source, Path(path))
-    write_document(document, path, interrupted=interrupted)
 
 
 # -- all together

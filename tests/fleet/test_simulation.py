@@ -21,7 +21,8 @@ from maneuver_automaton import (
 )
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.fleet import FleetGuarantee
-from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop, save_fleet_loop
+from maneuver_automaton.formats.documents import write_document
+from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict, load_fleet_loop
 from tests.fleet.robots import (
     at_rest,
     crossing,
@@ -355,7 +356,7 @@ def test_a_loop_that_was_broken_off_goes_on_where_it_was(after, tmp_path):
     more = {"step": 0.5, "time_limit": 60.0, "disturbance": upset, "seed": 3}
     whole = simulate_fleet(fleet, first=first, **more)
     half = simulate_fleet(fleet, first=first, steps=after, **more)
-    save_fleet_loop(half, tmp_path / "closed_loop.json", driven=verify_driven(half))
+    write_document(fleet_loop_to_dict(half, verify_driven(half)), tmp_path / "closed_loop.json")
     read = load_fleet_loop(tmp_path / "closed_loop.json", fleet)
     for log in (simulate_fleet(fleet, log=half, **more), simulate_fleet(fleet, log=read, **more)):
         assert [step.number for step in log.steps] == [*range(len(log.steps))]

@@ -12,8 +12,9 @@ from maneuver_automaton.formats.closed_loop_json import (
     closed_loop_to_dict,
     load_steps,
     save_closed_loop,
-    save_statistics,
+    statistics_to_dict,
 )
+from maneuver_automaton.formats.documents import write_document
 from maneuver_automaton.receding_horizon import (
     ClosedLoop,
     Disturbance,
@@ -251,7 +252,7 @@ class TestReading:
 def test_statistics_are_strict_json(tmp_path):
     starts = [[-2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     statistics = simulate_many(straight(), starts=starts, step=1.0)
-    save_statistics(statistics, tmp_path / "statistics.json")
+    write_document(statistics_to_dict(statistics), tmp_path / "statistics.json")
     document = strict(tmp_path / "statistics.json")
     assert document["loops_run"] == 2
     assert document["reached"] == 0.5

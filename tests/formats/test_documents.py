@@ -13,7 +13,7 @@ from maneuver_automaton.fleet import plan_fleet, simulate_fleet, verify_driven
 from maneuver_automaton.formats.closed_loop_json import (
     load_statistics,
     save_closed_loop,
-    save_statistics,
+    statistics_to_dict,
 )
 from maneuver_automaton.formats.documents import (
     KINDS,
@@ -23,7 +23,7 @@ from maneuver_automaton.formats.documents import (
     write_document,
 )
 from maneuver_automaton.formats.fleet_json import save_fleet
-from maneuver_automaton.formats.fleet_loop_json import save_fleet_loop
+from maneuver_automaton.formats.fleet_loop_json import fleet_loop_to_dict
 from maneuver_automaton.formats.plan_json import save_plan
 from maneuver_automaton.formats.road_json import (
     road_drive_to_dict,
@@ -45,7 +45,7 @@ def many_loops():
 
 def write_fleet_loop(folder, file):
     log = simulate_fleet(crossing(tolerance=0.05), step=0.5, steps=4, first_time_limit=1.0)
-    save_fleet_loop(log, file, driven=verify_driven(log))
+    write_document(fleet_loop_to_dict(log, verify_driven(log)), file)
 
 
 def write_road_fleet(folder, file):
@@ -56,7 +56,7 @@ def write_road_fleet(folder, file):
 WRITERS = {
     "plan": lambda folder, file: save_plan(plan(straight()), file),
     "loop": lambda folder, file: save_closed_loop(simulate(straight(), step=1.0), file),
-    "statistics": lambda folder, file: save_statistics(many_loops(), file),
+    "statistics": lambda folder, file: write_document(statistics_to_dict(many_loops()), file),
     "fleet": lambda folder, file: save_fleet(plan_fleet(crossing(), time_limit=0.5), file),
     "fleet-loop": write_fleet_loop,
     "road-plan": lambda folder, file: write_document(
@@ -117,9 +117,9 @@ def test_the_schema_is_printed(capsys):
 
 def test_statistics_are_read_back(tmp_path):
     statistics = many_loops()
-    save_statistics(statistics, tmp_path / "a.json")
+    write_document(statistics_to_dict(statistics), tmp_path / "a.json")
     again = load_statistics(tmp_path / "a.json")
-    save_statistics(again, tmp_path / "b.json")
+    write_document(statistics_to_dict(again), tmp_path / "b.json")
     assert (tmp_path / "b.json").read_bytes() == (tmp_path / "a.json").read_bytes()
     for one, other in zip(statistics.outcomes, again.outcomes, strict=True):
         np.testing.assert_array_equal(one.start, other.start)

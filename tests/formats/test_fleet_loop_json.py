@@ -12,11 +12,10 @@ import pytest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet, verify_driven
 from maneuver_automaton.formats.closed_loop_json import driven_document
-from maneuver_automaton.formats.documents import read_document
+from maneuver_automaton.formats.documents import read_document, write_document
 from maneuver_automaton.formats.fleet_loop_json import (
     fleet_loop_to_dict,
     load_fleet_loop,
-    save_fleet_loop,
 )
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.receding_horizon import Disturbance
@@ -60,7 +59,7 @@ def same(one, other):
 
 def test_there_and_back(log, tmp_path):
     path = tmp_path / "closed_loop.json"
-    save_fleet_loop(log, path, driven=verify_driven(log), name="any")
+    write_document(fleet_loop_to_dict(log, verify_driven(log), name="any"), path)
     again = load_fleet_loop(path, log.problem)
     same(document_of(again), document_of(log))
     assert again.status == log.status
@@ -104,7 +103,7 @@ def test_vehicles_with_inertia_and_other_kinds(tmp_path):
     scenario = load_scenario(SCENARIOS / "fleets" / "airfield.yaml")
     log = simulate_fleet(scenario.fleet, step=1.0, steps=3, first_time_limit=1.0)
     path = tmp_path / "closed_loop.json"
-    save_fleet_loop(log, path, driven=verify_driven(log))
+    write_document(fleet_loop_to_dict(log, verify_driven(log)), path)
     again = load_fleet_loop(path, scenario.fleet)
     same(
         fleet_loop_to_dict(again, verify_driven(again)), fleet_loop_to_dict(log, verify_driven(log))
@@ -122,7 +121,7 @@ def test_who_leaves_ends_where_it_left(tmp_path):
     assert found["reached"]
     assert found["steps"][-1]["time_s"] >= found["arrived_s"]
     path = tmp_path / "closed_loop.json"
-    save_fleet_loop(log, path, driven=verify_driven(log))
+    write_document(fleet_loop_to_dict(log, verify_driven(log)), path)
     assert verify_driven(load_fleet_loop(path, fleet)).passed
 
 
@@ -132,7 +131,8 @@ def test_interrupted_and_sources(tmp_path):
     path = tmp_path / "out" / "closed_loop.json"
     path.parent.mkdir()
     source = {"file": tmp_path / "x.yaml", "with": None, "case": None}
-    save_fleet_loop(log, path, driven=verify_driven(log), source=source, interrupted=True)
+    document = fleet_loop_to_dict(log, verify_driven(log))
+    write_document(document, path, source=source, interrupted=True)
     document = read_document(path, "fleet-loop")
     assert document["interrupted"] is True
     assert document["source"] == {"file": "../x.yaml", "with": None, "case": None}
