@@ -10,10 +10,10 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from maneuver_automaton import _display
-from maneuver_automaton._lazy import homes, lazily
+from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton import plotting as plotting
@@ -114,57 +114,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-_HOMES = homes(
-    {
-        "automaton": "Automaton Plan",
-        "automaton.building": "build_library",
-        "automaton.library": "load_library load_stock_library save_library",
-        "collision": "Box Disc Motion Obstacle OccupancyMap Polygon Zone",
-        "costs": "Cost",
-        "design": "DesignedLibrary DispersedLibrary design_library disperse_library",
-        "exports": (
-            "ros_messages save_commonroad_solution save_csv save_geojson save_rerun save_ros2_bag"
-        ),
-        "field": "FieldProblem FieldResult cover",
-        "fleet": (
-            "DaskWorkers FleetHorizon FleetLog FleetProblem FleetResult plan_fleet simulate_fleet "
-            "verify_driven verify_fleet"
-        ),
-        "formats.fleet_json": "save_fleet",
-        "formats.plan_json": "load_plan load_plans save_plan",
-        "formats.registry": "load_map",
-        "groups": "SE2 SE2xR translations",
-        "models": (
-            "ArticulatedVehicle Car CarWithTrailer FourWheelSteeringCar Helicopter Hovercraft "
-            "Omnidirectional RearSteeredCar SecondOrderCar SecondOrderUnicycle SingleTrack "
-            "TractorWithTrailers Unicycle UserModel"
-        ),
-        "places": "Clearance Ground PlaceCost",
-        "planning": "LowerBound Planner PlanResult PlanStatus plan plan_many plans",
-        "planning.lower_bound": "lower_bound",
-        "planning.verdict": "Verdict verify",
-        "primitives": "Maneuver Trajectory Trim trims_of",
-        "problem": "Bounds Goal Horizon Problem SearchSettings Via",
-        "receding_horizon": "Disturbance RecedingHorizon simulate",
-        "roads": "RoadScene RoadVehicle drive_road drive_roads plan_road plan_roads",
-        "scenario": "FleetScenario RoadScenario Scenario load_scenario",
-    }
-)
-
-__all__ = [*_HOMES, "plotting"]
-
-
-_get, _ = lazily(__name__, _HOMES)
-
+__getattr__, __dir__ = lazily(__name__)
+__all__ = [name for name in __dir__() if not name.startswith("__")]
 
 _display.register(lambda: importlib.import_module("maneuver_automaton.plotting.notebooks"))
-
-
-def __getattr__(name: str) -> Any:
-    if name == "plotting":
-        return importlib.import_module("maneuver_automaton.plotting")
-    return _get(name)
-
-
-def __dir__() -> list[str]:
-    return sorted([*__all__, "__version__"])

@@ -3,38 +3,35 @@
 from __future__ import annotations
 
 import importlib
+import re
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
-
-def homes(names: Mapping[str, str]) -> dict[str, str]:
-    """The module of each name, from the names of each module, parted by spaces."""
-    return {name: module for module, many in names.items() for name in many.split()}
+_IMPORT = re.compile(r"^    from (\S+) import \(?\s*(\w+) as \2\b", re.MULTILINE)
 
 
-def lazily(
-    package: str, homes: Mapping[str, str]
-) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` of a package whose names have their homes in its modules.
+def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """`__getattr__` and `__dir__` of a package, by its ``__name__``.
 
-    Parameters
-    ----------
-    package : str
-        Its ``__name__``.
-    homes : mapping
-        The module of each name, seen from the package.
+    What it names, and in which modules, stands once, in its block for type checkers, as
+    ``from module import name as name``.
     """
+    module = sys.modules[package]
+    assert module.__spec__ is not None
+    loader: Any = module.__spec__.loader
+    homes = {name: home for home, name in _IMPORT.findall(loader.get_source(package))}
 
     def get(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(importlib.import_module(f"{package}.{homes[name]}"), name)
-        setattr(sys.modules[package], name, value)
+        within = homes[name] == package  # a module of its own
+        home = importlib.import_module(f"{package}.{name}" if within else homes[name])
+        value = home if within else getattr(home, name)
+        setattr(module, name, value)
         return value
 
     def listed() -> list[str]:
-        own = {name for name in vars(sys.modules[package]) if name.startswith("__")}
-        return sorted(own | homes.keys())
+        return sorted(homes.keys() | ({"__version__"} & vars(module).keys()))
 
     return get, listed

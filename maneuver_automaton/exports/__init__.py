@@ -17,15 +17,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.exports.ros import save_ros2_bag as save_ros2_bag
     from maneuver_automaton.exports.table import save_csv as save_csv
 
-_HOMES = {
-    "ResultFile": "reading",
-    "load_recording": "reading",
-    "open_result": "reading",
-    "ros_messages": "ros",
-    "save_commonroad_solution": "commonroad_solution",
-    "save_csv": "table",
-    "save_geojson": "geojson",
-    "save_rerun": "rerun_log",
-    "save_ros2_bag": "ros",
-}
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+__getattr__, __dir__ = lazily(__name__)

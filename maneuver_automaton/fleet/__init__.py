@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._lazy import homes, lazily
+from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.fleet.agreement import Message as Message
@@ -27,19 +27,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.fleet.workers import DaskWorkers as DaskWorkers
     from maneuver_automaton.fleet.workers import Workers as Workers
 
-_HOMES = homes(
-    {
-        "agreement": "Message",
-        "driven": "DrivenVerdict verify_driven",
-        "horizon": "FleetHorizon",
-        "planning": "plan_fleet",
-        "problem": "FleetProblem",
-        "result": (
-            "Closest FleetGuarantee FleetLog FleetResult FleetStatus FleetStep FleetViolation Swap"
-        ),
-        "simulation": "simulate_fleet",
-        "verdict": "FleetVerdict verify_fleet",
-        "workers": "DaskWorkers Workers",
-    }
-)
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+__getattr__, __dir__ = lazily(__name__)

@@ -21,15 +21,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.formats.plan_json import read_plan_document as read_plan_document
     from maneuver_automaton.formats.plan_json import save_plan as save_plan
 
-_HOMES = {
-    "fleet_to_dict": "fleet_json",
-    "load_plan": "plan_json",
-    "load_plans": "plan_json",
-    "plan_to_dict": "plan_json",
-    "read_plan_document": "plan_json",
-    "save_fleet": "fleet_json",
-    "save_plan": "plan_json",
-}
-
-
-__getattr__, _ = lazily(__name__, _HOMES)
+__getattr__, _ = lazily(__name__)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from maneuver_automaton._lazy import homes, lazily
+from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import draw_automaton as draw_automaton
@@ -35,21 +35,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.searches import save_progress_figure as save_progress_figure
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
 
-_HOMES = homes(
-    {
-        "automata": "draw_automaton draw_motions save_automaton_figure",
-        "colors": "trim_colors",
-        "controls": "draw_controls",
-        "factors": "draw_factor save_factor_figure",
-        "films": "film_of save_film",
-        "look": "Look",
-        "maneuvers": "draw_maneuvers save_maneuvers_figure",
-        "obstacles": "draw_obstacles",
-        "pictures": "figure_of save_picture",
-        "plane": "draw_plane",
-        "player": "Player player_of player_of_file",
-        "searches": "draw_progress save_progress_figure",
-        "space": "flies_among_heights",
-    }
-)
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+__getattr__, __dir__ = lazily(__name__)

@@ -17,15 +17,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.refinement.retiming import retime as retime
     from maneuver_automaton.refinement.shooting import least_effort as least_effort
 
-_HOMES = {
-    "EffortReport": "retiming",
-    "effort_report": "retiming",
-    "least_effort": "shooting",
-    "PolishedMotion": "polish",
-    "PolishResult": "polish",
-    "PolishTask": "polish",
-    "polish_guesses": "polish",
-    "Retiming": "retiming",
-    "retime": "retiming",
-}
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+__getattr__, __dir__ = lazily(__name__)

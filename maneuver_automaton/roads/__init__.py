@@ -30,30 +30,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.roads.several import plan_roads as plan_roads
     from maneuver_automaton.roads.vehicle import RoadVehicle as RoadVehicle
 
-_HOMES = {
-    "RoadDecision": "plans",
-    "RoadSettings": "plans",
-    "RoadDrive": "driving",
-    "RoadStep": "driving",
-    "drive_scene": "driving",
-    "GoalRegion": "scene",
-    "RoadVerdict": "rules",
-    "judged": "rules",
-    "Lanelet": "lanelets",
-    "drivable_area": "lanelets",
-    "RoadPlanner": "planner",
-    "road_planner": "planner",
-    "RoadBenchmark": "scene",
-    "RoadScene": "scene",
-    "RoadStart": "scene",
-    "RoadFleetResult": "several",
-    "plan_roads": "several",
-    "RoadFleetDrive": "several",
-    "drive_roads": "several",
-    "RoadPlanResult": "driving",
-    "drive_road": "driving",
-    "plan_before": "driving",
-    "plan_road": "driving",
-    "RoadVehicle": "vehicle",
-}
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+__getattr__, __dir__ = lazily(__name__)

@@ -12,10 +12,4 @@ if TYPE_CHECKING:
     from maneuver_automaton.search.result import SearchStatus as SearchStatus
     from maneuver_automaton.search.words import search_words as search_words
 
-_HOMES = {
-    "search_insertion": "choose",
-    "SearchResult": "result",
-    "SearchStatus": "result",
-    "search_words": "words",
-}
-__getattr__, __dir__ = lazily(__name__, _HOMES)
+__getattr__, __dir__ = lazily(__name__)
