@@ -17,6 +17,7 @@ from maneuver_automaton.cli.inputs import (
     automaton_of,
     make_folder,
     named_automaton,
+    naming,
     target,
     writing,
 )
@@ -24,7 +25,7 @@ from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw
 from maneuver_automaton.cli.terminal import Advance, console, counted, progress_bar, table, waiting
 from maneuver_automaton.design import DesignedLibrary, disperse_library
-from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
+from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.scenario import build_file
 
 MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
@@ -60,17 +61,13 @@ def _build_maneuvers(
         if pairs
         else waiting("joining the trims", quiet=quiet)
     )
-    with writing(path), shown as advance:
+    with writing(path), naming(file), shown as advance:
         count = None if advance is None else counted(advance)
         try:
             built = build_file.build(asked, path, jobs=jobs, scheduler=scheduler, progress=count)
         except KeyboardInterrupt:
             complain(f"{file}: interrupted: called again, the build goes on after what is done")
             raise
-        except ManeuverAutomatonError:
-            raise
-        except ValueError as error:
-            raise InvalidScenario(f"{file}: {error}") from error
     for missing in asked.missing:
         complain(f"{file}: no trim at {missing.name}: {missing.reason}")
     for failure in built.failures:
@@ -247,11 +244,8 @@ def _disperse(file: Path, path: Path, *, instead: Mapping[str, float], quiet: bo
         )
     library = automaton_of(file)
     make_folder(path.parent)
-    try:
-        with waiting("choosing maneuvers", quiet=quiet):
-            done = disperse_library(library, most=int(instead["most"]))
-    except ValueError as error:
-        raise InvalidScenario(f"{file}: {error}") from error
+    with naming(file), waiting("choosing maneuvers", quiet=quiet):
+        done = disperse_library(library, most=int(instead["most"]))
     with writing(path):
         save_library(done.automaton, path)
     if not quiet:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -11,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from maneuver_automaton.cli.inputs import Parts, opened
+from maneuver_automaton.cli.inputs import Parts, naming, opened
 from maneuver_automaton.cli.terminal import announced
 from maneuver_automaton.collision.blocked import too_close
-from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import (
     Closest,
     DrivenVerdict,
@@ -75,7 +73,7 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
         found = _loop(path, file.document, _log_of(loop))
         return scenario.name, [*found, *_on_the_way(loop)]
     plan = load_plan(path, model=scenario.problem.automaton.model)
-    with announced(), _of_this(path):
+    with announced(), naming(path):
         verdict = verify(scenario.problem, plan, leave=leave or None)
     return scenario.name, [_plan("plan", verdict, file.document.get("cost"))]
 
@@ -86,7 +84,7 @@ def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, lis
 def _plans(path: Path, document: Mapping[str, Any], fleet: FleetProblem) -> list[Finding]:
     """What holds of the plans of several vehicles, each alone and every pair."""
     plans = load_plans(path)
-    with announced(), _of_this(path):
+    with announced(), naming(path):
         verdict = verify_fleet(fleet, plans)
     stated = document["vehicles"]
     rows = [
@@ -164,15 +162,6 @@ def _agrees(stated: Any, cost: float) -> bool:
     return isinstance(stated, int | float) and abs(stated - cost) <= AGREES * max(1.0, abs(cost))
 
 
-@contextlib.contextmanager
-def _of_this(path: Path) -> Iterator[None]:
-    """Name the file where plans do not belong to the problem."""
-    try:
-        yield
-    except ValueError as error:
-        raise InvalidScenario(f"{path}: {error}") from error
-
-
 # -- closed loops
 
 
@@ -188,13 +177,6 @@ def _log_of(loop: ClosedLoop) -> FleetLog:
             values={"vehicle": step.value},
             arrivals={"vehicle": math.inf},
             off_plan={"vehicle": 0.0},
-            arrived=(),
-            swaps=(),
-            asked=(),
-            void=(),
-            refused=(),
-            gap_m=math.inf,
-            violations=(),
             solve_s=step.solve_s,
         )
         for step, pose in zip(loop.steps, loop.poses, strict=False)

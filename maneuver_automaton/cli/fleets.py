@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from maneuver_automaton._interrupts import stopped
+from maneuver_automaton.cli.inputs import naming
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.single import STEPS
 from maneuver_automaton.cli.terminal import progress_bar, waiting
@@ -113,28 +114,26 @@ def _loop(job: Job, scenario: FleetScenario) -> FleetLog:
         seed = 0 if part.disturbance is None else part.disturbance.seed
     log = None if options.resume is None else load_fleet_loop(options.resume, scenario.fleet)
     first = _first_plans(job, scenario) if log is None else None
-    with progress_bar("steps", steps, quiet=options.quiet) as advance:
-        try:
-            return simulate_fleet(
-                scenario.fleet,
-                step=part.step_s,
-                steps=steps,
-                disturbance=scenario.disturbances,
-                seed=seed,
-                first=first,
-                log=log,
-                margin=part.margin,
-                tube_m=part.tube_m,
-                time_limit=options.budgets.time_limit or part.time_limit_s,
-                swaps_per_step=part.swaps_per_step,
-                group_size=part.group_size,
-                delay_steps=part.delay_steps,
-                joins_s=scenario.joins_s,
-                breaks_s=scenario.breaks_s,
-                progress=lambda _: advance(),
-            )
-        except ValueError as error:
-            raise job.wrong(error, "receding_horizon: ") from error
+    named = naming(job.path, "receding_horizon: ")
+    with progress_bar("steps", steps, quiet=options.quiet) as advance, named:
+        return simulate_fleet(
+            scenario.fleet,
+            step=part.step_s,
+            steps=steps,
+            disturbance=scenario.disturbances,
+            seed=seed,
+            first=first,
+            log=log,
+            margin=part.margin,
+            tube_m=part.tube_m,
+            time_limit=options.budgets.time_limit or part.time_limit_s,
+            swaps_per_step=part.swaps_per_step,
+            group_size=part.group_size,
+            delay_steps=part.delay_steps,
+            joins_s=scenario.joins_s,
+            breaks_s=scenario.breaks_s,
+            progress=lambda _: advance(),
+        )
 
 
 def _first_plans(job: Job, scenario: FleetScenario) -> FleetResult | None:

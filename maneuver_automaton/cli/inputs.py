@@ -7,6 +7,7 @@ import difflib
 import functools
 import importlib
 import inspect
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from maneuver_automaton import exports
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import load_library
 from maneuver_automaton.cli.guard import complain
-from maneuver_automaton.errors import InvalidScenario
+from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
 from maneuver_automaton.formats.commonroad import n_problems
 from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.models import Model
@@ -29,6 +30,8 @@ from maneuver_automaton.scenario import (
     load_scenario,
     remarks_on,
 )
+
+OF_LOOPS = re.compile(r"^(receding horizon: |fleet horizon: |fleet: )+")  # a file says it better
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -123,6 +126,18 @@ def writing(path: Path) -> Iterator[None]:
     except OSError as error:
         said = error.strerror or error
         raise InvalidScenario(f"{error.filename or path}: cannot be written: {said}") from error
+
+
+@contextlib.contextmanager
+def naming(path: Path, about: str = "") -> Iterator[None]:
+    """Name the file, and the part of it that is meant, where a value of it is refused."""
+    try:
+        yield
+    except ManeuverAutomatonError:
+        raise
+    except ValueError as error:
+        said = OF_LOOPS.sub("", str(error))
+        raise InvalidScenario(f"{path}: {about}{said}") from error
 
 
 def opened(path: Path, parts: Parts) -> exports.ResultFile:

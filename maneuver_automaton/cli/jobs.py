@@ -144,14 +144,6 @@ class Job:
             with writing(out):
                 draw(outcome.result, outcome.name, out / DOCUMENTS[self.command], options)
 
-    def wrong(self, error: ValueError, about: str = "") -> InvalidScenario:
-        """An error that names the file, and the part of it that it is `about`."""
-        if isinstance(error, InvalidScenario):
-            return error
-        said = str(error).removeprefix("receding horizon: ")
-        said = said.removeprefix("fleet horizon: ").removeprefix("fleet: ")
-        return InvalidScenario(f"{self.path}: {about}{said}")
-
 
 def run_jobs(command: str, path: Path, out: Path, options: Options, parts: Parts) -> int:
     """Run `plan` or `mpc` of a file or of a folder; the exit code."""

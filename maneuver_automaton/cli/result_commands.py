@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import (
     Parts,
     make_folder,
+    naming,
     opened,
     user_model,
     writing,
@@ -20,9 +20,10 @@ from maneuver_automaton.cli.inputs import (
 from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.terminal import print_written
-from maneuver_automaton.errors import InvalidScenario, ManeuverAutomatonError
+from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.formats.closed_loop_json import driven_document
+from maneuver_automaton.formats.documents import told_of
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
@@ -79,13 +80,8 @@ def export(
     path = _export_target(file, out, form, kind)
     write: Callable[..., None] = getattr(exports, form.function)
     make_folder(path.parent)
-    try:
-        with writing(path):
-            write(recording, path, **options)
-    except ManeuverAutomatonError:
-        raise
-    except ValueError as error:
-        raise InvalidScenario(f"{file}: {error}") from error
+    with naming(file), writing(path):
+        write(recording, path, **options)
     print_written(path)
     clean = all(one.reached and not one.reason for one in recording.movers)
     if kind == "commonroad" and not clean:
@@ -137,10 +133,10 @@ def plot(
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
     path = _picture_target(file, out, what)
-    with _named(file):
+    with told_of(file):
         result, name = _result_of(file, beside)
     make_folder(path.parent)
-    with writing(path), _named(file):
+    with writing(path), told_of(file):
         if isinstance(result, dict):
             _draw_motion(result, path, what, look)
         elif what == "page":
@@ -153,18 +149,6 @@ def plot(
             save_film(recording_of(result), path, look.look(name))
     print_written(path)
     return FOUND
-
-
-@contextlib.contextmanager
-def _named(file: Path) -> Iterator[None]:
-    """Name the file in what is wrong with it."""
-    try:
-        yield
-    except InvalidScenario:
-        raise
-    except (KeyError, ValueError, TypeError, IndexError, AttributeError) as error:
-        said = f"misses the key {error}" if isinstance(error, KeyError) else str(error)
-        raise InvalidScenario(f"{file}: {said}") from error
 
 
 def _result_of(file: Path, beside: Path | None) -> tuple[Any, str]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.cli.guard import complain
-from maneuver_automaton.cli.inputs import states_several
+from maneuver_automaton.cli.inputs import naming, states_several
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.terminal import progress_bar, waiting
 from maneuver_automaton.errors import InvalidScenario
@@ -41,11 +41,8 @@ def planned(job: Job, _: None) -> JobResult:
         return _plans(job)
     found = _scenario(job)
     limit = job.options.budgets.time_limit or TIME_LIMIT
-    with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet):
-        try:
-            result = plan_road(found.scene, found.vehicle, time_limit=limit)
-        except ValueError as error:
-            raise job.wrong(error) from error
+    with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet), naming(job.path):
+        result = plan_road(found.scene, found.vehicle, time_limit=limit)
     if stopped() and result.plan is None:
         result = replace(result, reason=INTERRUPTED)
     status = "found" if result.plan is not None else "out_of_budget" if stopped() else "no_plan"
@@ -72,10 +69,8 @@ def driven(job: Job, _: None) -> JobResult:
         return _drives(job)
     found, budgets = _scenario(job), job.options.budgets
     with patient():
-        try:
+        with naming(job.path):
             planner = road_planner(found.scene, found.vehicle)
-        except ValueError as error:
-            raise job.wrong(error) from error
         limit = budgets.time_limit or TIME_LIMIT
         with waiting(f"planning before the start, at most {limit:g} s", quiet=job.options.quiet):
             before = plan_before(planner, time_limit=limit)
@@ -114,11 +109,8 @@ def _plans(job: Job) -> JobResult:
     """Plan them all."""
     scenes, vehicle, name = _scenes(job)
     limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
-    with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet):
-        try:
-            result = plan_roads(scenes, vehicle, name=name, time_limit=limit)
-        except ValueError as error:
-            raise InvalidScenario(f"{job.path}: {error}") from error
+    with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet), naming(job.path):
+        result = plan_roads(scenes, vehicle, name=name, time_limit=limit)
     status = "found" if result.found else "partial" if result.plans else "no_plan"
     missing = [(vehicle, one) for vehicle, one in result.results.items() if one.plan is None]
     reason = "; ".join(f"{vehicle}: {one.reason}" for vehicle, one in missing)
@@ -144,13 +136,11 @@ def _drives(job: Job) -> JobResult:
     ticks = [tick_of(one.step) for one in scenes.values()]
     ends = [max(math.ceil(s / tick), 1) for s, tick in zip(lasting, ticks, strict=True)]
     most = sum(n if steps is None else min(steps, n) for n in ends)  # so that a bar has an end
-    with progress_bar("planning before the start, then steps", most, quiet=quiet) as advance:
-        try:
-            drive = drive_roads(
-                scenes, vehicle, name=name, steps=steps, time_limit=limit, progress=advance
-            )
-        except ValueError as error:
-            raise InvalidScenario(f"{job.path}: {error}") from error
+    shown = progress_bar("planning before the start, then steps", most, quiet=quiet)
+    with shown as advance, naming(job.path):
+        drive = drive_roads(
+            scenes, vehicle, name=name, steps=steps, time_limit=limit, progress=advance
+        )
     return JobResult(
         name=drive.name,
         result=drive,

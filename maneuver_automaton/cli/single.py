@@ -9,6 +9,7 @@ from typing import Any
 from maneuver_automaton import planning
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton.budget import Watch
+from maneuver_automaton.cli.inputs import naming
 from maneuver_automaton.cli.jobs import INTERRUPTED, Job, JobResult
 from maneuver_automaton.cli.terminal import counted, has_terminal, progress_bar, waiting
 from maneuver_automaton.formats.closed_loop_json import (
@@ -116,7 +117,7 @@ def driven(job: Job, scenario: Scenario) -> JobResult:
         "pieces": part.pieces or 0,
         "gap": budgets.gap,
     }
-    try:
+    with naming(job.path, "receding_horizon: "):
         if options.seeds is not None:
             how["disturbance"] = None if noise is None else disturbance_of(noise)
             return _statistics(job, scenario, how)
@@ -128,8 +129,6 @@ def driven(job: Job, scenario: Scenario) -> JobResult:
                 last, problem = done[-1], replace(problem, start=poses[-1])
         with progress_bar("steps", steps, quiet=options.quiet) as advance:
             loop = simulate(problem, **how, last=last, progress=lambda _: advance())
-    except ValueError as error:
-        raise job.wrong(error, "receding_horizon: ") from error
     return _driven(loop, scenario.name)
 
 

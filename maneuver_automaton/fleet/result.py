@@ -160,14 +160,14 @@ class FleetStep:
     values: dict[str, float]  # cost of what is left; inf if the plan does not arrive
     arrivals: dict[str, float]  # [s] on the clock of all; inf if the plan does not arrive
     off_plan: dict[str, float]  # [m] any point of the body from where the plan has it
-    arrived: tuple[str, ...]
-    swaps: tuple[Swap, ...]
-    asked: tuple[str, ...]  # who looked for another plan, in this order
-    void: tuple[str, ...]  # whose plans were void, and planned anew
-    refused: tuple[str, ...]  # who has not been let in yet
-    gap_m: float  # any two bodies keep it over the rest of the plans; the audit's lower bound
-    violations: tuple[FleetViolation, ...]
     solve_s: float
+    arrived: tuple[str, ...] = ()
+    swaps: tuple[Swap, ...] = ()
+    asked: tuple[str, ...] = ()  # who looked for another plan, in this order
+    void: tuple[str, ...] = ()  # whose plans were void, and planned anew
+    refused: tuple[str, ...] = ()  # who has not been let in yet
+    gap_m: float = math.inf  # any two bodies keep it over the rest of the plans: a lower bound
+    violations: tuple[FleetViolation, ...] = ()
     distance_m: float = math.inf  # least of any two bodies along what was driven, measured
     silent: tuple[str, ...] = ()  # whose workers do not answer: they drive the plans that they hold
 
