@@ -1,4 +1,4 @@
-"""Files that are whole or not there: write beside the target, then replace it."""
+"""Files that are whole or not there, written beside the target first; journals, line by line."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import stat
 import time
 import uuid
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -54,6 +55,33 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
 def write_text_atomically(path: Path, text: str) -> None:
     """Replace the file `path` by `text` in UTF-8 in one step; see `write_bytes_atomically`."""
     write_bytes_atomically(path, text.encode("utf-8"))
+
+
+def journal_lines(path: Path) -> list[str]:
+    """The whole lines of a journal, without one that a kill cut off; none if it is not there."""
+    text = path.read_text(encoding="utf-8", errors="replace") if path.exists() else ""
+    return text.split("\n")[:-1]
+
+
+@contextlib.contextmanager
+def journal(path: Path, head: str = "") -> Iterator[Callable[[Sequence[str]], None]]:
+    """What writes lines to a journal, each on the disk at once; one that was cut off is removed.
+
+    A journal that is empty begins with the line `head`.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("a+b") as stream:
+        stream.seek(0)
+        stream.truncate(stream.read().rfind(b"\n") + 1)
+
+        def write(lines: Sequence[str]) -> None:
+            stream.write("".join(f"{line}\n" for line in lines).encode())
+            stream.flush()
+            os.fsync(stream.fileno())
+
+        if head and not stream.seek(0, os.SEEK_END):
+            write([head])
+        yield write
 
 
 def relative(path: Path, folder: Path) -> str:

@@ -7,19 +7,18 @@ import functools
 import itertools
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from maneuver_automaton._brief import brief
+from maneuver_automaton._files import journal
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.automaton.automaton import Automaton
 from maneuver_automaton.automaton.journal import (
     Entry,
-    append,
-    appending,
     build_key,
     journal_path,
     pair_key,
@@ -157,16 +156,17 @@ def build_library(
     )
     keys = {pair: recipe.key_of(pair) for pair in to_solve}
     served = Counter(keys[images.get(pair, pair)] for pair in wanted)
-    journal = None if path is None else journal_path(Path(path))
-    entries = {} if journal is None else read_journal(journal)
+    log = None if path is None else journal_path(Path(path))
+    entries = {} if log is None else read_journal(log)
     open_pairs = [pair for pair in to_solve if keys[pair] not in entries]
     resumed = len(to_solve) - len(open_pairs)
     ready = len(wanted) - sum(served[keys[pair]] for pair in open_pairs)
     work = functools.partial(_solved, recipe)
-    with _lines(journal) as write:
+    with contextlib.nullcontext() if log is None else journal(log) as write:
         for entry in in_parallel(work, open_pairs, jobs=jobs, scheduler=scheduler, order="as done"):
             entries[entry.key] = entry
-            write(entry)
+            if write is not None:
+                write([entry.line()])
             ready += served[entry.key]
             if progress is not None:
                 progress(ready, len(wanted))
@@ -175,8 +175,8 @@ def build_library(
     automaton = Automaton(model, nodes.trims, maneuvers, name=name)
     if path is not None:
         save_library(automaton, path)
-    if journal is not None:
-        journal.unlink(missing_ok=True)
+    if log is not None:
+        log.unlink(missing_ok=True)
     return LibraryBuild(
         automaton=automaton,
         failures=failures,
@@ -278,16 +278,6 @@ def _solved(recipe: _Recipe, pair: Pair) -> Entry:
         control=found.inputs.control,
         defect=found.defect,
     )
-
-
-@contextlib.contextmanager
-def _lines(journal: Path | None) -> Iterator[Callable[[Entry], None]]:
-    """Function that writes an entry to the journal, or does nothing where there is none."""
-    if journal is None:
-        yield lambda entry: None
-        return
-    with appending(journal) as stream:
-        yield functools.partial(append, stream)
 
 
 def _images(nodes: Automaton, pairs: Sequence[Pair]) -> dict[Pair, Pair]:

@@ -6,15 +6,15 @@ import contextlib
 import hashlib
 import json
 import math
-import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._files import journal_lines
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, TransferSettings
 from maneuver_automaton.primitives import Trim
@@ -41,7 +41,7 @@ class Entry:
         numbers = {"interval": self.interval, "defect": self.defect}
         finite = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
         content = {"key": self.key, "reason": self.reason, **finite}
-        return json.dumps({**content, "control": self.control.tolist()}, allow_nan=False) + "\n"
+        return json.dumps({**content, "control": self.control.tolist()}, allow_nan=False)
 
 
 def journal_path(library: Path) -> Path:
@@ -82,37 +82,12 @@ def pair_key(build: str, source: Trim, target: Trim, *, keep_sign: Sequence[str]
 
 def read_journal(path: Path) -> dict[str, Entry]:
     """Entries by key; a line that a killed build left unfinished does not count."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        return {}
     entries: dict[str, Entry] = {}
-    for line in text.splitlines(keepends=True):
-        if not line.endswith("\n"):
-            continue
+    for line in journal_lines(path):
         with contextlib.suppress(ValueError, TypeError, KeyError):
             entry = _entry(json.loads(line))
             entries[entry.key] = entry
     return entries
-
-
-@contextlib.contextmanager
-def appending(path: Path) -> Iterator[TextIO]:
-    """The journal, open for more lines, without what a killed build left unfinished."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a+b") as stream:
-        stream.seek(0)
-        whole = stream.read().rfind(b"\n") + 1
-        stream.truncate(whole)
-    with path.open("a", encoding="utf-8") as text:
-        yield text
-
-
-def append(stream: TextIO, entry: Entry) -> None:
-    """Write a line and see to it that it is on the disk."""
-    stream.write(entry.line())
-    stream.flush()
-    os.fsync(stream.fileno())
 
 
 def _entry(content: Mapping[str, Any]) -> Entry:

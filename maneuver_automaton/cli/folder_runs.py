@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from maneuver_automaton._files import journal, journal_lines
 from maneuver_automaton._interrupts import stopped
 from maneuver_automaton._parallel import check_scheduler, in_parallel
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
@@ -80,11 +80,14 @@ def run_folder(
         ready()
     if rows and not quiet:
         _say(f"{len(rows)} of {len(problems)} were done by a run before")
-    with progress_bar("files", len(left), quiet=quiet) as advance, _journal(out) as write:
+    with writing(out):
+        kept = contextlib.ExitStack()
+        write = kept.enter_context(journal(out / JOURNAL))
+    with progress_bar("files", len(left), quiet=quiet) as advance, kept:
         for path, row in results:
             rows[path] = row
             if row.code <= NO_PLAN and not stopped():
-                write({"key": keys[path], **asdict(row)})
+                write([json.dumps({"key": keys[path], **asdict(row)})])
             if not quiet and len(problems) > 1:
                 cost = "" if row.cost is None else f", cost {row.cost:.6g}"
                 _say(f"{row.name}: {row.status}{cost}")
@@ -128,32 +131,13 @@ def _key(path: Path, parts: Parts, options: str) -> str:
 
 def _kept(out: Path, keys: dict[Path, str]) -> dict[Path, Row]:
     """Rows of the journal that are still of use; a line cut off by a kill does not count."""
-    try:
-        lines = (out / JOURNAL).read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return {}
     known: dict[str, Row] = {}
-    for line in lines:
+    for line in journal_lines(out / JOURNAL):
         with contextlib.suppress(ValueError, TypeError, KeyError):
             entry = json.loads(line)
             key = entry.pop("key")
             known[key] = Row(**entry)
     return {path: known[key] for path, key in keys.items() if key in known}
-
-
-@contextlib.contextmanager
-def _journal(out: Path) -> Iterator[Callable[[dict[str, Any]], None]]:
-    """What writes a line to the journal and sees to it that it is on the disk."""
-    with writing(out):
-        stream = (out / JOURNAL).open("a", encoding="utf-8")
-
-    def write(entry: dict[str, Any]) -> None:
-        stream.write(json.dumps(entry) + "\n")
-        stream.flush()
-        os.fsync(stream.fileno())
-
-    with stream:
-        yield write
 
 
 def _say(line: str) -> None:

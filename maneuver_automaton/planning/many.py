@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 import json
 import math
-import os
 import pickle
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -17,6 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
+from maneuver_automaton._files import journal as opened
+from maneuver_automaton._files import journal_lines
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.planning.plan import plan
 from maneuver_automaton.planning.result import PlanResult
@@ -31,6 +33,7 @@ Take = Callable[[PlanResult], Any]
 Goals = ArrayLike | Sequence[Goal]
 
 
+Keeps = contextlib.AbstractContextManager[Callable[[Sequence[str]], None] | None]
 Queries = list[Problem] | tuple[Array, list[Any]]  # problems; or starts and goals of a planner
 
 
@@ -184,12 +187,16 @@ def _answers(
         raise ValueError(f"time_limit must be positive, got {asked.time_limit} s")
     if journal is not None and asked.take is None:
         raise ValueError("journal: keeps what is taken of the answers, need take=")
-    kept = [] if journal is None else _kept_in(Path(journal), _digest(asked))
+    kept: list[Any] = []
+    keeps: Keeps = contextlib.nullcontext()
+    if journal is not None:
+        head = json.dumps({"queries": _digest(asked)})
+        kept, keeps = _kept_in(Path(journal), head), opened(Path(journal), head)
     wanted = list(range(len(kept), len(asked)))
     size = max(1, min(CHUNK, math.ceil(len(wanted) / (CHUNKS * max(jobs, 1)))))
     parts = [asked.part(wanted[k : k + size]) for k in range(0, len(wanted), size)]
     if jobs == 1 and scheduler is None:
-        return _told(kept, in_parallel(asked.answers, parts), len(asked), journal, progress)
+        return _told(kept, in_parallel(asked.answers, parts), len(asked), keeps, progress)
     common = _dumped(asked.planner)
     rest = (asked.time_limit, asked.take)
     pieces = [(common, _dumped(part), *rest) for part in parts]
@@ -198,25 +205,31 @@ def _answers(
         _Receiver(io.BytesIO(one), asked.shared(part)).load()
         for one, part in zip(sent, parts, strict=True)
     )
-    return _told(kept, chunks, len(asked), journal, progress)
+    return _told(kept, chunks, len(asked), keeps, progress)
 
 
 def _told(
     kept: list[Any],
     chunks: Iterator[list[Any]],
     n: int,
-    journal: str | Path | None,
+    keeps: Keeps,
     progress: Callable[[int, int], None] | None,
 ) -> Iterator[Any]:
     yield from kept
     done = len(kept)
-    for found in chunks:
-        if journal is not None:
-            _keep(Path(journal), found)
-        done += len(found)
-        if progress is not None:
-            progress(done, n)
-        yield from found
+    with keeps as write:
+        for found in chunks:
+            try:
+                if write is not None:
+                    write([json.dumps(one) for one in found])
+            except TypeError as error:
+                raise ValueError(
+                    f"journal: {error}; need numbers, texts, lists and dicts of what is taken"
+                ) from error
+            done += len(found)
+            if progress is not None:
+                progress(done, n)
+            yield from found
 
 
 def _answered_apart(piece: tuple[bytes, bytes, float, Take | None]) -> bytes:
@@ -306,32 +319,10 @@ def _digest(asked: _Asked) -> str:
         ) from error
 
 
-def _kept_in(path: Path, identity: str) -> list[Any]:
-    """What a journal has kept of these queries; a line that was cut off counts for nothing."""
-    head = json.dumps({"queries": identity})
-    text = path.read_text(encoding="utf-8") if path.exists() else ""
-    if "\n" not in text and head.startswith(text):  # not there, or cut off within its first line
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(head + "\n", encoding="utf-8")
-        return []
-    whole, _, _ = text.rpartition("\n")
-    first, *lines = whole.split("\n")
-    if first != head:
+def _kept_in(path: Path, head: str) -> list[Any]:
+    """What a journal has kept of the queries that it begins with; a line cut off does not count."""
+    first, *lines = journal_lines(path) or [head]
+    begun = lines or not path.exists() or head.startswith(path.read_text("utf-8").strip("\n"))
+    if first != head or not begun:
         raise ValueError(f"{path}: is the journal of other queries; need another file, or none")
-    if len(whole) + 1 < len(text):
-        with path.open("r+", encoding="utf-8") as file:
-            file.truncate(len((whole + "\n").encode()))
     return [json.loads(line) for line in lines]
-
-
-def _keep(path: Path, found: list[Any]) -> None:
-    try:
-        lines = "".join(json.dumps(one) + "\n" for one in found)
-    except TypeError as error:
-        raise ValueError(
-            f"journal: {error}; need numbers, texts, lists and dicts of what is taken"
-        ) from error
-    with path.open("a", encoding="utf-8") as file:
-        file.write(lines)
-        file.flush()
-        os.fsync(file.fileno())

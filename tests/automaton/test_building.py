@@ -13,12 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maneuver_automaton._files import journal as opened
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.building import all_pairs, build_library, nearest_pairs
 from maneuver_automaton.automaton.journal import (
     Entry,
-    append,
-    appending,
     build_key,
     journal_path,
     pair_key,
@@ -125,17 +124,16 @@ def test_a_line_cut_short_is_made_again(tmp_path):
     path = tmp_path / "journal"
     entry = Entry(key="a", interval=0.1, control=np.array([[0.1, 1 / 3]]), defect=1e-9)
     failed = Entry(key="b", interval=np.inf, control=np.zeros((0, 2)), reason="too far")
-    with appending(path) as stream:
-        append(stream, entry)
-        append(stream, failed)
+    with opened(path) as write:
+        write([entry.line(), failed.line()])
     whole = path.read_text()
     path.write_text(whole + '{"key": "c", "rea')
     assert set(read_journal(path)) == {"a", "b"}
     assert np.array_equal(read_journal(path)["a"].control, entry.control)
     assert read_journal(path)["b"].reason == "too far"
-    with appending(path) as stream:
-        append(stream, entry)
-    assert path.read_text() == whole + entry.line()
+    with opened(path) as write:
+        write([entry.line()])
+    assert path.read_text() == whole + entry.line() + "\n"
     path.write_text("nonsense\n" + json.dumps({"key": 1}) + "\n" + whole)
     assert set(read_journal(path)) == {"a", "b"}
     assert read_journal(tmp_path / "none") == {}
