@@ -436,23 +436,18 @@ def cell_proofs(
         for goal in problem.goals
     )
     besides = motions.besides
+    apart = min(float(np.linalg.norm(start[:2] - goal.pose[:2])) for goal in goals)
+    low, high = scene.box[:2], scene.box[2:]
+    size = float(np.linalg.norm(high - low)) if np.isfinite(scene.box).all() else 0.0
+    round_once = TURNS * 2.0 * math.pi / max(motions.turn_rate, motions.speed / (1.0 + apart))
     for proof in proofs(
         scene,
         motions,
         start=start,
         goals=goals,
         incumbent=lambda: incumbent() - besides,
-        cap=_cap(scene, motions, start, goals),
+        cap=(apart + size) / motions.speed + round_once,  # of what is looked at without a plan
         ends=ends,
         over=over,
     ):
         yield replace(proof, value=proof.value + besides)
-
-
-def _cap(scene: PoseScene, motions: Motions, start: Array, goals: tuple[Goal, ...]) -> float:
-    """Cost beyond which plans are not looked at where none is known."""
-    apart = min(float(np.linalg.norm(start[:2] - goal.pose[:2])) for goal in goals)
-    low, high = scene.box[:2], scene.box[2:]
-    size = float(np.linalg.norm(high - low)) if np.isfinite(scene.box).all() else 0.0
-    round_once = TURNS * 2.0 * math.pi / max(motions.turn_rate, motions.speed / (1.0 + apart))
-    return (apart + size) / motions.speed + round_once

@@ -111,7 +111,8 @@ class Draughtsman:
 @contextlib.contextmanager
 def draughtsman(*, wanted: bool) -> Iterator[Draughtsman | None]:
     """A process that draws, if one is wanted and there is a processor for it; or none."""
-    if not (wanted and is_main_program() and sys.platform == "linux" and _processors() > 1):
+    able = wanted and is_main_program() and sys.platform == "linux"
+    if not (able and len(os.sched_getaffinity(0)) > 1):
         yield None
         return
     read, write = os.pipe()
@@ -125,10 +126,6 @@ def draughtsman(*, wanted: bool) -> Iterator[Draughtsman | None]:
         yield one
     finally:
         one.dismiss()
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0))
 
 
 def _serve(read: int) -> None:

@@ -43,7 +43,11 @@ def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Lay
     layers = layers_of(obstacles, in_space=in_space)
     heights = {height for layer in layers for height in (layer.low, layer.high)}
     bands = []
-    for low, high in _thick(sorted(heights)):
+    kept = sorted(heights)
+    while len(kept) - 1 > MOST_LAYERS:  # the thinnest band joins its lower neighbour
+        thinnest = int(np.argmin(np.diff(kept)))
+        del kept[max(thinnest, 1)]
+    for low, high in pairwise(kept):
         numbers = sorted(
             number
             for layer in layers
@@ -154,15 +158,6 @@ def _numbers(one: WorldArrays, first_box: int) -> tuple[tuple[float, ...], tuple
         *(field.origin_x, field.origin_y, field.cell, field.outside),
         *(slabs.begin, slabs.width),
     ), (buckets.columns, buckets.rows, slabs.leaves, first_box)
-
-
-def _thick(heights: Sequence[float]) -> list[tuple[float, float]]:
-    """Bands between sorted heights, at most so many: the thinnest join their lower neighbour."""
-    kept = list(heights)
-    while len(kept) - 1 > MOST_LAYERS:
-        thinnest = int(np.argmin(np.diff(kept)))
-        del kept[max(thinnest, 1)]
-    return list(pairwise(kept))
 
 
 def _concatenated(pairs: Sequence[tuple[Solids, Solids]]) -> tuple[Solids, list[int], list[int]]:

@@ -410,7 +410,8 @@ def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
         return (value,)
     if type(value) is tuple and all(isinstance(one, Obstacle | OccupancyMap) for one in value):
         return value
-    if _holds_parts(value):
+    is_sequence = isinstance(value, np.ndarray | Sequence) and not isinstance(value, str)
+    if is_sequence and not are_points(value):
         return tuple(one for part in value for one in as_obstacles(part))
     shapes = as_shapes("obstacles", value, or_else="Obstacle, OccupancyMap, ")
     return tuple(Obstacle(shape) for shape in shapes)
@@ -432,12 +433,6 @@ def as_footprint(value: Any) -> tuple[Shape, ...]:
                 f"footprint: reaches {reach:g} m from the pose, need at most {LARGEST_BODY:g} m"
             )
     return shapes
-
-
-def _holds_parts(value: Any) -> bool:
-    """Whether it is a sequence, and not one of points."""
-    is_sequence = isinstance(value, np.ndarray | Sequence) and not isinstance(value, str)
-    return is_sequence and not are_points(value)
 
 
 def _reach(shape: Shape) -> float:

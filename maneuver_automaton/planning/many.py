@@ -191,7 +191,11 @@ def _answers(
     keeps: Keeps = contextlib.nullcontext()
     if journal is not None:
         head = json.dumps({"queries": _digest(asked)})
-        kept, keeps = _kept_in(Path(journal), head), opened(Path(journal), head)
+        path, (first, *lines) = Path(journal), journal_lines(Path(journal)) or [head]
+        begun = lines or not path.exists() or head.startswith(path.read_text("utf-8").strip("\n"))
+        if first != head or not begun:  # a line that was cut off does not count
+            raise ValueError(f"{path}: is the journal of other queries; need another file, or none")
+        kept, keeps = [json.loads(line) for line in lines], opened(path, head)
     wanted = list(range(len(kept), len(asked)))
     size = max(1, min(CHUNK, math.ceil(len(wanted) / (CHUNKS * max(jobs, 1)))))
     parts = [asked.part(wanted[k : k + size]) for k in range(0, len(wanted), size)]
@@ -317,12 +321,3 @@ def _digest(asked: _Asked) -> str:
             f"journal: the queries cannot be told from others: {error}; need a model of the "
             "package, or functions that a module holds"
         ) from error
-
-
-def _kept_in(path: Path, head: str) -> list[Any]:
-    """What a journal has kept of the queries that it begins with; a line cut off does not count."""
-    first, *lines = journal_lines(path) or [head]
-    begun = lines or not path.exists() or head.startswith(path.read_text("utf-8").strip("\n"))
-    if first != head or not begun:
-        raise ValueError(f"{path}: is the journal of other queries; need another file, or none")
-    return [json.loads(line) for line in lines]

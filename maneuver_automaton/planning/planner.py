@@ -157,24 +157,8 @@ class Planner:
         start_time: float = 0.0,
         start_trim: str | None,
     ) -> Problem:
-        return Problem(
-            self.automaton,
-            start,
-            goals,
-            cost=self.cost,
-            horizon=self.horizon,
-            bounds=self.bounds,
-            search=self.search,
-            obstacles=self.obstacles,
-            footprint=self.footprint,
-            parts=self.parts,
-            body_height=self.body_height,
-            margin=self.margin,
-            zones=self.zones,
-            place_costs=self.place_costs,
-            start_time=start_time,
-            start_trim=start_trim,
-        )
+        asked = {"start": start, "goals": goals, "start_time": start_time, "start_trim": start_trim}
+        return Problem(**self.stated | asked)
 
     def plan(
         self,

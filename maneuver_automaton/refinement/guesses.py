@@ -84,7 +84,9 @@ def timed(plan: Plan, pace: PathLimits) -> Timed:
     squared = _squared_ratio(ratio[owner], growth[owner], width, stroke_of[owner])
     mean = 0.5 * (np.sqrt(squared[:-1]) + np.sqrt(squared[1:]))
     passed = width / mean
-    steering = _steering(twists, pace.wheelbase)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        angle = np.arctan(pace.wheelbase * twists[:, 2] / twists[:, 0])
+    steering = np.where(twists[:, 0] != 0.0, angle, 0.0)
     strokes = np.bincount(stroke_of[owner], weights=passed).astype(np.float64)
     waits = _waits(steering, stroke_of, strokes, pace.steering_rate)
     return _assembled(
@@ -115,12 +117,6 @@ def _squared_ratio(ratio: Array, growth: Array, width: Array, stroke: IntArray) 
     for k in range(len(width) - 1, -1, -1):
         squared[k] = min(squared[k], squared[k + 1] + gain[k])
     return squared
-
-
-def _steering(twists: Array, wheelbase: float) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):
-        angle = np.arctan(wheelbase * twists[:, 2] / twists[:, 0])
-    return np.where(twists[:, 0] != 0.0, angle, 0.0)
 
 
 def _waits(steering: Array, stroke_of: IntArray, strokes: Array, rate: float) -> Array:

@@ -128,7 +128,8 @@ def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], l
     """Name and colour of all trims, and for each vehicle their numbers."""
     entries: list[dict[str, str]] = []
     of_kind: dict[int, Numbers] = {}
-    kinds = [_kind(one.mover) for one in cast.actors]
+    movers = [one.mover for one in cast.actors]
+    kinds = [id(one.model if one.problem is None else one.problem.automaton) for one in movers]
     for kind in dict.fromkeys(kinds):
         alike = [one for one, its in zip(cast.actors, kinds, strict=True) if its == kind]
         tracks = [*others, *(way for one in alike for way in (one.track, *_held(one)))]
@@ -145,11 +146,6 @@ def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], l
 
 def _held(one: Actor) -> list[Track]:
     return [track for _, track in one.held]
-
-
-def _kind(mover: Mover) -> int:
-    """What tells vehicles of two kinds apart."""
-    return id(mover.model if mover.problem is None else mover.problem.automaton)
 
 
 def _motion(
