@@ -368,8 +368,8 @@ def _options(settings: PolishSettings, most: int) -> dict[str, Any]:
         "ipopt.mu_init": settings.mu_init,
         "ipopt.tol": settings.tolerance,
         "ipopt.constr_viol_tol": settings.violation,
-        "ipopt.acceptable_tol": settings.acceptable,
-        "ipopt.acceptable_iter": settings.acceptable_iterations,
+        "ipopt.acceptable_tol": settings.acceptable[0],
+        "ipopt.acceptable_iter": settings.acceptable[1],
         "ipopt.max_iter": most,
     }
 

@@ -155,8 +155,7 @@ class PolishSettings:
     change: float = 1e-3  # price of a full change of control from one interval to the next
     tolerance: float = 1e-6
     violation: float = 1e-7
-    acceptable: float = 1e-4
-    acceptable_iterations: int = 8
+    acceptable: tuple[float, int] = (1e-4, 8)  # tolerance after so many iterations within it
     max_iterations: int = 300
     fixed_iterations: int = 150  # with fixed planes
     mu_init: float = 1e-3
