@@ -15,6 +15,7 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
 from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.place_term import place_kind, second_kind
 from maneuver_automaton.optimal_control.problem import (
     OptimalControlProblem,
     RunningCost,
@@ -232,6 +233,22 @@ def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Block
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
     return blocks
+
+
+def place_blocks(program: PolishProgram, first: int) -> list[Blocks]:
+    """What places cost, by nodes and intervals, of parameters from the `first` on."""
+    if program.scene.places is None:
+        return []
+    count, own = program.n_intervals, len(program.model.control_names)
+    node, interval = place_kind(program.dof), second_kind(program.paced, count)
+    poses = program.states_at(np.arange(count + 1))[: program.dof]
+    given = first + np.arange((count + 1) * node.given)
+    controls = _every(program.problem, count)[2 * program.problem.n_states :]
+    lasting = controls[[own, -1]] if program.paced else controls[-1:]
+    return [
+        Blocks(node, poses, given.reshape(count + 1, node.given).T),
+        Blocks(interval, lasting, given[-1] + 1 + np.arange(count)[None]),
+    ]
 
 
 @functools.lru_cache(maxsize=16)

@@ -25,7 +25,7 @@ from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import BodyPart, Guard
+from maneuver_automaton.optimal_control.scene import BodyPart, Guard, PlacesAt
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
@@ -113,7 +113,6 @@ class Polish(PlanningStep):
     guesses: list[Aimed] = field(default_factory=list)  # along kinematic plans that are known
     otherwise: Callable[[], None] | None = None  # offers what there is where nothing is gained
     tried: float = math.inf  # cost of the cheapest plan when all guesses were tried before
-    instead: Problem | None = None  # to be solved: of prices of places the solver knows nothing
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """The solver, and tables of the kinematic libraries."""
@@ -142,11 +141,11 @@ class Polish(PlanningStep):
         if budget.is_over or why_not_polished(problem):
             return not budget.is_over
         price = polished_price(problem)
-        problem = self.instead or problem
         known = _worth_polishing(found, price)
         if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
             return True  # it is there already
-        stage_cost = price.stage_cost(known[0][0] if known else None)
+        first = known[0][0] if known else None
+        stage_cost, places = price.stage_cost(first), price.places(first)
         solid = _without_passed(problem, known[0][0]) if known else problem
         work = iterations_within(budget)
         for goal_index, guesses in _in_groups(problem, known, self.guesses, budget):
@@ -158,6 +157,7 @@ class Polish(PlanningStep):
                     guesses,
                     goal_index,
                     stage_cost,
+                    places=places,
                     budget=budget,
                     most_iterations=work,
                     accepts=functools.partial(found.offer, goal_index=goal_index),
@@ -331,6 +331,7 @@ def polish_plans(
     goal_index: int,
     stage_cost: RunningCost | None,
     *,
+    places: PlacesAt | None = None,
     budget: Budget,
     most_iterations: int | None = None,
     accepts: Callable[[Plan], bool],
@@ -375,6 +376,7 @@ def polish_plans(
             for one in zones
         ),
         durations=admitted_durations(problem),
+        places=places,
     )
 
     def sound(motion: PolishedMotion) -> bool:

@@ -30,6 +30,7 @@ from maneuver_automaton.optimal_control.scene import (
     Guard,
     MotionEnds,
     MovingSolid,
+    PlacesAt,
     Polished,
     PolishScene,
     PolishSettings,
@@ -79,6 +80,8 @@ class PolishTask:
         Limits of the twist where the body touches a shape.
     durations : (2,) tuple
         Least and greatest duration [s].
+    places : callable, optional
+        What places cost, seen from the start, in the units of the objective.
     """
 
     model: Model
@@ -94,6 +97,7 @@ class PolishTask:
     margin: float = 0.0  # [m]
     guards: tuple[tuple[Guard, Shape], ...] = ()
     durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
+    places: PlacesAt | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "start", last=self.model.group.dof)
@@ -127,6 +131,7 @@ class PolishTask:
             movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
             guards=(*everywhere, *map(self._seen, self.guards)),
+            places=self.places,
         )
 
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
