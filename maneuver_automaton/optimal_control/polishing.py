@@ -44,6 +44,7 @@ from maneuver_automaton.optimal_control.polish_program import (
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, TimeGrid, resampled
 from maneuver_automaton.optimal_control.scene import (
     MotionEnds,
+    NodeOnTheWay,
     PartPose,
     Point,
     Polished,
@@ -322,7 +323,8 @@ def solve_from(
         for axis in (0, 1):
             # nodes but for the ends
             inner = slice(n_x + axis, n_x * program.n_intervals + axis, n_x)
-            bounds[inner] = state[1:-1, axis, None] + np.array([-trust, trust])
+            near = state[1:-1, axis, None] + np.array([-trust, trust])
+            bounds[inner] = np.clip(near, *bounds[inner].T[..., None])
     function = solver.function(begin)
     watcher.forget()
     answer = function(
@@ -410,6 +412,7 @@ def polish(
     fixed_planes: bool = False,
     elastic: bool = False,
     gears: Array | None = None,
+    via: Sequence[NodeOnTheWay] = (),
     budget: Budget = UNLIMITED,
 ) -> Polished:
     """A local optimum among obstacles near a guess.
@@ -435,6 +438,8 @@ def polish(
         out may still touch, and is a guess itself.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
+    via : sequence of (int, tuple)
+        Nodes that are passed on the way; stretches between them take their own time.
     budget : Budget
         Its time is for all there is to do; every iteration of the solver asks it.
 
@@ -446,7 +451,7 @@ def polish(
     settings = settings or PolishSettings()
     began = budget.elapsed
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
-    program = program_of(model, ends, scene, settings, stage_cost, gears, point)
+    program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
     ahead = settings.ahead * _fastest(point)
     reach = max((part.reach for part in scene.parts), default=0.0) or 0.5 * ahead or 1.0
     near = max(settings.near * reach, ahead)

@@ -202,6 +202,10 @@ def _pieces_during(scene: PolishScene, durations: bytes) -> ObstaclePieces:
     return pieces_during(scene.pieces, scene.movers, np.frombuffer(durations))
 
 
+NodeOnTheWay = tuple[int, tuple[float | None, ...]]
+"""Number of a node between the first and the last, and its state; None leaves a component free."""
+
+
 class MotionEnds(NamedTuple):
     """First and last pose and reduced state; None leaves a component free."""
 
