@@ -15,6 +15,7 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.blocks import Blocks, Kind, kind_of
 from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
+from maneuver_automaton.optimal_control.place_term import place_kind, second_kind
 from maneuver_automaton.optimal_control.problem import (
     OptimalControlProblem,
     RunningCost,
@@ -26,6 +27,7 @@ from maneuver_automaton.optimal_control.scene import (
     BodyPart,
     Guard,
     MotionEnds,
+    NodeOnTheWay,
     ObstaclePieces,
     Point,
     PolishScene,
@@ -183,19 +185,25 @@ def program_of(
     stage_cost: RunningCost | None,
     gears: Array | None,
     point: Point,
+    via: Sequence[NodeOnTheWay] = (),
 ) -> PolishProgram:
     """The program of a vehicle, its ends and its scene, on as many intervals as the point has.
 
     With `gears`, the sign of the speed ahead in every interval, time has a pace of its own in every
-    stretch of one sign.
+    stretch of one sign, and so it has between nodes at which poses on the way are passed.
     """
     casadi = load_casadi()
-    paced, count = gears is not None, len(point.durations)
+    paced, count = gears is not None or bool(via), len(point.durations)
     problem = _problem(model, ends, settings, stage_cost)
     if paced:
         problem = _paced(problem, float(point.durations.sum()))
     weights = settings.effort, settings.change, settings.tightening
     kinds = _kinds(model, *weights, stage_cost, paced)  # type: ignore[arg-type]  # values all
+    bounds = bounds_of(problem, TimeGrid(n_nodes=count + 1, rule="rk4"))
+    for node, state in via:
+        for k, value in enumerate(state):
+            if value is not None:
+                bounds[problem.n_states * node + k] = value
     return PolishProgram(
         casadi=casadi,
         scene=scene,
@@ -203,8 +211,8 @@ def program_of(
         problem=problem,
         dof=model.group.dof,
         n_intervals=count,
-        bounds=bounds_of(problem, TimeGrid(n_nodes=count + 1, rule="rk4")),
-        blocks=tuple(_blocks(problem, model, scene, settings, kinds, gears, count)),
+        bounds=bounds,
+        blocks=tuple(_blocks(problem, model, scene, settings, kinds, gears, count, via)),
         path=_path(casadi, model, scene),
         paced=paced,
         model=model,
@@ -232,6 +240,22 @@ def guard_blocks(program: PolishProgram, held: Sequence[IntArray]) -> list[Block
             share = np.full(len(which), 1.0 / program.n_intervals)
             blocks.append(Blocks(kind, every[:, which], np.vstack([share, which > 0])))
     return blocks
+
+
+def place_blocks(program: PolishProgram, first: int) -> list[Blocks]:
+    """What places cost, by nodes and intervals, of parameters from the `first` on."""
+    if program.scene.places is None:
+        return []
+    count, own = program.n_intervals, len(program.model.control_names)
+    node, interval = place_kind(program.dof), second_kind(program.paced, count)
+    poses = program.states_at(np.arange(count + 1))[: program.dof]
+    given = first + np.arange((count + 1) * node.given)
+    controls = _every(program.problem, count)[2 * program.problem.n_states :]
+    lasting = controls[[own, -1]] if program.paced else controls[-1:]
+    return [
+        Blocks(node, poses, given.reshape(count + 1, node.given).T),
+        Blocks(interval, lasting, given[-1] + 1 + np.arange(count)[None]),
+    ]
 
 
 @functools.lru_cache(maxsize=16)
@@ -287,6 +311,7 @@ def _blocks(
     kinds: IntervalKinds,
     gears: Array | None,
     count: int,
+    via: Sequence[NodeOnTheWay],
 ) -> list[Blocks]:
     n_x, own = problem.n_states, len(model.control_names)
     every = _every(problem, count)
@@ -303,7 +328,10 @@ def _blocks(
     if gears is not None:
         signs = np.asarray(gears, dtype=np.float64)[None]
         found.append(Blocks(kinds.gear, every[: 2 * n_x + own], signs))
-        same = np.flatnonzero(np.diff(gears) == 0)
+    if gears is not None or via:
+        changes = np.zeros(count - 1) if gears is None else np.diff(gears)
+        changes[[node - 1 for node, _ in via]] = 1.0
+        same = np.flatnonzero(changes == 0)
         if len(same):
             paces = np.vstack([controls[own, same], controls[own, same + 1]])
             found.append(Blocks(kinds.pace, paces, np.zeros((0, len(same)))))

@@ -34,14 +34,17 @@ from maneuver_automaton.optimal_control.ipopt import (
     numpy_on_symbols,
     watcher_of,
 )
+from maneuver_automaton.optimal_control.place_term import place_term, price_of_places
 from maneuver_automaton.optimal_control.polish_program import (
     PolishProgram,
     guard_blocks,
+    place_blocks,
     program_of,
 )
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, TimeGrid, resampled
 from maneuver_automaton.optimal_control.scene import (
     MotionEnds,
+    NodeOnTheWay,
     PartPose,
     Point,
     Polished,
@@ -133,6 +136,9 @@ def solver_of(
     if takes > budget.left:
         return float(takes)
     given = OF_LINE * len(own) + corners.size
+    priced = place_blocks(program, given)
+    blocks += priced
+    given += sum(one.given.size for one in priced)
     built = assembled(casadi, blocks, size=len(bounds), given=given)
     watcher = watcher_of(budget, built.limits, n_variables=len(bounds), n_given=given)
     most = program.settings.fixed_iterations if fixed else program.settings.max_iterations
@@ -302,6 +308,8 @@ def solve_from(
         first += [lines.angle, np.zeros(len(own))]
     first.append(np.zeros(len(solver.bounds) - sum(map(len, first))))  # how deep inside
     given = np.column_stack([apart.margins[own], lines.anchor, lines.angle])
+    places, dof = program.scene.places, program.dof
+    term = place_term(places, point, dof, beside=BESIDE * trust) if places else None
     watcher = solver.watcher
     began = watcher.budget.elapsed
     bounds, corners = solver.bounds.copy(), solver.corners
@@ -315,12 +323,13 @@ def solve_from(
         for axis in (0, 1):
             # nodes but for the ends
             inner = slice(n_x + axis, n_x * program.n_intervals + axis, n_x)
-            bounds[inner] = state[1:-1, axis, None] + np.array([-trust, trust])
+            near = state[1:-1, axis, None] + np.array([-trust, trust])
+            bounds[inner] = np.clip(near, *bounds[inner].T[..., None])
     function = solver.function(begin)
     watcher.forget()
     answer = function(
         x0=np.clip(np.concatenate(first), *bounds.T),
-        p=np.concatenate([given.ravel(), corners]),
+        p=np.concatenate([given.ravel(), corners, *([term.given] if term else [])]),
         lbx=bounds[:, 0],
         ubx=bounds[:, 1],
         lbg=solver.limits[:, 0],
@@ -336,8 +345,11 @@ def solve_from(
         values, objective = watcher.best, watcher.least
     if not solver.fixed:
         apart = apart.moved(*values[program.size :][: 2 * len(own)].reshape(2, -1))
+    found = _point_at(program, values[: program.size])
+    if places and term:
+        objective += price_of_places(places, found, dof) - term.price(found)
     return (
-        _point_at(program, values[: program.size]),
+        found,
         apart,
         Multipliers(*(answer[name].full().ravel() for name in ("lam_x", "lam_g"))),
         SolverAnswer(
@@ -381,6 +393,11 @@ PRICE = 2.0  # of being inside obstacles, in durations of the guess per radius o
 FIXED_ROUNDS = 2  # solves with fixed planes: what comes out is a guess
 TRUST = 0.6  # share of the distance within which pairs have lines
 QUICKER = 1.0 - 0.99 * WITHIN  # share of the duration that is as quick as a solve may get
+PLACE_ROUNDS = 8  # more solves at most, with prices of places about each answer
+BESIDE = 0.2  # of the trust: how far from a node it is looked what places cost
+SETTLED = 1e-3  # share of the objective by which another of them must gain
+ALIKE = 0.02  # radii of the body: of points so near prices of places are nearly the same
+SHORT = 1e-3  # radii of the body: a step so short is not made shorter
 TIGHT = 2e-3  # radii of the body: pieces nearer than this are held back by their line
 
 
@@ -395,6 +412,7 @@ def polish(
     fixed_planes: bool = False,
     elastic: bool = False,
     gears: Array | None = None,
+    via: Sequence[NodeOnTheWay] = (),
     budget: Budget = UNLIMITED,
 ) -> Polished:
     """A local optimum among obstacles near a guess.
@@ -420,6 +438,8 @@ def polish(
         out may still touch, and is a guess itself.
     gears : (n - 1,) array, optional
         Sign of the speed ahead in every interval; stretches of one sign take their own time.
+    via : sequence of (int, tuple)
+        Nodes that are passed on the way; stretches between them take their own time.
     budget : Budget
         Its time is for all there is to do; every iteration of the solver asks it.
 
@@ -431,7 +451,7 @@ def polish(
     settings = settings or PolishSettings()
     began = budget.elapsed
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
-    program = program_of(model, ends, scene, settings, stage_cost, gears, point)
+    program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
     ahead = settings.ahead * _fastest(point)
     reach = max((part.reach for part in scene.parts), default=0.0) or 0.5 * ahead or 1.0
     near = max(settings.near * reach, ahead)
@@ -443,9 +463,13 @@ def polish(
     price = PRICE * guess.duration / reach if elastic else math.inf
     best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
+    former: Solver | None = None  # that found the point
     needed = 0.0  # [s] to build a program that was not built
-    begin, trust, known = Begin.GUESS, math.inf, None
-    for _ in range(FIXED_ROUNDS if fixed_planes else settings.rounds):
+    begin, trust, known = Begin.GUESS, near if scene.places else math.inf, None
+    kept: Point | None = None  # the best whose lines held, where places have a price
+    before, least = math.inf, math.inf  # objectives of the point and of that
+    rounds = settings.rounds + (PLACE_ROUNDS if scene.places else 0)
+    for _ in range(FIXED_ROUNDS if fixed_planes else rounds):
         if budget.is_over:
             total = total._replace(status=SolveStatus.OUT_OF_BUDGET, reason="no time was left")
             break
@@ -463,14 +487,21 @@ def polish(
         found, moved, known, answer = solve_from(
             solver, program, point, apart, begin=begin, known=known, trust=trust
         )
+        far = float(np.abs(found.state[:, :2] - point.state[:, :2]).max())
         total = total.then(answer)
+        if scene.places and answer.objective > before and far > SHORT * reach:
+            # Places cost other than was said, or lines were added.
+            trust, known = 0.5 * far, None
+            if solver is former:
+                begin = Begin.NEARBY
+                continue
+        former = solver
         if answer.is_feasible or not total.is_feasible:
             best = found
         if elastic or answer.status is not SolveStatus.SOLVED:
             break
         total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
         missed = pairs_near(program, found, MISSED * reach)
-        far = float(np.abs(found.state[:, :2] - point.state[:, :2]).max())
         held_back = program.scene.movers and found.durations.sum() < QUICKER * point.durations.sum()
         if trust > near and far > near and apart.lacks(missed):
             trust = TRUST * near  # it went through what was not near: once more, in short steps
@@ -491,17 +522,25 @@ def polish(
         if trust < near:
             missed = pairs_near(program, found, near)
         apart = moved.joined(program, point, missed)
-        begin = Begin.SAME if apart is moved else Begin.GUESS
+        alike = apart is moved and (not scene.places or far < ALIKE * reach)
+        begin = Begin.SAME if alike else Begin.GUESS
         if apart is moved and not fixed_planes:
             apart = moved.split(program, point, TIGHT * reach)
         if apart is moved and moved.is_kept(program, point):
-            if far < 0.99 * trust and not held_back:
+            if scene.places and answer.objective < least:
+                kept, least = found, answer.objective
+            settled = not scene.places or answer.objective > (1.0 - SETTLED) * before
+            if settled and far < 0.99 * trust and not held_back:
                 total = total._replace(status=answer.status, reason=answer.reason)
                 break
         else:
             apart = apart.faced(program, point)
+        before = answer.objective
         if apart is not moved:
             solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
+    if kept is not None:
+        best = kept
+        total = total._replace(status=SolveStatus.SOLVED, reason="settled", objective=least)
     return _polished(best, total, max(budget.elapsed - began, needed))
 
 

@@ -171,15 +171,20 @@ class Guard(NamedTuple):
     solids: tuple[Solid, ...] | None = None  # None: everywhere
 
 
+PlacesAt = Callable[[Array, Array, Array], Array]
+"""Rates (n, 2) per metre and per second at poses (n, dof), reduced states and controls."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PolishScene:
-    """The body, the obstacles around it, half-planes for the reference point, and limits."""
+    """The body, obstacles, half-planes for the reference point, limits, and prices of places."""
 
     parts: tuple[BodyPart, ...] = ()
     pieces: tuple[Solid, ...] = ()
     movers: tuple[MovingSolid, ...] = ()
     walls: tuple[tuple[float, float, float], ...] = ()  # (a, b, c): a x + b y <= c
     guards: tuple[Guard, ...] = ()
+    places: PlacesAt | None = None
 
     @property
     def body(self) -> list[Solid]:
@@ -194,6 +199,10 @@ class PolishScene:
 @functools.lru_cache(maxsize=8)  # a round asks for the same ones several times
 def _pieces_during(scene: PolishScene, durations: bytes) -> ObstaclePieces:
     return pieces_during(scene.pieces, scene.movers, np.frombuffer(durations))
+
+
+NodeOnTheWay = tuple[int, tuple[float | None, ...]]
+"""Number of a node between the first and the last, and its state; None leaves a component free."""
 
 
 class MotionEnds(NamedTuple):

@@ -39,12 +39,14 @@ from maneuver_automaton.planning.arrivals import (
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_goal_blocked
 from maneuver_automaton.planning.incumbents import LEAST_TIME, Incumbents, PlanningStep
 from maneuver_automaton.planning.on_the_way import goal_around
+from maneuver_automaton.planning.polishing import polish_on_the_way
 from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, Via
 
 LEG_SHARE = 0.2  # of the time left, for a leg that is planned for the first time
 IMPROVED = 0.15  # of the time, for arrivals that are better by estimates
 SEARCHED = 0.4  # of the time, for the search over arrivals
+POLISHED = 0.7  # of the time left, for polishing the plan as a whole
 VARIED = 0.6  # of the time left then, for free headings and places
 THINNED = 3  # of so many arrivals one stays where improved ones come in
 SECTORS = 12  # of headings, in each of which the best arrival is improved
@@ -104,8 +106,10 @@ class AlongPoses(PlanningStep):
             search = _Search(found, legs, search.improved(budget.part(IMPROVED)))
         best = search.best(budget.before((1.0 - SEARCHED) * budget.left))
         if best is not None and found.wants_more:
-            best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
-            search.with_more_time(best)
+            whole = found.for_better.part(POLISHED)
+            if not polish_on_the_way(found, whole):
+                best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
+                search.with_more_time(best)
         if not found.plans:
             ended.why = search.why_none()
             return

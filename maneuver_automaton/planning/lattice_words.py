@@ -355,19 +355,15 @@ class LatticeWords(PlanningStep):
 
         Estimates of the search are too low there to find a way round: it expands the places first.
         """
-        query, best, found = self.query, self.words[-1], self.found
-        pays = best.cost - with_price(query.library.priced, best).cost > PAID * best.cost
-        problem = with_dear_places_closed(query) if pays or self.polish else None
+        query, best = self.query, self.words[-1]
+        paid = best.cost - with_price(query.library.priced, best).cost
+        problem = with_dear_places_closed(query) if paid > PAID * best.cost else None
         if problem is None:
             return
-        if pays:
-            closed = lattice_query(
-                problem, _goals(query), prepared=query.prepared, library=query.library
-            )
-            self._by_way_of(closed, ROUND_SHARE, counted=COUNTED_ROUND)
-        if self.polish and found.plans:
-            paid = sum(one.price for one in query.problem.place_prices_of(found.plans[0].plan))
-            self.polish.instead = problem if paid <= PAID * found.cost else None
+        closed = lattice_query(
+            problem, _goals(query), prepared=query.prepared, library=query.library
+        )
+        self._by_way_of(closed, ROUND_SHARE, counted=COUNTED_ROUND)
 
     def _by_way_of(self, other: LatticeQuery, share: float, *, counted: float) -> None:
         """Note the word of another query with the same maneuvers, if it costs less than known."""

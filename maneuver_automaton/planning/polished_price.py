@@ -13,9 +13,15 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost, StageCost, terms_of
+from maneuver_automaton.groups import group_of
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import LEAST_DURATION, MOST_DURATION
+from maneuver_automaton.optimal_control.scene import (
+    LEAST_DURATION,
+    MOST_DURATION,
+    PlacesAt,
+)
+from maneuver_automaton.places import PER, rates_along
 from maneuver_automaton.problem import Problem
 
 EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some
@@ -41,16 +47,36 @@ class PolishedPrice:
             return self.problem.cost_of(plan)
         return replace(self.problem, cost=self.cost).cost_of(plan)
 
+    def unit(self, known: Plan | None) -> float:
+        """The price of time or, where it has none, what a `known` plan costs per second; else 1."""
+        if self.cost.time > self.waiting:
+            return self.cost.time
+        return self.of(known) / known.duration - self.waiting if known else 1.0
+
+    def places(self, known: Plan | None) -> PlacesAt | None:
+        """What places cost in the same unit, seen from the start; None if they cost nothing."""
+        costs, unit = self.problem.bound_place_costs, self.unit(known)
+        if not (costs and unit > 0.0):
+            return None
+        model, start = self.problem.automaton.model, self.problem.start
+        group = group_of(start.size)
+
+        def at(poses: Array, states: Array, controls: Array) -> Array:
+            world = np.asarray((group(start) @ group(poses)).pose)
+            twists, rates = model.body_velocity(states, controls), np.zeros((len(poses), 2))
+            for one in costs:
+                rates[:, PER.index(one.per)] += rates_along(one, world, twists, states) / unit
+            return rates
+
+        return at
+
     def stage_cost(self, known: Plan | None) -> RunningCost | None:
         """Cost per second beside 1 for the time; None if there is none.
 
-        The unit is the price of time or, where it has none, what a `known` plan costs per second;
-        without one, 1.
+        Its unit is that of `unit`.
         """
         cost, model = self.cost, self.problem.automaton.model
-        unit = cost.time
-        if cost.time <= self.waiting:
-            unit = self.of(known) / known.duration - self.waiting if known else 1.0
+        unit = self.unit(known)
         fixed = (cost.time - self.waiting) / unit - 1.0 if unit > 0.0 else 0.0
         if not unit > 0.0 or (fixed == cost.effort == cost.norm == cost.length == 0.0):
             return None

@@ -25,8 +25,14 @@ from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import BodyPart, Guard
+from maneuver_automaton.optimal_control.scene import (
+    BodyPart,
+    Guard,
+    NodeOnTheWay,
+    PlacesAt,
+)
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
+from maneuver_automaton.planning.on_the_way import passed_on_the_way
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
@@ -42,6 +48,7 @@ from maneuver_automaton.refinement.polish import (
     PolishResult,
     PolishTask,
     polish_guesses,
+    polish_through,
 )
 from maneuver_automaton.refinement.stop_and_steer import follows_paths, simpler_problem
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
@@ -113,7 +120,6 @@ class Polish(PlanningStep):
     guesses: list[Aimed] = field(default_factory=list)  # along kinematic plans that are known
     otherwise: Callable[[], None] | None = None  # offers what there is where nothing is gained
     tried: float = math.inf  # cost of the cheapest plan when all guesses were tried before
-    instead: Problem | None = None  # to be solved: of prices of places the solver knows nothing
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """The solver, and tables of the kinematic libraries."""
@@ -142,11 +148,11 @@ class Polish(PlanningStep):
         if budget.is_over or why_not_polished(problem):
             return not budget.is_over
         price = polished_price(problem)
-        problem = self.instead or problem
         known = _worth_polishing(found, price)
         if known and all(isinstance(one, Trim) and one.is_rest for one in known[0][0].primitives):
             return True  # it is there already
-        stage_cost = price.stage_cost(known[0][0] if known else None)
+        first = known[0][0] if known else None
+        stage_cost, places = price.stage_cost(first), price.places(first)
         solid = _without_passed(problem, known[0][0]) if known else problem
         work = iterations_within(budget)
         for goal_index, guesses in _in_groups(problem, known, self.guesses, budget):
@@ -158,6 +164,7 @@ class Polish(PlanningStep):
                     guesses,
                     goal_index,
                     stage_cost,
+                    places=places,
                     budget=budget,
                     most_iterations=work,
                     accepts=functools.partial(found.offer, goal_index=goal_index),
@@ -331,6 +338,7 @@ def polish_plans(
     goal_index: int,
     stage_cost: RunningCost | None,
     *,
+    places: PlacesAt | None = None,
     budget: Budget,
     most_iterations: int | None = None,
     accepts: Callable[[Plan], bool],
@@ -339,6 +347,23 @@ def polish_plans(
 
     With `most_iterations` of the solver the work is counted, and time only ends it earlier.
     """
+    task = polish_task(problem, goal_index, places)
+
+    def sound(motion: PolishedMotion) -> bool:
+        return accepts(_plan_of(problem, goal_index, motion))
+
+    return polish_guesses(
+        task,
+        guesses,
+        stage_cost=stage_cost,
+        budget=budget,
+        most_iterations=most_iterations,
+        accepts=sound,
+    )
+
+
+def polish_task(problem: Problem, goal_index: int, places: PlacesAt | None) -> PolishTask:
+    """The vehicle, its ends and what is around it."""
     goal = problem.goals[goal_index]
     first, last = problem.first_trim, problem.last_trim(goal)
     # a zone that does not admit the motion by its name is not entered at all
@@ -352,7 +377,7 @@ def polish_plans(
         () if problem.automaton.translated is None else problem.automaton.translated.follows_pose
     )
     values = last.reduced_state.tolist()
-    task = PolishTask(
+    return PolishTask(
         model=problem.automaton.model,
         start=problem.start,
         start_state=first.reduced_state,
@@ -375,27 +400,65 @@ def polish_plans(
             for one in zones
         ),
         durations=admitted_durations(problem),
+        places=places,
     )
 
-    def sound(motion: PolishedMotion) -> bool:
-        maneuver = motion.maneuver("polished", source=first.name, target=last.name)
-        return accepts(
-            Plan(
-                problem.start,
-                (first, last),
-                durations=[0.0, 0.0],
-                maneuvers=(maneuver,),
-                start_time=problem.start_time,
-            )
-        )
 
-    return polish_guesses(
-        task,
-        guesses,
-        stage_cost=stage_cost,
-        budget=budget,
-        most_iterations=most_iterations,
-        accepts=sound,
+def _plan_of(problem: Problem, goal_index: int, motion: PolishedMotion) -> Plan:
+    first, last = problem.first_trim, problem.last_trim(problem.goals[goal_index])
+    maneuver = motion.maneuver("polished", source=first.name, target=last.name)
+    return Plan(
+        problem.start,
+        (first, last),
+        durations=[0.0, 0.0],
+        maneuvers=(maneuver,),
+        start_time=problem.start_time,
+    )
+
+
+def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
+    """Offer the best plan polished as a whole, past all poses on its way; whether that is cheaper.
+
+    It rests where it has to, and passes each pose as it likes. A place that may be chosen stays.
+    """
+    problem, horizon = found.problem, found.problem.horizon
+    limited = horizon.time is not None or horizon.max_time is not None
+    stays = any(via.stay_s for via in problem.via)
+    if limited or stays or problem.moves or budget.is_over or why_not_polished(problem):
+        return False
+    known, goal_index = found.plans[0].plan, found.plans[0].goal_index
+    price = polished_price(problem)
+    task = polish_task(problem, goal_index, price.places(known))
+    course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
+    count, rows = _intervals()(known.duration), np.hstack([course.pose, course.reduced_state])
+    passed, via, dof = passed_on_the_way(problem, known), list[NodeOnTheWay](), known.start.size
+    times, nodes = [0.0], [0]
+    for one in passed:
+        times.append(one.time - known.start_time)
+        nodes.append(round(count * times[-1] / known.duration))
+        state = np.array([np.interp(times[-1], course.time, row) for row in rows.T])
+        asked = problem.via[one.number - 1]
+        pose = (one.pose if asked.radius > 0.0 else asked.pose).tolist()
+        pose[2] = None if asked.free_heading else pose[2]
+        free = (None,) * (len(state) - dof)
+        seen = replace(task, goal=tuple(pose), goal_state=free).ends(float(state[2])).end
+        via.append((nodes[-1], (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
+    times, nodes = [*times, known.duration], [*nodes, count]
+    if min(np.diff(nodes)) < 1:
+        return False
+    at = np.interp(np.arange(count + 1), nodes, times)
+    state = np.stack([np.interp(at, course.time, row) for row in rows.T], axis=1)
+    which = np.clip(np.searchsorted(course.time, at[:-1], side="right") - 1, 0, len(rows) - 2)
+    guess = Guess(state=state, control=course.control[which], duration=known.duration)
+    settings, work = PolishSettings(), iterations_within(budget)
+    if work is not None:
+        settings = replace(settings, max_iterations=min(work, settings.max_iterations))
+    motion = polish_through(
+        task, guess, via, stage_cost=price.stage_cost(known), settings=settings, budget=budget
+    )
+    found.counts.update(polished=1)
+    return not isinstance(motion, str) and found.offer(
+        _plan_of(problem, goal_index, motion), goal_index
     )
 
 

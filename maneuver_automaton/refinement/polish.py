@@ -30,11 +30,14 @@ from maneuver_automaton.optimal_control.scene import (
     Guard,
     MotionEnds,
     MovingSolid,
+    NodeOnTheWay,
+    PlacesAt,
     Polished,
     PolishScene,
     PolishSettings,
 )
 from maneuver_automaton.primitives import Maneuver, Trajectory
+from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.problem import Bounds
 from maneuver_automaton.refinement.closure import Closed, closed
 from maneuver_automaton.refinement.gear_sequences import gears_of, without_shuffles
@@ -79,6 +82,8 @@ class PolishTask:
         Limits of the twist where the body touches a shape.
     durations : (2,) tuple
         Least and greatest duration [s].
+    places : callable, optional
+        What places cost, seen from the start, in the units of the objective.
     """
 
     model: Model
@@ -94,6 +99,7 @@ class PolishTask:
     margin: float = 0.0  # [m]
     guards: tuple[tuple[Guard, Shape], ...] = ()
     durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
+    places: PlacesAt | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "start", last=self.model.group.dof)
@@ -127,6 +133,7 @@ class PolishTask:
             movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
             guards=(*everywhere, *map(self._seen, self.guards)),
+            places=self.places,
         )
 
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
@@ -269,6 +276,81 @@ def polish_guesses(
     return _Polishing(
         task, task.scene, guesses, stage_cost, settings, budget, most_iterations, accepts
     ).run()
+
+
+def polish_through(
+    task: PolishTask,
+    guess: Guess,
+    via: Sequence[NodeOnTheWay],
+    *,
+    stage_cost: RunningCost | None = None,
+    settings: PolishSettings | None = None,
+    budget: Budget = UNLIMITED,
+) -> PolishedMotion | str:
+    """The exact motion through poses on the way that a guess leads to; why there is none, if so.
+
+    Parameters
+    ----------
+    task : PolishTask
+        Nothing may move.
+    guess : Guess
+        Seen from the start, with its nodes at the poses on the way.
+    via : sequence of (int, tuple)
+        These nodes in order, with pose and reduced state seen from the start; None is free.
+    """
+    settings = settings or PolishSettings()
+    ends, why = task.ends(float(guess.state[-1, 2])), ""
+    for room in (1.0, ROOM):  # more of it where closing broke a limit
+        some = replace(settings, tightening=room * settings.tightening)
+        found = polish(task.model, ends, task.scene, guess, stage_cost=stage_cost, settings=some,
+                       via=via, budget=budget)  # fmt: skip
+        if not found.is_feasible:
+            return found.reason
+        ending = _closed_through(task, found, (*via, (len(found.control), ends.end)), budget)
+        if not isinstance(ending, str):
+            return ending
+        why = ending
+    return why
+
+
+def _closed_through(
+    task: PolishTask, found: Polished, nodes: Sequence[NodeOnTheWay], budget: Budget
+) -> PolishedMotion | str:
+    """The motion closed from node to node, each from where the one before it came out."""
+    group, here, first, state = (
+        group_of(task.start.size),
+        np.zeros(task.start.size),
+        0,
+        task.start_state,
+    )
+    dof, control, durations = here.size, list[Array](), list[Array]()
+    for last, wanted in nodes:
+        aim = np.array([found.state[last, k] if v is None else v for k, v in enumerate(wanted)])
+        seen = np.array((group(here).inverse() @ group(aim[:dof])).pose)
+        seen[2] = aim[2] - here[2]
+        ending = closed(
+            task.model,
+            state,
+            [
+                None if value is None else float(at)
+                for value, at in zip(wanted, [*seen, *aim[dof:]], strict=True)
+            ],
+            control=found.control[first:last],
+            durations=found.durations[first:last],
+            budget=budget,
+        )
+        if isinstance(ending, str):
+            return ending
+        control.append(ending.control)
+        durations.append(ending.durations)
+        turned = here[2] + ending.course.pose[-1, 2]
+        here = np.array((group(here) @ group(ending.course.pose[-1])).pose)
+        here[2], first, state = turned, last, ending.course.reduced_state[-1]
+    every, lasting = np.concatenate(control), np.concatenate(durations)
+    course = drive(task.model, task.start_state, control=every, durations=lasting)
+    return PolishedMotion(
+        course=course, control=every, durations=lasting, objective=found.objective, error=0.0
+    )
 
 
 @dataclass(slots=True, eq=False)

@@ -1,0 +1,123 @@
+"""Prices of places in polishing: a convex model of them about the last answer, written anew.
+
+Of a rate numbers alone are known. It is looked at beside each node as far as the next answer may be
+from there, so that the ridge between two walls and the border of an area are seen. The price of a
+way is a sum over its nodes: the model has its slope in all that moves, and curves as the rates do,
+but not along the way: a node that slides changes no price. Rates times symbols for the way were
+tried: they are not convex, and take the solver ten times as many iterations.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton.optimal_control.blocks import Kind, kind_of
+from maneuver_automaton.optimal_control.ipopt import load_casadi
+from maneuver_automaton.optimal_control.scene import PlacesAt, Point
+
+
+class PlaceTerm(NamedTuple):
+    """The model about a point of n nodes."""
+
+    about: Array  # (n, dof) its poses
+    slope: Array  # (n, dof) of the price
+    along: Array  # (n,) [rad] direction of the way
+    curve: Array  # (n, dof) along the way, across it, and of the other coordinates
+    rates: Array  # (n - 1,) per second of each interval
+
+    @property
+    def given(self) -> Array:
+        """Parameters of the blocks: of nodes one after the other, then of intervals."""
+        nodes = np.column_stack([self.about, self.slope, self.along, self.curve])
+        return np.concatenate([nodes.ravel(), self.rates])
+
+    def price(self, point: Point) -> float:
+        """What the model adds to the objective at another point: the price but for a constant."""
+        by = point.state[:, : self.about.shape[1]] - self.about
+        bent = (self.curve * _turned(by, -self.along) ** 2).sum()
+        return float((self.slope * by).sum() + bent + self.rates @ point.durations)
+
+
+def place_term(places: PlacesAt, point: Point, dof: int, *, beside: float) -> PlaceTerm:
+    """The model about a point, of rates so far `beside` it [m]."""
+    pose, steps = point.state[:, :dof], _steps(point, dof)
+    lengths = np.sqrt((steps * steps).sum(axis=1))
+    ahead = np.divide(steps, lengths[:, None], out=np.zeros_like(steps), where=lengths[:, None] > 0)
+    x, y = _at_nodes(steps)[:, :2].T
+    along = np.where(np.hypot(x, y) > 0.0, np.arctan2(y, x), pose[:, 2])
+    weights = np.column_stack([_at_nodes(lengths), _at_nodes(point.durations)])  # [m, s]
+    here, slopes, curve = _rates(places, point, pose), np.zeros_like(pose), np.zeros_like(pose)
+    for k in range(dof):
+        step = np.zeros_like(pose)
+        step[:, k] = beside
+        step = _turned(step, along)
+        more, less = (_rates(places, point, pose + sign * step) for sign in (1.0, -1.0))
+        slopes[:, k] = (weights * (more - less)).sum(axis=1) / (2.0 * beside)
+        bends = np.maximum(more + less - 2.0 * here, 0.0) / (2.0 * beside**2)
+        curve[:, k] = (weights[:, k == 0 :] * bends[:, k == 0 :]).sum(axis=1)
+    slope, middles = _turned(slopes, along), _middles(here)
+    slope[1:] += middles[:, :1] * ahead
+    slope[:-1] -= middles[:, :1] * ahead
+    return PlaceTerm(pose, slope, along, curve, middles[:, 1])
+
+
+def price_of_places(places: PlacesAt, point: Point, dof: int) -> float:
+    """What the places of a point cost."""
+    steps, rates = _steps(point, dof), _middles(_rates(places, point, point.state[:, :dof]))
+    return float(rates[:, 0] @ np.sqrt((steps * steps).sum(axis=1)) + rates[:, 1] @ point.durations)
+
+
+def _rates(places: PlacesAt, point: Point, pose: Array) -> Array:
+    control = np.vstack([point.control, point.control[-1:]])
+    return places(pose, point.state[:, pose.shape[1] :], control)
+
+
+def _steps(point: Point, dof: int) -> Array:
+    """Changes of place (n - 1, dof) [m], without the turn."""
+    steps = np.diff(point.state[:, :dof], axis=0)
+    steps[:, 2] = 0.0
+    return steps
+
+
+def _turned(vectors: Array, angles: Array) -> Array:
+    """Vectors (n, dof), of which x and y are turned by angles (n,) [rad]."""
+    (x, y), c, s = vectors[:, :2].T, np.cos(angles), np.sin(angles)
+    return np.column_stack([c * x - s * y, s * x + c * y, vectors[:, 2:]])
+
+
+def _middles(values: Array) -> Array:
+    """Means (n - 1, ...) over intervals."""
+    return np.asarray(0.5 * (values[1:] + values[:-1]))
+
+
+def _at_nodes(values: Array) -> Array:
+    """Of each node (n, ...) half of what the intervals beside it have."""
+    half = np.concatenate([0.5 * values, np.zeros_like(values[:1])])
+    half[1:] += 0.5 * values
+    return half
+
+
+@functools.cache
+def place_kind(dof: int) -> Kind:
+    """One node: its pose; given the model there."""
+    casadi = load_casadi()
+    pose, about, slope, curve = (casadi.SX.sym(name, dof) for name in ("x", "at", "slope", "curve"))
+    angle = casadi.SX.sym("along")
+    by = pose - about
+    c, s = casadi.cos(angle), casadi.sin(angle)
+    turned = casadi.vertcat(c * by[0] + s * by[1], c * by[1] - s * by[0], by[2:])
+    price = casadi.dot(slope, by) + casadi.dot(curve, turned**2)
+    return kind_of(casadi, pose, casadi.vertcat(about, slope, angle, curve), price=price)
+
+
+@functools.cache
+def second_kind(paced: bool, intervals: int) -> Kind:
+    """One interval: its pace, if it has one, and the duration; given the rate per second."""
+    casadi = load_casadi()
+    every, rate = casadi.SX.sym("T", 1 + int(paced)), casadi.SX.sym("rate")
+    lasting: Any = every[-1] / intervals * (every[0] if paced else 1.0)
+    return kind_of(casadi, every, rate, price=rate * lasting)
