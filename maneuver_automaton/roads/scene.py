@@ -312,12 +312,18 @@ def outlines_of(places: Sequence[Shape]) -> list[Array]:
     return rings
 
 
+def geometry_of(place: Shape) -> Any:
+    """A shape as a shapely geometry; a disc as its center, to be grown by its radius."""
+    import shapely
+
+    if isinstance(place, Disc):
+        return shapely.Point(place.center)
+    return shapely.Polygon(place.corners, place.holes if isinstance(place, Polygon) else ())
+
+
 def _away(place: Shape, area: Any) -> float:
     """Distance to a place, 0 inside [m]."""
     import shapely
 
-    if isinstance(place, Disc):
-        return max(float(shapely.distance(shapely.Point(place.center), area)) - place.radius, 0.0)
-    holes = place.holes if isinstance(place, Polygon) else ()
-    corners = place.corners if isinstance(place, Box | Polygon) else np.zeros((0, 2))
-    return float(shapely.distance(shapely.Polygon(corners, holes), area))
+    radius = place.radius if isinstance(place, Disc) else 0.0
+    return max(float(shapely.distance(geometry_of(place), area)) - radius, 0.0)
