@@ -18,6 +18,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
+from maneuver_automaton._kept import RECENT
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Motion, Obstacle, Polygon
@@ -270,7 +271,7 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
         causes.append(("undrivable", f"the model cannot drive it: {said}"))
     if causes:
         return causes[0][0], "; ".join(said for _, said in causes)
-    road = shapely.buffer(drivable_area(scene.lanelets), -0.5 * vehicle.width)
+    road = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), -0.5 * vehicle.width)
     why = [_never_reached(goal, scene, vehicle, road) for goal in scene.goals]
     if "" in why:
         shut = _shut_off(scene, vehicle, road)
@@ -382,7 +383,7 @@ def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]
     places = plan.sample().pose[:, :2]
     path = shapely.LineString(places) if len(places) > 1 else shapely.Point(places[0])
     near = shapely.buffer(path, BESIDE)
-    return obstacles_in(shapely.difference(near, drivable_area(lanelets)))
+    return obstacles_in(shapely.difference(near, RECENT.once(drivable_area, tuple(lanelets))))
 
 
 def nearest_miss(
