@@ -92,7 +92,7 @@ def stop_lines(
         if len(ends) != 2:
             raise element.error(f"got the stop line {ends}, need two points, or none for its end")
         if len(set(ends)) == 1:
-            notes.append(f"the stop line of lanelet {number} has no length: it is at the lanelet's end")
+            notes.append(f"the stop line of lanelet {number} has no length: it is at its end")
             ends = _end_of(lanelet)
         line, lit = np.array(ends), False
         for ref in sorted(ref for tag, ref in here if tag == LIGHT and ref in lights):

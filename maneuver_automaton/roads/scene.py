@@ -282,7 +282,14 @@ class GoalRegion:
         >>> GoalRegion(places=(Disc(1.0, [5.0, 0.0]),)).away_from(shapely.Point(2.0, 0.0))
         2.0
         """
-        return min((_away(place, area) for place in self.places or ()), default=0.0)
+        import shapely
+
+        apart = (
+            float(shapely.distance(geometry_of(one), area))
+            - (one.radius if isinstance(one, Disc) else 0.0)
+            for one in self.places or ()
+        )
+        return max(min(apart, default=0.0), 0.0)
 
 
 def turns_within(heading: float, interval: Interval, *, tolerance: float = 0.0) -> bool:
@@ -319,11 +326,3 @@ def geometry_of(place: Shape) -> Any:
     if isinstance(place, Disc):
         return shapely.Point(place.center)
     return shapely.Polygon(place.corners, place.holes if isinstance(place, Polygon) else ())
-
-
-def _away(place: Shape, area: Any) -> float:
-    """Distance to a place, 0 inside [m]."""
-    import shapely
-
-    radius = place.radius if isinstance(place, Disc) else 0.0
-    return max(float(shapely.distance(geometry_of(place), area)) - radius, 0.0)

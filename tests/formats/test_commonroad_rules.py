@@ -92,7 +92,7 @@ def test_a_stop_line_without_a_length_is_at_the_end(tmp_path):
     lane = piece(1, 0, 99, f"<stopLine>{point}{point}{REF}</stopLine>")
     scene = read(tmp_path, lane, sign(7, "206"), problem(goal=ANY))
     assert [one.line.tolist() for one in scene.stop_lines] == [[[99.0, 4.0], [99.0, 0.0]]]
-    assert scene.notes == ("the stop line of lanelet 1 has no length: it is at the lanelet's end",)
+    assert scene.notes == ("the stop line of lanelet 1 has no length: it is at its end",)
 
 
 @pytest.mark.parametrize("name", ["206", "R1-1", "R1-3", "r2"])
