@@ -351,7 +351,7 @@ def _met(
     begin, last = scene.start.time, scene.last_time
     every = [one for some in walls.values() for one in some]
     times = sorted({begin, last, *(t for _, *ends in every for t in ends if begin < t < last)})
-    top = max(vehicle.model.max_speed, -vehicle.model.min_speed)
+    top = float(np.abs(vehicle.model.reduced_limits[0]).max())
     places, met = shapely.Point(scene.start.middle[:2]), [False for _ in scene.goals]
     for low, high in itertools.pairwise(times):
         around = shapely.buffer(places, TOUCHES + WIDER * min(top * (high - low), FAR))
