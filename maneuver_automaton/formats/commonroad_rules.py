@@ -2,12 +2,14 @@
 
 Signs are those that commonroad-io 2026.1 knows by country. One list serves all: no two countries
 mean different rules by one name, and files use German names everywhere. Speeds are in m/s in every
-country, those of R2-1 too, as commonroad-io takes them.
+country, those of R2-1 too, as commonroad-io takes them, unless a unit follows the number. Of a
+limit that is no such speed (some files state -1) nothing is known, so it is not obeyed.
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
@@ -20,6 +22,7 @@ from maneuver_automaton.roads.lanelets import StopLine
 # Germany and Zamunda, China, Italy: 274; a zone; USA and Puerto Rico; Spain; Russia; Argentina;
 # Belgium; France; Greece, whose letter is a rho, or is typed as a P; Croatia.
 LIMITS = ("274", "274.1", "r2-1", "r301", "3.24", "r15", "c43", "b14", "ρ-32", "p-32", "b31")
+UNITS = {"": 1.0, "m/s": 1.0, "km/h": 1 / 3.6, "kmh": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704}
 STOPS = ("206", "r1-1", "r1-3", "r2")  # Germany; USA and Australia; USA, all ways; Spain
 YIELDS = ("205", "r1-2", "r1")  # Germany; Australia and USA; Spain
 # Whether a line is closed in a phase of a light.
@@ -50,8 +53,16 @@ def sign_name(shown: Element) -> str:
 def limits_of(shown: list[Element]) -> Iterator[float]:
     """The speed limits [m/s] that a traffic sign shows."""
     for one in shown:
-        if sign_name(one) in LIMITS and (value := one.get("additionalValue")) is not None:
-            yield value.number()
+        if sign_name(one) in LIMITS and (limit := _speed_on(one)) is not None:
+            yield limit
+
+
+def _speed_on(shown: Element) -> float | None:
+    """The speed that a sign shows [m/s], stated as 13.9, 50kmh or 30 mph; None if it shows none."""
+    stated = shown.get("additionalValue")
+    text = "" if stated is None else stated.text.strip().casefold()
+    found = re.fullmatch(rf"((?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*({'|'.join(UNITS)})", text)
+    return None if found is None else float(found[1]) * UNITS[found[2]] or None
 
 
 def refs(element: Element, tag: str) -> Iterator[int]:
@@ -73,13 +84,16 @@ def stop_lines(
         here, lanelet = _refs_of(element), lanelets[number]
         ends = [_place(one) for line in element.all("stopLine") for one in line.all("point")]
         if not ends:
-            ends = [(float(x), float(y)) for x, y in (lanelet.left[-1], lanelet.right[-1])]
+            ends = _end_of(lanelet)
             # Of lanelets in a row that refer to one light, the last one has it at its end.
             here = here.difference(*(_refs_of(at[k]) for k in lanelet.successors if k in at))
         if not here:
             continue
-        if len(set(ends)) != 2:
+        if len(ends) != 2:
             raise element.error(f"got the stop line {ends}, need two points, or none for its end")
+        if len(set(ends)) == 1:
+            notes.append(f"the stop line of lanelet {number} has no length: it is at its end")
+            ends = _end_of(lanelet)
         line, lit = np.array(ends), False
         for ref in sorted(ref for tag, ref in here if tag == LIGHT and ref in lights):
             phases, offset = _phases(lights[ref], step)
@@ -100,6 +114,10 @@ def stop_lines(
                 notes.append(f"stop sign {ref}: the traffic light at its line holds instead")
             else:
                 yield StopLine(name=f"stop sign {ref}", line=line, lanelet=number)
+
+
+def _end_of(lanelet: Lanelet) -> list[tuple[float, float]]:
+    return [(float(x), float(y)) for x, y in (lanelet.left[-1], lanelet.right[-1])]
 
 
 def _refs_of(lanelet: Element) -> set[tuple[str, int]]:
@@ -179,7 +197,7 @@ def not_obeyed(root: Element) -> Iterator[str]:
             name, sign = sign_name(one), one.need("trafficSignID").text.strip() or "unknown"
             if name in YIELDS:
                 others[f"give way ({sign}): nobody is touched, and no more is kept"] += 1
-            elif name not in STOPS and (name not in LIMITS or one.get("additionalValue") is None):
+            elif name not in STOPS and (name not in LIMITS or _speed_on(one) is None):
                 signs[sign] += 1
     if signs:
         yield f"not obeyed: traffic signs {_counted(signs)}"

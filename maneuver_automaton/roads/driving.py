@@ -233,6 +233,7 @@ def _ending(
         why += f"; no continuation was found {since}"
     why += planner.waits(states[-1], tick=tick)
     if over:
+        why += planner.hindrance
         return "missed", f"no goal was reached until {now:.6g} s, when the last one is over; {why}"
     return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s; {why}"
 
@@ -298,6 +299,8 @@ def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPl
         if limited and best.plan is None and not stopped():
             hurried = _wider(planner.hurried(), begin + limit, begin + limit, WIDTHS, loop=True)
             best = best if hurried.plan is None else hurried
+    if best.plan is None:
+        best = replace(best, reason=best.reason + planner.hindrance)
     return replace(best, search_s=time.perf_counter() - begin)
 
 

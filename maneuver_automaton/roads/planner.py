@@ -35,7 +35,7 @@ from maneuver_automaton.roads.plans import (
     plan_of_controls,
     polished_controls,
 )
-from maneuver_automaton.roads.route import Route, route_of
+from maneuver_automaton.roads.route import Route, hindrance, route_of
 from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules, hopeless
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
@@ -188,6 +188,11 @@ class RoadPlanner:
             if begin <= self.time_of(tick) <= end and one.from_body(self.vehicle, state[:3])[1]:
                 return f"; the line of {one.stop_line.name} is closed ahead of it"
         return ""
+
+    @property
+    def hindrance(self) -> str:
+        """What may keep the vehicle from its route, as the end of a sentence."""
+        return hindrance(self.route, self.local, self.vehicle)
 
     def notes(self, states: Array, *, tick: int = 0) -> tuple[str, ...]:
         """What of the file, and of its rules on states (n, 5) from a tick on, is not obeyed."""

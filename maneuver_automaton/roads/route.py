@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.roads.lanelets import Lanelet, along
+from maneuver_automaton.roads.lanelets import ROUNDED, Lanelet, along, drivable_area
 from maneuver_automaton.roads.scene import GoalRegion, RoadScene, outlines_of
+from maneuver_automaton.roads.vehicle import RoadVehicle
 
 SPACING = 1.0  # [m] of the points of the line
 LONGEST = 1e5  # [m] of a route, and of the outline of a goal
@@ -20,6 +22,8 @@ ASIDE, COLUMNS = 0.5, 24  # [m] between offsets at which limits are known, how m
 # [m/s^2] before a lower limit; of whoever is beyond a limit, more; and after a lower limit. The
 # difference of the first two is what keeps a limit in sight from being out of reach.
 BRAKING, SLOWING, GAINING = 3.0, 3.5, 3.0
+AROUND = 3  # points before and after one, between which a turn is measured
+TURNING = 0.3  # [rad] between them
 SHARE = 0.3  # of the smaller of two areas, common to a lanelet and a goal in it
 
 
@@ -68,6 +72,60 @@ def route_of(scene: RoadScene) -> Route:
         limit=limit,
         extents=extents,
     )
+
+
+def hindrance(route: Route, scene: RoadScene, vehicle: RoadVehicle) -> str:
+    """What may keep a vehicle from following a route, as the end of a sentence; it proves nothing.
+
+    A goal that lanelets do not lead to, or that is behind the start; else the turn that leaves less
+    room than the body sweeps where it turns on and on about the same center.
+    """
+    places = [goal for goal in scene.goals if goal.places is not None]
+    targets = {k for goal in places for k in lanelets_of_goal(scene.lanelets, goal)}
+    if targets and targets.isdisjoint(route.lanelets):
+        return "; no lanelets lead from the start to a goal"
+    here = int(np.argmin(np.hypot(*(route.points - scene.start.middle[:2]).T)))
+    behind = SPACING * here - float(route.extents[:, 1].max())
+    if behind > 0.0:
+        return f"; the goal is {behind:.3g} m behind the start, and no lanelets lead back to it"
+    last = min(float(route.extents[:, 0].min()) / SPACING, len(route.points) - 1.0 - AROUND)
+    lacking, said = 0.0, ""
+    for k in range(max(here, AROUND), int(max(last, 0.0)) + 1):
+        turn = float(route.heading[k + AROUND] - route.heading[k - AROUND])
+        if abs(turn) < TURNING or (free := _across(route, scene, k)) is None:
+            continue
+        radius = 2.0 * AROUND * SPACING / abs(turn)
+        inner, outer = free if turn > 0.0 else free[::-1]
+        tightest = vehicle.model.wheelbase / math.tan(vehicle.model.max_steering)
+        inside = max(radius - inner, tightest - 0.5 * vehicle.width)
+        front = vehicle.ahead + 0.5 * vehicle.length
+        swept, room = math.hypot(inside + vehicle.width, front) - inside, radius + outer - inside
+        if swept - room > lacking:
+            lacking = swept - room
+            number = lanelets_at(scene.lanelets, np.append(route.points[k], route.heading[k]))
+            on = next((one for one in number if one in route.lanelets), number[0])
+            said = (
+                f"; the {'left' if turn > 0.0 else 'right'} turn on lanelet {on} leaves"
+                f" {room:.3g} m, where a vehicle that turns about {inside:.3g} m"
+                f" sweeps {swept:.3g} m"
+            )
+    return said
+
+
+def _across(route: Route, scene: RoadScene, k: int) -> tuple[float, float] | None:
+    """How far the road goes on to the left and to the right of a point of a route [m]."""
+    import shapely
+
+    point, aside = route.points[k], np.array([-np.sin(route.heading[k]), np.cos(route.heading[k])])
+    reach = ASIDE * COLUMNS * aside
+    line = shapely.LineString([point - reach, point + reach])
+    near = [one for one in scene.lanelets if shapely.LinearRing(one.ring).distance(line) <= 0.0]
+    parts = shapely.get_parts(shapely.intersection(line, drivable_area(near))) if near else ()
+    for part in parts:
+        if shapely.distance(part, shapely.Point(point)) <= ROUNDED:
+            offsets = (shapely.get_coordinates(part) - point) @ aside
+            return float(offsets.max()), float(-offsets.min())
+    return None
 
 
 def lanelets_at(lanelets: Sequence[Lanelet], middle: Array) -> list[int]:

@@ -282,7 +282,14 @@ class GoalRegion:
         >>> GoalRegion(places=(Disc(1.0, [5.0, 0.0]),)).away_from(shapely.Point(2.0, 0.0))
         2.0
         """
-        return min((_away(place, area) for place in self.places or ()), default=0.0)
+        import shapely
+
+        apart = (
+            float(shapely.distance(geometry_of(one), area))
+            - (one.radius if isinstance(one, Disc) else 0.0)
+            for one in self.places or ()
+        )
+        return max(min(apart, default=0.0), 0.0)
 
 
 def turns_within(heading: float, interval: Interval, *, tolerance: float = 0.0) -> bool:
@@ -312,12 +319,10 @@ def outlines_of(places: Sequence[Shape]) -> list[Array]:
     return rings
 
 
-def _away(place: Shape, area: Any) -> float:
-    """Distance to a place, 0 inside [m]."""
+def geometry_of(place: Shape) -> Any:
+    """A shape as a shapely geometry; a disc as its center, to be grown by its radius."""
     import shapely
 
     if isinstance(place, Disc):
-        return max(float(shapely.distance(shapely.Point(place.center), area)) - place.radius, 0.0)
-    holes = place.holes if isinstance(place, Polygon) else ()
-    corners = place.corners if isinstance(place, Box | Polygon) else np.zeros((0, 2))
-    return float(shapely.distance(shapely.Polygon(corners, holes), area))
+        return shapely.Point(place.center)
+    return shapely.Polygon(place.corners, place.holes if isinstance(place, Polygon) else ())

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import RECENT
 from maneuver_automaton.collision import Disc, Obstacle, Shape
 from maneuver_automaton.collision.outline import outlines, united
 from maneuver_automaton.collision.world import world_of
@@ -114,7 +115,7 @@ def static_obstacles(scene: RoadScene, route: Route, vehicle: RoadVehicle) -> St
     """Static obstacles on the route, grown by the vehicle's half length and half width."""
     import shapely
 
-    area = drivable_area(scene.lanelets)
+    area = RECENT.once(drivable_area, scene.lanelets)
     grown = 0.5 * np.array([-vehicle.length, vehicle.length, -vehicle.width, vehicle.width])
     extents, passable = [], []
     for one in scene.traffic:
@@ -237,8 +238,9 @@ def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
 
     x, y = scene.start.middle[:2].tolist()
     around = shapely.box(x - far, y - far, x + far, y + far)
-    near = [lanelet for lanelet in scene.lanelets if _meets(lanelet, around)]
-    road = shapely.simplify(shapely.intersection(drivable_area(near), around), SIMPLER)
+    near = tuple(lanelet for lanelet in scene.lanelets if _meets(lanelet, around))
+    area = RECENT.once(drivable_area, near)
+    road = shapely.simplify(shapely.intersection(area, around), SIMPLER)
     strip = shapely.difference(shapely.buffer(road, STRIP, join_style="mitre"), road)
     return obstacles_in(strip)
 

@@ -71,6 +71,30 @@ def test_limits_of_every_country_are_limits_in_metres_per_second(tmp_path, name)
     assert scene.notes == ()
 
 
+@pytest.mark.parametrize(
+    ("value", "limit"),
+    [("50kmh", 50 / 3.6), ("25 mph", 25 * 0.44704), ("30 km/h", 30 / 3.6), ("8.5 m/s", 8.5)],
+)
+def test_a_unit_after_the_number_is_that_of_the_limit(tmp_path, value, limit):
+    scene = read(tmp_path, piece(1, 0, 99, REF), sign(7, "274", value), problem(goal=ANY))
+    assert [one.speed_limit for one in scene.lanelets] == [pytest.approx(limit, rel=1e-12)]
+
+
+@pytest.mark.parametrize("value", ["-1.0", "0", "zone", "50 furlongs"])
+def test_a_limit_that_is_no_speed_is_named(tmp_path, value):
+    scene = read(tmp_path, piece(1, 0, 99, REF), sign(7, "274.1", value), problem(goal=ANY))
+    assert [one.speed_limit for one in scene.lanelets] == [None]
+    assert scene.notes == ("not obeyed: traffic signs 274.1",)
+
+
+def test_a_stop_line_without_a_length_is_at_the_end(tmp_path):
+    point = "<point><x>90</x><y>2</y></point>"
+    lane = piece(1, 0, 99, f"<stopLine>{point}{point}{REF}</stopLine>")
+    scene = read(tmp_path, lane, sign(7, "206"), problem(goal=ANY))
+    assert [one.line.tolist() for one in scene.stop_lines] == [[[99.0, 4.0], [99.0, 0.0]]]
+    assert scene.notes == ("the stop line of lanelet 1 has no length: it is at its end",)
+
+
 @pytest.mark.parametrize("name", ["206", "R1-1", "R1-3", "r2"])
 def test_stop_signs_of_every_country_stop_at_the_line(tmp_path, name):
     scene = read(tmp_path, piece(1, 0, 99, REF), sign(7, name), problem(goal=ANY))

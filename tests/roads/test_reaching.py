@@ -24,7 +24,7 @@ from maneuver_automaton.roads import (
 )
 from tests.formats.outside import DATA, needs_data
 from tests.quickly import quick_are
-from tests.roads.files import LANES, interval, lanelet, parked, problem, scene_of
+from tests.roads.files import LANES, interval, lanelet, parked, piece, problem, scene_of, square
 
 LIMIT = 300.0  # [s] that nobody waits for: searches end by themselves
 
@@ -224,3 +224,108 @@ def test_files_of_others_are_planned_and_driven(name):
 def test_it_is_not_hit_where_it_stands():
     scene = ma.load_scenario(DATA / "commonroad" / "scenarios" / "CHN_Sha-7_1_T-1.xml").scene
     assert drive_scene(road_planner(scene)).status == "reached"
+
+
+AHEAD = goal(place(150.0, 4.0, 20.0, 8.0), time=(0, 120))
+
+
+def phantom(number, *sets):
+    """Squares of 8 m at places (x, y), each from a step to a step."""
+    occupied = "".join(
+        f"<occupancy><shape>{square(x, y, 8)}</shape>{interval('time', *time)}</occupancy>"
+        for x, y, *time in sets
+    )
+    name = f'<phantomObstacle id="{number}"><occupancySet>{occupied}</occupancySet>'
+    return f"{name}</phantomObstacle>"
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ((phantom(5, (80, 4, 0, 120)),), "phantom 5 leaves no way"),
+        ((phantom(5, (80, 4, 0, 60), (84, 4, 60, 120)),), "phantom 5 leaves no way"),
+        (
+            (parked(3, x=80, y=2), phantom(5, (80, 8, 0, 130))),
+            "parkedVehicle 3 and phantom 5 leave no way",
+        ),
+        ((phantom(5, (60, 4, 0, 120)), phantom(6, (90, 4, 0, 120))), "road users leave no way"),
+    ],
+)
+def test_who_shuts_a_goal_off_is_told_before_any_search(tmp_path, monkeypatch, parts, said):
+    monkeypatch.setattr(RoadPlanner, "search", None)
+    scene = scene_of(tmp_path, *LANES, *parts, problem(goal=AHEAD))
+    result, drive = plan_road(scene), drive_scene(road_planner(scene))
+    assert result.reason == (
+        f"no goal can be reached: {said} to it as wide as the vehicle until 12 s"
+    )
+    assert (drive.status, drive.reason, len(drive.steps)) == ("missed", result.reason, 0)
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        (phantom(5, (80, 4, 0, 60)),),  # gone in time
+        (phantom(5, (80, 10, 0, 120)),),  # a lane is left
+        (phantom(5, (80, 4, 60, 120)),),  # comes late
+    ],
+)
+def test_who_leaves_a_way_shuts_nothing_off(tmp_path, parts):
+    scene = scene_of(tmp_path, *LANES, *parts, problem(goal=AHEAD))
+    assert plan_road(scene, time_limit=LIMIT).plan is not None
+
+
+def test_a_road_that_is_cut_is_told(tmp_path):
+    lanes = (piece(1, 0, 60), piece(2, 70, 200))
+    scene = scene_of(tmp_path, *lanes, problem(goal=goal(place(150.0, 2.0, 20.0))))
+    assert plan_road(scene).reason == (
+        "no goal can be reached: no way to it is as wide as the vehicle, 1.61 m"
+    )
+
+
+def test_a_start_too_fast_is_told_whatever_else_is_wrong(tmp_path):
+    asked = goal(place(150.0, 30.0, 8.0))
+    reason = plan_road(scene_of(tmp_path, *LANES, problem(speed=60.0, y=7.8, goal=asked))).reason
+    assert "off the road" in reason
+    assert "speed is 9.2 beyond its limits" in reason
+
+
+def corner(radius, width=2.5):
+    """A lane to the right, a quarter of a turn to the right about a center, and a lane down."""
+    angles = np.linspace(np.pi / 2, 0.0, 12)
+    arcs = [
+        np.array([60.0, -r0]) + r * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        for r0 in (radius + 0.5 * width,)
+        for r in (radius + width, radius)
+    ]
+    (left, right), low = arcs, -radius - 0.5 * width
+    return (
+        Lanelet(1, [[0, left[0, 1]], left[0]], [[0, right[0, 1]], right[0]], successors=[2]),
+        Lanelet(2, left, right, successors=[3]),
+        Lanelet(3, [left[-1], left[-1] - [0, 60]], [right[-1], right[-1] - [0, 60]]),
+    ), Box([2.0, 20.0], [60.0 + radius + 0.5 * width, low - 30.0])
+
+
+@pytest.mark.parametrize(("radius", "told"), [(2.0, True), (9.0, False)])
+def test_a_turn_that_is_too_tight_is_named(radius, told):
+    lanelets, there = corner(radius)
+    scene = RoadScene(
+        name="corner",
+        lanelets=lanelets,
+        start=RoadStart(middle=[10.0, 0.0, 0.0], speed=5.0),
+        goals=(GoalRegion(places=(there,), time=(0.0, 20.0)),),
+    )
+    planner = road_planner(scene)
+    front = planner.vehicle.ahead + 0.5 * planner.vehicle.length
+    swept = np.hypot(radius + planner.vehicle.width, front) - radius  # on paper, about one center
+    said = planner.hindrance
+    assert (swept > 2.5) == told
+    assert said.startswith("; the right turn on lanelet 2 leaves 2.") if told else said == ""
+    result = plan_road(scene, time_limit=LIMIT)
+    assert result.reason.endswith(said) if told else result.plan is not None
+
+
+def test_a_goal_behind_is_told(tmp_path):
+    scene = scene_of(tmp_path, *LANES, problem(x=60.0, goal=goal(place(30.0, 2.0, 10.0))))
+    assert road_planner(scene).hindrance == (
+        "; the goal is 25 m behind the start, and no lanelets lead back to it"
+    )
