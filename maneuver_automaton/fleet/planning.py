@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
@@ -103,6 +104,9 @@ def plan_fleet(
     >>> result.status.value, result.clearance_m > 0.0
     ('found', True)
     """
+    time_limit, seed = as_number("time_limit", time_limit), as_whole("seed", seed)
+    orders, jobs = as_whole("orders", orders), as_whole("jobs", jobs)
+    max_rounds = None if max_rounds is None else as_whole("max_rounds", max_rounds)
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if objective not in ("sum", "last"):
