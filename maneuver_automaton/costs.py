@@ -39,8 +39,7 @@ class StageCost(Protocol):
 class Cost:
     """Prices of effort, norm of the control and time per second, of length and of switches.
 
-    Per second ``effort |u|_R^2 + norm |||u||| + time``, per metre ``length``. Source: the paper,
-    Sec. 3.3 (c1, c2, c3); the last three terms are ours.
+    Source: ``effort |u|_R^2 + norm |||u||| + time``, the paper, Sec. 3.3; all others are ours.
 
     Examples
     --------

@@ -193,21 +193,15 @@ def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> 
         yield
         return
     from rich.console import Console
-    from rich.progress import (
-        Progress,
-        ProgressColumn,
-        SpinnerColumn,
-        Task,
-        TimeElapsedColumn,
-    )
+    from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TimeElapsedColumn
     from rich.text import Text
 
     class More(ProgressColumn):
         def render(self, task: Task) -> Text:
             return Text(more() or task.description, no_wrap=True, overflow="ellipsis")
 
-    columns = SpinnerColumn(), TimeElapsedColumn(), More()
-    clock = Progress(*columns, console=Console(stderr=True), transient=True)
+    shown = SpinnerColumn(), TimeElapsedColumn(), More()
+    clock = Progress(*shown, console=Console(stderr=True), transient=True)
     with _live(clock):
         clock.add_task(what, total=None)
         yield

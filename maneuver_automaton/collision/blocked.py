@@ -240,7 +240,7 @@ class Contact:
         near = within + max(float(np.hypot(*one.middle)) + one.reach for one in self.parts)
         turn = SE2(np.array([0.0, 0.0, pose[2]]))
         body = [(turn.act(ring), r) for ring, r in self.body]
-        found = []
+        found = []  # the areas are where the body overlaps
         for pieces, boxes in zip(self.solids, self.boxes, strict=True):
             gaps = np.maximum(np.maximum(boxes[:, :2] - place, place - boxes[:, 2:]), 0.0)
             close = [pieces[k] for k in np.flatnonzero(np.hypot(*gaps.T) <= near).tolist()]
@@ -250,8 +250,7 @@ class Contact:
                 for ring, _ in body
             ]
             rounding = np.add.outer([r for _, r in close], [r for _, r in body]).ravel()
-            rounded = shapely.buffer(np.array(hulls, dtype=object), rounding, quad_segs=16)
-            area = united(rounded)  # where the body overlaps
+            area = united(shapely.buffer(np.array(hulls, dtype=object), rounding, quad_segs=16))
             point = shapely.Point(place)
             aside = within if area.is_empty else area.distance(point)
             found.append(aside or -float(shapely.distance(area.boundary, point)))

@@ -111,10 +111,9 @@ def plan_fleet(
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if objective not in ("sum", "last"):
         raise ValueError(f"objective must be 'sum' or 'last', got {objective!r}")
-    if orders < 1:
-        raise ValueError(f"orders must be at least 1, got {orders}")
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, got {jobs}")
+    for name, count in (("orders", orders), ("jobs", jobs)):
+        if count < 1:
+            raise ValueError(f"{name} must be at least 1, got {count}")
     apart = jobs > 1 or scheduler is not None
     workers = gathered(jobs=jobs, scheduler=scheduler) if apart else nullcontext()
     with workers as run, patient():

@@ -188,11 +188,11 @@ def transfer_program(
             return casadi.SX(0, 1)
         with numpy_on_symbols(casadi):
             v_x, v_y, turn = model.velocity(casadi.vertsplit(states), casadi.vertsplit(control))[:3]
-        most = lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)
-        return casadi.vec((v_x * v_x + v_y * v_y) * turn * turn / most - 1.0)
+        felt = (v_x * v_x + v_y * v_y) * turn * turn
+        return casadi.vec(felt / (lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)) - 1.0)
 
-    # With the control before and after each node; after an interval it is part of the next stage.
-    within = (one.state[:, :-1], one.state[:, 1:-1])
+    # With the controls of both sides of a node; that before an interval is a state of its stage.
+    within = one.state[:, :-1], one.state[:, 1:-1]
     beyond = casadi.vertcat(*(too_fast(states, one.inputs) for states in within))
     interval = casadi.Function("interval", [one.state, one.control, one.duration],
                                [one.objective, one.constraints, beyond])  # fmt: skip
@@ -213,8 +213,8 @@ def transfer_program(
         if k == 0:
             g.append(casadi.vertcat(x[:n_z] - start, x[n_z + 1 :] - first))
         equality += [True] * (sum(row.numel() for row in g) - len(equality))
-        g += [beyond, too_fast(x[:n_z], x[n_z + 1 :])]
-        equality += [False] * (g[-2].numel() + g[-1].numel())
+        g.append(casadi.vertcat(beyond, too_fast(x[:n_z], x[n_z + 1 :])))
+        equality += [False] * g[-1].numel()
     g += [begins[-1][:n_z] - end, too_fast(begins[-1][:n_z], begins[-1][n_z + 1 :])]
     equality += [True] * n_z + [False] * g[-1].numel()
     cost += objective.smoothness * casadi.sumsqr((last - begins[-1][n_z + 1 :]) / casadi.DM(scale))

@@ -194,10 +194,9 @@ def _coasts(
     (far, word, times), begin = begun
     coast = contact.coast(trim.body_velocity, begin, trim.max_duration)
     for n, (after, length, pose, clear) in enumerate(coast):
-        if after < problem.horizon.min_coast:
-            continue
-        way = far + length, (*word, trim), (*times, after)
-        cost = problem.cost_of_trims(way[1], np.array(way[2]))
-        yield (round(way[0], 9), round(cost, 9)), way, n, pose, clear
-        if clear:
-            return
+        if after >= problem.horizon.min_coast:
+            way = far + length, (*word, trim), (*times, after)
+            cost = problem.cost_of_trims(way[1], np.array(way[2]))
+            yield (round(way[0], 9), round(cost, 9)), way, n, pose, clear
+            if clear:
+                return
