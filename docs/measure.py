@@ -179,7 +179,7 @@ def run_notebook(file: Path) -> None:
             if "image/png" in data:
                 picture = few_colours(Image.open(io.BytesIO(base64.b64decode(data["image/png"]))))
                 data["image/png"] = base64.b64encode(picture).decode()
-    file.write_text(nbformat.writes(notebook), encoding="utf-8")
+    file.write_text(nbformat.writes(notebook).rstrip() + "\n", encoding="utf-8")
 
 
 def draw_scenario(scenario: Path) -> None:

@@ -37,9 +37,9 @@ class StageCost(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Cost:
-    """``effort |u|_R^2 + norm |||u||| + time`` per second, ``length`` per metre, prices per switch.
+    """Prices of effort, norm of the control and time per second, of length and of switches.
 
-    Source: the paper, Sec. 3.3 (c1, c2, c3); the last three terms are ours.
+    Source: ``effort |u|_R^2 + norm |||u||| + time``, the paper, Sec. 3.3; all others are ours.
 
     Examples
     --------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -51,6 +52,32 @@ def features(path, kind):
 def lines(path):
     header, *rows = path.read_text().splitlines()
     return header.split(","), rows
+
+
+INERTIA = """\
+schema: 1
+vehicle: {model: second_order_unicycle, max_speed_m_s: 0.5, max_turn_rate_rad_s: 0.5,
+  max_acceleration_m_s2: 0.25, max_angular_acceleration_rad_s2: 0.25}
+automaton: {preset: second_order_unicycle}
+start: {pose: [0, 0, 0]}
+goal: {pose: [1, 1, 0]}
+search: {polish: false, max_expansions: 300}
+"""
+
+
+def test_between_its_samples_a_plan_with_its_scenario_moves_at_its_speed(tmp_path):
+    scenario = tmp_path / "inertia.yaml"
+    scenario.write_text(INERTIA)
+    assert run(["plan", str(scenario), "--out", str(tmp_path), "--quiet", "--no-plot"]) == 0
+    asked = ["--to", "csv", "--rate", "200", "--with", str(scenario)]
+    assert run(["export", str(tmp_path / "plan.json"), *asked]) == 0
+    with (tmp_path / "plan.csv").open(newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    x, y, length = np.array(
+        [[row["x_m"], row["y_m"], row["arc_length_m"]] for row in rows], dtype=np.float64
+    ).T
+    driven = np.append(0.0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
+    np.testing.assert_allclose(driven, length, atol=1e-5)
 
 
 def test_a_plan_is_written_beside_its_file(plan):

@@ -19,7 +19,7 @@ SHOWN = re.compile(
 
 
 def on_a_terminal(*arguments, cwd, run=("-m", "maneuver_automaton")):
-    """What the command writes to a terminal as wide as a line needs to be."""
+    """What the command writes to a terminal of 80 columns."""
     reads, writes = pty.openpty()
     command = [sys.executable, *run, *map(str, arguments)]
     process = subprocess.Popen(
@@ -28,7 +28,7 @@ def on_a_terminal(*arguments, cwd, run=("-m", "maneuver_automaton")):
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=writes,
-        env={**os.environ, "COLUMNS": "140", "TERM": "xterm"},
+        env={**os.environ, "COLUMNS": "80", "TERM": "xterm"},
     )
     os.close(writes)
     seen = b""

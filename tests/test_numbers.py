@@ -215,6 +215,15 @@ def test_what_is_no_number_is_named(make, message):
         make()
 
 
+def of_a_fleet(**options):
+    """Cost of a fleet of one, planned with arguments as they are handed in."""
+    return ma.plan_fleet(ma.FleetProblem([FREE]), **{"max_rounds": 1} | options).cost
+
+
+def of_a_fleet_driven(**options):
+    return ma.simulate_fleet(ma.FleetProblem([FREE]), **{"step": 1, "steps": 2} | options).cost
+
+
 FREE = ma.Problem(robot(Plain()), [0, 0, 0], [3, 1, 0])
 PLANNER = ma.Planner(FREE.automaton)
 PLAN = ma.Plan([0, 0, 0], FREE.automaton.trims[1:3], durations=[1, 1])
@@ -239,6 +248,19 @@ ARGUMENTS: dict[str, tuple[Callable[[Any], Any], float]] = {
     "most": (lambda v: ma.design_library(FREE.automaton, most=v).factor, 9),
     "max_step_m": (lambda v: len(PLAN.sample(max_step_m=v).time), 1 / 2),
     "max_step_rad": (lambda v: len(PLAN.sample(max_step_rad=v).time), 1 / 2),
+    "limit of a fleet": (lambda v: of_a_fleet(time_limit=v), 60),
+    "orders": (lambda v: of_a_fleet(orders=v), 1),
+    "seed": (lambda v: of_a_fleet(seed=v), 1),
+    "max_rounds": (lambda v: of_a_fleet(max_rounds=v), 1),
+    "jobs of a fleet": (lambda v: of_a_fleet(jobs=v), 1),
+    "step of a fleet": (lambda v: of_a_fleet_driven(step=v), 1),
+    "steps of a fleet": (lambda v: of_a_fleet_driven(steps=v), 2),
+    "swaps_per_step": (lambda v: of_a_fleet_driven(swaps_per_step=v), 1),
+    "at_once": (lambda v: of_a_fleet_driven(at_once=v), 1),
+    "group_size": (lambda v: of_a_fleet_driven(group_size=v), 1),
+    "delay_steps": (lambda v: of_a_fleet_driven(delay_steps=v), 0),
+    "seed of its loop": (lambda v: of_a_fleet_driven(seed=v), 1),
+    "first_time_limit": (lambda v: of_a_fleet_driven(first_time_limit=v), 60),
     "horizon": (lambda v: analysis.continuous_index([1, 4], [1, 1], horizon=v, step=2), 4),
 }
 

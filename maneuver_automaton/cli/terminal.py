@@ -187,28 +187,21 @@ def counted(advance: Advance) -> Callable[[int, int], None]:
 def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> Iterator[None]:
     """A clock that runs while something is computed of which no one knows how long it takes.
 
-    What `more` says is shown beside it, and asked for again and again.
+    What `more` says takes the place of `what`, and is asked for again and again: one line.
     """
     if quiet or _shown or not has_terminal():
         yield
         return
     from rich.console import Console
-    from rich.progress import (
-        Progress,
-        ProgressColumn,
-        SpinnerColumn,
-        Task,
-        TextColumn,
-        TimeElapsedColumn,
-    )
+    from rich.progress import Progress, ProgressColumn, SpinnerColumn, Task, TimeElapsedColumn
     from rich.text import Text
 
     class More(ProgressColumn):
         def render(self, task: Task) -> Text:
-            return Text(more())
+            return Text(more() or task.description, no_wrap=True, overflow="ellipsis")
 
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), More())
-    clock = Progress(*columns, console=Console(stderr=True), transient=True)
+    shown = SpinnerColumn(), TimeElapsedColumn(), More()
+    clock = Progress(*shown, console=Console(stderr=True), transient=True)
     with _live(clock):
         clock.add_task(what, total=None)
         yield

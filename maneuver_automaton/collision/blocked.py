@@ -238,19 +238,19 @@ class Contact:
 
         place = pose[:2] - self.start[:2]
         near = within + max(float(np.hypot(*one.middle)) + one.reach for one in self.parts)
-        turned = SE2(np.array([0.0, 0.0, pose[2]]))
-        found = []
+        turn = SE2(np.array([0.0, 0.0, pose[2]]))
+        body = [(turn.act(ring), r) for ring, r in self.body]
+        found = []  # the areas are where the body overlaps
         for pieces, boxes in zip(self.solids, self.boxes, strict=True):
             gaps = np.maximum(np.maximum(boxes[:, :2] - place, place - boxes[:, 2:]), 0.0)
-            area = united(
-                [
-                    shapely.MultiPoint(
-                        (pieces[k][0][:, None] - turned.act(ring)).reshape(-1, 2)
-                    ).convex_hull.buffer(r + pieces[k][1])
-                    for k in np.flatnonzero(np.hypot(*gaps.T) <= near).tolist()
-                    for ring, r in self.body
-                ]
-            )  # where the body overlaps
+            close = [pieces[k] for k in np.flatnonzero(np.hypot(*gaps.T) <= near).tolist()]
+            hulls = [
+                shapely.multipoints((corners[:, None] - ring).reshape(-1, 2)).convex_hull
+                for corners, _ in close
+                for ring, _ in body
+            ]
+            rounding = np.add.outer([r for _, r in close], [r for _, r in body]).ravel()
+            area = united(shapely.buffer(np.array(hulls, dtype=object), rounding, quad_segs=16))
             point = shapely.Point(place)
             aside = within if area.is_empty else area.distance(point)
             found.append(aside or -float(shapely.distance(area.boundary, point)))

@@ -251,7 +251,7 @@ def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -
         if "steps" in document:
             plan = _road_drive(document, road)
         elif document["status"] == "found":
-            plan = plan_of_document(document)
+            plan = plan_of_document(document, road.vehicle.model)
     if plan is not None:
         _check_start(path, plan, road.vehicle.rear_of(road.scene.start.middle))
     return plan
@@ -275,8 +275,9 @@ def _alone(file: ResultFile) -> Recording:
 
 def _planned(file: ResultFile) -> Recording:
     """The plan of a plan.json in the world of its scenario."""
-    scenario, plan = file.scenario, load_plan(file.path)
+    scenario = file.scenario
     assert isinstance(scenario, Scenario)
+    plan = load_plan(file.path, model=scenario.problem.automaton.model)
     if file.document["automaton_hash"] != automaton_hash(scenario.problem.automaton):
         raise InvalidScenario(
             f"{file.path}: automaton_hash: this plan was made with another library than that of "

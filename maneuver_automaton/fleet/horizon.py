@@ -121,24 +121,6 @@ class FleetHorizon:
         workers: Workers | None = None,
         log: FleetLog | None = None,
     ) -> None:
-        for name, value in (("step", step), ("time_limit", time_limit)):
-            if not value > 0.0:
-                raise ValueError(f"fleet horizon: {name} must be positive, got {value} s")
-        if not margin >= 0.0:
-            raise ValueError(f"fleet horizon: margin must be at least 0, got {margin}")
-        if tube_m is not None and not 0.0 <= tube_m <= 0.5 * fleet.margin:
-            raise ValueError(
-                f"fleet horizon: tube_m is {tube_m:g} m, need at most half of the margin of the "
-                f"fleet, {fleet.margin:g} m: two bodies may both be off their plans"
-            )
-        counts = {"group_size": group_size, "swaps_per_step": swaps_per_step, "at_once": at_once}
-        for name, count in counts.items():
-            if count is not None and count < 1:
-                raise ValueError(f"fleet horizon: {name} must be at least 1, got {count}")
-        if delay_steps < 0:
-            raise ValueError(f"fleet horizon: delay_steps must be at least 0, got {delay_steps}")
-        vehicles = vehicles_of(fleet)
-        self.fleet = fleet
         settings = LoopSettings(
             step=step,
             margin=margin,
@@ -151,6 +133,23 @@ class FleetHorizon:
             delay_steps=delay_steps,
             workers=workers,
         )
+        for name in ("step", "time_limit"):
+            if not (value := getattr(settings, name)) > 0.0:
+                raise ValueError(f"fleet horizon: {name} must be positive, got {value} s")
+        if not settings.margin >= 0.0:
+            raise ValueError(f"fleet horizon: margin must be at least 0, got {margin}")
+        if not 0.0 <= settings.tube_m <= 0.5 * fleet.margin:
+            raise ValueError(
+                f"fleet horizon: tube_m is {settings.tube_m:g} m, need at most half of the margin "
+                f"of the fleet, {fleet.margin:g} m: two bodies may both be off their plans"
+            )
+        for name in ("group_size", "swaps_per_step", "at_once"):
+            if (count := getattr(settings, name)) is not None and count < 1:
+                raise ValueError(f"fleet horizon: {name} must be at least 1, got {count}")
+        if settings.delay_steps < 0:
+            raise ValueError(f"fleet horizon: delay_steps must be at least 0, got {delay_steps}")
+        vehicles = vehicles_of(fleet)
+        self.fleet = fleet
         knowledge = knowledge_of(fleet.names, lost, lambda k, one: len(self._now.near_to(k, one)))
         answers = {} if first is None else first.results
         plans = {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, plain_numbers
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.motion import Motion
@@ -56,6 +56,9 @@ class LoopSettings:
     group_size: int
     delay_steps: int
     workers: Workers | None
+
+    def __post_init__(self) -> None:
+        plain_numbers(self)
 
 
 @dataclass(slots=True, eq=False)

@@ -16,6 +16,7 @@ from typing import Literal
 
 import numpy as np
 
+from maneuver_automaton._arrays import as_number, as_whole
 from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
@@ -103,14 +104,16 @@ def plan_fleet(
     >>> result.status.value, result.clearance_m > 0.0
     ('found', True)
     """
+    time_limit, seed = as_number("time_limit", time_limit), as_whole("seed", seed)
+    orders, jobs = as_whole("orders", orders), as_whole("jobs", jobs)
+    max_rounds = None if max_rounds is None else as_whole("max_rounds", max_rounds)
     if not time_limit > 0.0:
         raise ValueError(f"time_limit must be positive, got {time_limit} s")
     if objective not in ("sum", "last"):
         raise ValueError(f"objective must be 'sum' or 'last', got {objective!r}")
-    if orders < 1:
-        raise ValueError(f"orders must be at least 1, got {orders}")
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, got {jobs}")
+    for name, count in (("orders", orders), ("jobs", jobs)):
+        if count < 1:
+            raise ValueError(f"{name} must be at least 1, got {count}")
     apart = jobs > 1 or scheduler is not None
     workers = gathered(jobs=jobs, scheduler=scheduler) if apart else nullcontext()
     with workers as run, patient():

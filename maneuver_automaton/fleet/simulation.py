@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array
+from maneuver_automaton._arrays import Array, as_number, as_whole
 from maneuver_automaton._interrupts import patient, stopped
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.fleet.agreement import Lost
@@ -120,6 +120,9 @@ def simulate_fleet(
     >>> log.reached, sorted(log.arrived_s), log.distance_m > 0.1, [*log.violations]
     (True, ['a', 'b'], True, [])
     """
+    steps, seed = as_whole("steps", steps), as_whole("seed", seed)
+    step = as_number("step", step)
+    first_time_limit = as_number("first_time_limit", first_time_limit)
     if steps < 1:
         raise ValueError(f"steps must be at least 1, got {steps}")
     for what, times in (("joins_s", joins_s), ("breaks_s", breaks_s)):

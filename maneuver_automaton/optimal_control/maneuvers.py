@@ -182,16 +182,18 @@ def transfer_program(
         ),
     )
     one = transcribe(problem, TimeGrid(n_nodes=steps + 1, rule="rk4", held=steps))
-    beyond = casadi.SX(0, 1)
-    if math.isfinite(lateral_limit(model)):
-        with numpy_on_symbols(casadi):  # with the control before and after each node
-            twists = [
-                model.velocity(casadi.vertsplit(z), casadi.vertsplit(one.inputs))[:3]
-                for z in (one.state[:, :-1], one.state[:, 1:])
-            ]
-        most = lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)
-        rows = [(v_x * v_x + v_y * v_y) * turn * turn / most - 1.0 for v_x, v_y, turn in twists]
-        beyond = casadi.vertcat(*map(casadi.vec, rows))
+
+    def too_fast(states: Any, control: Any) -> Any:  # rows that must not be positive
+        if not math.isfinite(lateral_limit(model)):
+            return casadi.SX(0, 1)
+        with numpy_on_symbols(casadi):
+            v_x, v_y, turn = model.velocity(casadi.vertsplit(states), casadi.vertsplit(control))[:3]
+        felt = (v_x * v_x + v_y * v_y) * turn * turn
+        return casadi.vec(felt / (lateral_limit(model) ** 2 * (1.0 - WITHIN_GRIP)) - 1.0)
+
+    # With the controls of both sides of a node; that before an interval is a state of its stage.
+    within = one.state[:, :-1], one.state[:, 1:-1]
+    beyond = casadi.vertcat(*(too_fast(states, one.inputs) for states in within))
     interval = casadi.Function("interval", [one.state, one.control, one.duration],
                                [one.objective, one.constraints, beyond])  # fmt: skip
     before, state, own = n_z + 1 + n_u, casadi.SX.sym, (steps - 1) * n_z
@@ -211,10 +213,10 @@ def transfer_program(
         if k == 0:
             g.append(casadi.vertcat(x[:n_z] - start, x[n_z + 1 :] - first))
         equality += [True] * (sum(row.numel() for row in g) - len(equality))
-        g.append(beyond)
-        equality += [False] * beyond.numel()
-    g.append(begins[-1][:n_z] - end)
-    equality += [True] * n_z
+        g.append(casadi.vertcat(beyond, too_fast(x[:n_z], x[n_z + 1 :])))
+        equality += [False] * g[-1].numel()
+    g += [begins[-1][:n_z] - end, too_fast(begins[-1][:n_z], begins[-1][n_z + 1 :])]
+    equality += [True] * n_z + [False] * g[-1].numel()
     cost += objective.smoothness * casadi.sumsqr((last - begins[-1][n_z + 1 :]) / casadi.DM(scale))
     stages = zip(begins, others, strict=False)
     x = casadi.vertcat(*(part for stage in stages for part in stage), begins[-1])

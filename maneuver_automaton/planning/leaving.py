@@ -6,6 +6,7 @@ nothing else.
 
 from __future__ import annotations
 
+import heapq
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -167,30 +168,35 @@ def _after(problem: Problem, first: Plan) -> Problem:
 
 
 def _ways_out(problem: Problem, contact: Contact, deadline: float) -> Iterator[_Way]:
-    """Ways out of one trim, the shortest first, then those of two."""
+    """Ways out of one trim, the shortest first, then those of two; none is driven on for longer."""
     trims: Sequence[Trim] = problem.automaton.trims
     begun: list[tuple[_Way, Array]] = [((0.0, (), ()), problem.start)]
     for _ in range(2):
-        best: dict[tuple[str, ...], _Way] = {}
-        middles = []
-        for (far, word, times), begin in begun:
-            if word and time.perf_counter() > deadline:
-                break
-            for trim in trims:
-                for n, (after, length, pose, clear) in enumerate(
-                    contact.coast(trim.body_velocity, begin, trim.max_duration)
-                ):
-                    longer = far + length, (*word, trim), (*times, after)
-                    if after < problem.horizon.min_coast:
-                        continue
-                    if clear:
-                        names = tuple(one.name for one in longer[1])
-                        best[names] = min(best.get(names, longer), longer, key=lambda one: one[0])
-                        break
-                    if n % EVERY == 0:
-                        middles.append((longer, pose))
-        costs = {n: problem.cost_of_trims(one[1], np.array(one[2])) for n, one in best.items()}
-        for names in sorted(best, key=lambda n: (round(best[n][0], 9), round(costs[n], 9))):
-            yield best[names]
+        coasts = [_coasts(problem, contact, one, trim) for one in begun for trim in trims]
+        middles, seen = [], set()
+        for _, way, n, pose, clear in heapq.merge(*coasts, key=lambda one: one[0]):
+            if len(way[1]) > 1 and time.perf_counter() > deadline:
+                return
+            names = tuple(one.name for one in way[1])
+            if not clear and n % EVERY == 0:
+                middles.append((way, pose))
+            if clear and names not in seen:
+                seen.add(names)
+                yield way
         trims = trims[:: -(-len(trims) // MOST_SECONDS)]
         begun = middles[:: max(-(-len(middles) // MOST_MIDDLES), 1)]
+
+
+def _coasts(
+    problem: Problem, contact: Contact, begun: tuple[_Way, Array], trim: Trim
+) -> Iterator[tuple[tuple[float, float], _Way, int, Array, bool]]:
+    """A trim driven on, until it is clear: length [m] and cost, the way, its number, its end."""
+    (far, word, times), begin = begun
+    coast = contact.coast(trim.body_velocity, begin, trim.max_duration)
+    for n, (after, length, pose, clear) in enumerate(coast):
+        if after >= problem.horizon.min_coast:
+            way = far + length, (*word, trim), (*times, after)
+            cost = problem.cost_of_trims(way[1], np.array(way[2]))
+            yield (round(way[0], 9), round(cost, 9)), way, n, pose, clear
+            if clear:
+                return

@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton.building import build_library
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.errors import InvalidAutomaton
 from maneuver_automaton.groups import SE2
@@ -216,7 +217,10 @@ def test_libraries_keep_the_limit(preset, seed):
         max_steering_rate=rng.uniform(0.2, 1.0),
         max_lateral_acceleration=rng.uniform(1.0, 5.0),
     )
-    library = preset_automaton(preset, model)
+    keeps_the_limit(preset_automaton(preset, model), model)
+
+
+def keeps_the_limit(library, model):
     assert library.maneuvers
     for maneuver in library.maneuvers:
         begin, end = maneuver.course.reduced_state[:-1], maneuver.course.reduced_state[1:]
@@ -224,6 +228,14 @@ def test_libraries_keep_the_limit(preset, seed):
             speed, steering = ((1.0 - share) * begin + share * end).T
             aside = speed**2 * np.abs(np.tan(steering)) / model.wheelbase
             assert aside.max() <= model.max_lateral_acceleration * (1.0 + 1e-9)
+
+
+def test_libraries_by_optimal_control_keep_the_limit():
+    model = replace(CAR, max_lateral_acceleration=3.0)
+    points = {"speed": [2.0, 5.0], "steering": [-0.2, 0.0, 0.2]}
+    built = build_library(model, trims_of(model, points).trims)
+    assert len(built.automaton.maneuvers) == 30  # of all pairs
+    keeps_the_limit(built.automaton, model)
 
 
 def test_trims_beyond_the_limit_are_refused_or_left_out():

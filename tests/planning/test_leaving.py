@@ -13,6 +13,7 @@ import shapely
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Motion, Obstacle
+from maneuver_automaton.collision.blocked import Contact
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus
 
@@ -70,6 +71,27 @@ def test_a_start_in_contact_is_left_backwards():
     assert result.terminal_error.position_m < 1e-9
     _, rest = driven(result.plan, left_after(result) + 1e-3)
     assert overlaps(problem, rest)[1].min() > 0.0
+
+
+def test_no_coast_is_driven_on_once_a_shorter_one_leads_out(monkeypatch):
+    driven_for = []
+    coast = Contact.coast
+
+    def counted(self, *arguments):
+        for one in coast(self, *arguments):
+            driven_for.append(one[1])
+            yield one
+
+    monkeypatch.setattr(Contact, "coast", counted)
+    controls = {"ahead": (1, 0), "back": (-1, 0), "out": (1, -1)}
+    robot = ma.Automaton.of_controls(ma.Unicycle(), controls)
+    problem = problem_of(  # along a wall of 40 m, on which it leads on ahead and back
+        ma.Box([0.3, 40.0]), start=(0.4, 0.0, np.pi / 2), footprint=ma.Disc(0.3)
+    )
+    problem = dataclasses.replace(problem, automaton=robot)
+    result = ma.plan(problem, leave=True)
+    assert result.plan.word[0] == "out"
+    assert max(driven_for) < 0.5  # [m]; out after 0.43
 
 
 @pytest.mark.parametrize(
