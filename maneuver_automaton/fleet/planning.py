@@ -187,6 +187,8 @@ class _FleetSearch:
         for how in AT_ONCE[1:]:
             self.whole += [(group, how) for group in groups if 2 <= len(group) <= MOST_OF[how]]
         rest = [k for group in groups for k in group if k not in self.held]
+        # Who does not switch at will holds a first plan, which nothing has improved yet.
+        self.whole += [((k,), "in turn") for k in rest if not self.vehicles[k].at_will]
         if not rest:
             self.order = sorted(able)
             return
@@ -267,7 +269,7 @@ class _FleetSearch:
         at_once = max(1, len(able) // VEHICLES_A_GROUP)
         while not self.budget.is_over and idle <= most_idle:
             left = at_once if max_rounds is None else max_rounds - self.rounds
-            tasks = self._groups(min(at_once, left), rng)
+            tasks = self._groups(min(at_once, left), rng, longer=2 * idle >= most_idle)
             idle += at_once - len(tasks)
             ways = unseen[: min(at_once, left - len(tasks) if max_rounds is not None else left)]
             del unseen[: len(ways)]
@@ -287,19 +289,22 @@ class _FleetSearch:
                 else:
                     idle += 1
 
-    def _groups(self, most: int, rng: np.random.Generator) -> list[PoolTask]:
+    def _groups(self, most: int, rng: np.random.Generator, *, longer: bool) -> list[PoolTask]:
         """Groups to plan anew, no vehicle twice."""
         tasks: list[PoolTask] = []
         busy: set[int] = set()
         for _ in range(most):
-            task = self._task(rng, busy)
+            task = self._task(rng, busy, longer=longer)
             if task is not None:
                 tasks.append(task)
                 busy.update(task.numbers)
         return tasks
 
-    def _task(self, rng: np.random.Generator, busy: set[int]) -> PoolTask | None:
-        """A group and how to plan it, unless that was asked of the same plans before."""
+    def _task(self, rng: np.random.Generator, busy: set[int], *, longer: bool) -> PoolTask | None:
+        """A group and how to plan it, unless that was asked of the same plans before.
+
+        Where the quick searches hardly gain any more, what was asked before is improved for longer.
+        """
         open_ = [row for row in self.whole if not busy & set(row[0])]
         first = next((row for row in open_ if self._lost(row[0]) > LOST_BY[row[1]]), None)
         if first is not None:
@@ -314,6 +319,9 @@ class _FleetSearch:
         if not suits or (how, *sorted(group), now) in self.asked:
             how = "in turn"
         asked = (how, *(group if how == "in turn" else sorted(group)), now)
+        if longer and asked in self.asked and any(self.vehicles[k].at_will for k in group):
+            how = "with time"  # their words were improved but at once
+            asked = (how, *group, now)
         if asked in self.asked:
             return None
         self.asked.add(asked)

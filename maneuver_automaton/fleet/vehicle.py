@@ -56,6 +56,7 @@ QUICK = 1500  # expansions in space and time at first ...
 LONG = 20_000  # ... and where nothing else helps
 AT_ONCE = WordSchedule(patience=Patience(attempts=0, passes=0))
 WITH_TIME = WordSchedule(patience=Patience(attempts=400, passes=2))
+PATIENT = WordSchedule(patience=Patience(attempts=1000, passes=4))
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
 MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
 LONGEST = 400_000  # expansions for a way alone
@@ -315,10 +316,11 @@ class FleetMember:
         most: int = QUICK,
         known: float = math.inf,
         again: bool = False,
+        schedule: WordSchedule = AT_ONCE,
     ) -> OwnPlan | None:
         """The cheapest way found past what the others do; None if there is none below a cost.
 
-        One that does not switch at will is improved if it is searched for `again`.
+        A word is improved by a `schedule`, any other plan if it is searched for `again`.
         """
         others = [standing_still(one) for one in self.beside(others)]
         if not others:
@@ -357,7 +359,7 @@ class FleetMember:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
-        best = words_of(query, budget=budget, schedule=AT_ONCE, known=best).to_the_end().word
+        best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
         if not best.cost < known:
             return None
         return self._word_found(query, best, aims)
