@@ -56,7 +56,6 @@ QUICK = 1500  # expansions in space and time at first ...
 LONG = 20_000  # ... and where nothing else helps
 AT_ONCE = WordSchedule(patience=Patience(attempts=0, passes=0))
 WITH_TIME = WordSchedule(patience=Patience(attempts=400, passes=2))
-PATIENT = WordSchedule(patience=Patience(attempts=1000, passes=4))
 NEARLY = 1.05  # times the way alone: what costs more is searched for in space and time as well
 MOST_AIMS = 2  # poses within the tolerance of a goal where another one stands
 LONGEST = 400_000  # expansions for a way alone

@@ -23,7 +23,7 @@ from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.vehicle import (
-    PATIENT,
+    WITH_TIME,
     FleetMember,
     OwnPlan,
     prepare_vehicles,
@@ -323,7 +323,7 @@ def done(turns: Turns, task: PoolTask) -> Done:
     if task.how == "in order":
         return Done(turns.one_after_another(numbers, held), turns.queries)
     if task.how == "with time":
-        turns = replace(turns, schedule=PATIENT)
+        turns = replace(turns, schedule=WITH_TIME)
     if task.how in ("in turn", "with time"):
         return Done(turns.anew(numbers, held), turns.queries)
     search = by_priorities if task.how == "by priorities" else by_conflicts
