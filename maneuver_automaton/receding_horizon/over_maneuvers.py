@@ -215,7 +215,7 @@ class OverManeuvers(StepSearch):
                 yield from self._evasions()
 
     def _nearer(self) -> Iterator[tuple[Plan, Decision]]:
-        """Drives to places on a plan that has just been lost, the furthest first, to stand there."""
+        """Ways to places on a plan that has just been lost, the furthest first, to stand there."""
         now, rest, automaton = self.now, self.now.rest, self.here.automaton
         lost = now.last is not None and now.last.decision.leads
         if rest is None or automaton.rest is None or not lost:
