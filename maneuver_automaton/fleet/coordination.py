@@ -38,16 +38,8 @@ from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import Meeting, meetings
-from maneuver_automaton.fleet.vehicle import (
-    AT_ONCE,
-    LONG,
-    QUICK,
-    FleetMember,
-    OwnPlan,
-    courses_of,
-)
+from maneuver_automaton.fleet.vehicle import LONG, QUICK, FleetMember, OwnPlan, courses_of
 from maneuver_automaton.problem import Goal
-from maneuver_automaton.refinement.improve import WordSchedule
 
 HeldPlans: TypeAlias = dict[int, OwnPlan]
 """Plans by the numbers of their vehicles."""
@@ -68,7 +60,7 @@ class Turns:
     vehicles: Sequence[FleetMember]
     margin: float  # [m] that any two bodies keep
     budget: Budget
-    schedule: WordSchedule = AT_ONCE  # of improving words
+    patiently: bool = False  # whether words are improved for longer
     queries: int = 0
 
     def one_after_another(self, order: Sequence[int], held: HeldPlans) -> HeldPlans:
@@ -128,7 +120,6 @@ class Turns:
         standing: Sequence[int],
         *,
         most: int = QUICK,
-        known: float = math.inf,
         again: bool = False,
         besides: Sequence[Obstacle] = (),
     ) -> OwnPlan | None:
@@ -139,9 +130,8 @@ class Turns:
             course = held[other].course if other in held else self.vehicles[other].standing
             others += course.obstacles
         others += besides
-        return self.vehicles[k].past(
-            others, self.budget, most=most, known=known, again=again, schedule=self.schedule
-        )
+        one = self.vehicles[k]
+        return one.past(others, self.budget, most=most, again=again, patiently=self.patiently)
 
 
 def by_priorities(

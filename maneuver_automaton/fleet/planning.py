@@ -20,10 +20,7 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.fleet.coordination import (
-    HeldPlans,
-    one_at_a_time,
-)
+from maneuver_automaton.fleet.coordination import HeldPlans, one_at_a_time
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -199,7 +196,9 @@ class _FleetSearch:
         # All the time there is for those that have no plan, in turn by both ways: orders are many
         # and quick, so ever more of them stand between two turns, however many processes there are.
         while len(best) < len(able) and not self.budget.is_over:
-            best = self._one_at_a_time(able, n_th, rng, best)
+            order = self._order_of(able, n_th, rng)
+            found = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
+            best = found if self._rank(found) < self._rank(best) else best
             if len(best) == len(able) or not (to_come or max_rounds is None):
                 break
             n_th += 1
@@ -211,14 +210,6 @@ class _FleetSearch:
         for k in able:
             if k not in best:
                 self.reasons[k] = self._who_is_in_the_way(k)
-
-    def _one_at_a_time(
-        self, able: Sequence[int], n_th: int, rng: np.random.Generator, best: HeldPlans
-    ) -> HeldPlans:
-        """Plans in which one drives at a time, in an order, if these are better."""
-        order = self._order_of(able, n_th, rng)
-        found = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
-        return found if self._rank(found) < self._rank(best) else best
 
     def _in_orders(
         self, drawn: Sequence[list[int]], until: Budget, best: HeldPlans | None = None

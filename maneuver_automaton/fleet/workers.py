@@ -22,13 +22,7 @@ from maneuver_automaton.fleet.coordination import HeldPlans, Turns, by_conflicts
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.vehicle import (
-    WITH_TIME,
-    FleetMember,
-    OwnPlan,
-    prepare_vehicles,
-    vehicles_of,
-)
+from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.words.word import Word
 
@@ -322,8 +316,7 @@ def done(turns: Turns, task: PoolTask) -> Done:
         return Done(None)
     if task.how == "in order":
         return Done(turns.one_after_another(numbers, held), turns.queries)
-    if task.how == "with time":
-        turns = replace(turns, schedule=WITH_TIME)
+    turns.patiently = task.how == "with time"
     if task.how in ("in turn", "with time"):
         return Done(turns.anew(numbers, held), turns.queries)
     search = by_priorities if task.how == "by priorities" else by_conflicts

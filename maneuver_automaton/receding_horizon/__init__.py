@@ -4,9 +4,7 @@ from maneuver_automaton.receding_horizon.candidates import within as within
 from maneuver_automaton.receding_horizon.controller import ManeuverHorizon as ManeuverHorizon
 from maneuver_automaton.receding_horizon.controller import RecedingHorizon as RecedingHorizon
 from maneuver_automaton.receding_horizon.failsafe import FailSafe as FailSafe
-from maneuver_automaton.receding_horizon.failsafe import (
-    search_fail_safe as search_fail_safe,
-)
+from maneuver_automaton.receding_horizon.failsafe import search_fail_safe as search_fail_safe
 from maneuver_automaton.receding_horizon.guarantees import Promises as Promises
 from maneuver_automaton.receding_horizon.guarantees import promises as promises
 from maneuver_automaton.receding_horizon.log import ClosedLoop as ClosedLoop
@@ -24,9 +22,7 @@ from maneuver_automaton.receding_horizon.unconstrained import FixedHorizon as Fi
 from maneuver_automaton.receding_horizon.unconstrained import HorizonPlan as HorizonPlan
 from maneuver_automaton.receding_horizon.unconstrained import HorizonSearch as HorizonSearch
 from maneuver_automaton.receding_horizon.unconstrained import MixedOrderCost as MixedOrderCost
-from maneuver_automaton.receding_horizon.unconstrained import (
-    UnconstrainedLoop as UnconstrainedLoop,
-)
+from maneuver_automaton.receding_horizon.unconstrained import UnconstrainedLoop as UnconstrainedLoop
 from maneuver_automaton.receding_horizon.unconstrained import (
     UnconstrainedProblem as UnconstrainedProblem,
 )

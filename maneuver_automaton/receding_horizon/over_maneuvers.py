@@ -200,10 +200,7 @@ class OverManeuvers(StepSearch):
         any case.
         """
         rest, here = self.now.rest, self.here
-        if here.moves:
-            yield from self.approaches()
-        else:
-            yield from self._nearer()
+        yield from self.approaches() if here.moves else self._nearer()
         motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
         kept = [plan for plan in motions if plan is not None and plan.trims]
         self.tried = [*kept]
@@ -221,14 +218,13 @@ class OverManeuvers(StepSearch):
         if rest is None or automaton.rest is None or not lost:
             return
         reach = self._contact(rest).contact - rest.start_time
-        for share in NEARER:
-            if share * reach > now.busy and not now.budget.is_over:
-                place = rest.pose_at(rest.start_time + share * reach)
-                still = Plan(place, (automaton.trims[automaton.rest],), durations=[0.0])
-                found = self.planned_anew(NEARER_SHARE, improve=False, then=still)
-                roundabout = found is None or found.plan.duration > ROUNDABOUT * reach
-                if found is not None and not roundabout and not self._hit(found.plan):
-                    yield found.plan, Decision.APPROACHED
+        for after in (share * reach for share in NEARER if share * reach > now.busy):
+            place, stands = rest.pose_at(rest.start_time + after), automaton.trims[automaton.rest]
+            still = Plan(place, (stands,), durations=[0.0])
+            found = self.planned_anew(NEARER_SHARE, improve=False, then=still)
+            direct = found is not None and found.plan.duration <= ROUNDABOUT * reach
+            if found is not None and direct and not self._hit(found.plan):
+                yield found.plan, Decision.APPROACHED
 
     def heedless(self, static: Problem) -> Plan | None:
         """A plan to the goal of the problem without what moves in it: the lattice's first."""
