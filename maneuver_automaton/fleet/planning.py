@@ -197,8 +197,8 @@ class _FleetSearch:
         # and quick, so ever more of them stand between two turns, however many processes there are.
         while len(best) < len(able) and not self.budget.is_over:
             order = self._order_of(able, n_th, rng)
-            found = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
-            best = found if self._rank(found) < self._rank(best) else best
+            by_turns = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
+            best = by_turns if self._rank(by_turns) < self._rank(best) else best
             if len(best) == len(able) or not (to_come or max_rounds is None):
                 break
             n_th += 1
