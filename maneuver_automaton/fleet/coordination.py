@@ -60,6 +60,7 @@ class Turns:
     vehicles: Sequence[FleetMember]
     margin: float  # [m] that any two bodies keep
     budget: Budget
+    patiently: bool = False  # whether words are improved for longer
     queries: int = 0
 
     def one_after_another(self, order: Sequence[int], held: HeldPlans) -> HeldPlans:
@@ -119,7 +120,6 @@ class Turns:
         standing: Sequence[int],
         *,
         most: int = QUICK,
-        known: float = math.inf,
         again: bool = False,
         besides: Sequence[Obstacle] = (),
     ) -> OwnPlan | None:
@@ -130,7 +130,8 @@ class Turns:
             course = held[other].course if other in held else self.vehicles[other].standing
             others += course.obstacles
         others += besides
-        return self.vehicles[k].past(others, self.budget, most=most, known=known, again=again)
+        one = self.vehicles[k]
+        return one.past(others, self.budget, most=most, again=again, patiently=self.patiently)
 
 
 def by_priorities(

@@ -21,10 +21,7 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.fleet.coordination import (
-    HeldPlans,
-    one_at_a_time,
-)
+from maneuver_automaton.fleet.coordination import HeldPlans, one_at_a_time
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -190,6 +187,8 @@ class _FleetSearch:
         for how in AT_ONCE[1:]:
             self.whole += [(group, how) for group in groups if 2 <= len(group) <= MOST_OF[how]]
         rest = [k for group in groups for k in group if k not in self.held]
+        # Who does not switch at will holds a first plan, which nothing has improved yet.
+        self.whole += [((k,), "in turn") for k in rest if not self.vehicles[k].at_will]
         if not rest:
             self.order = sorted(able)
             return
@@ -200,7 +199,9 @@ class _FleetSearch:
         # All the time there is for those that have no plan, in turn by both ways: orders are many
         # and quick, so ever more of them stand between two turns, however many processes there are.
         while len(best) < len(able) and not self.budget.is_over:
-            best = self._one_at_a_time(able, n_th, rng, best)
+            order = self._order_of(able, n_th, rng)
+            by_turns = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
+            best = by_turns if self._rank(by_turns) < self._rank(best) else best
             if len(best) == len(able) or not (to_come or max_rounds is None):
                 break
             n_th += 1
@@ -212,14 +213,6 @@ class _FleetSearch:
         for k in able:
             if k not in best:
                 self.reasons[k] = self._who_is_in_the_way(k)
-
-    def _one_at_a_time(
-        self, able: Sequence[int], n_th: int, rng: np.random.Generator, best: HeldPlans
-    ) -> HeldPlans:
-        """Plans in which one drives at a time, in an order, if these are better."""
-        order = self._order_of(able, n_th, rng)
-        found = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
-        return found if self._rank(found) < self._rank(best) else best
 
     def _in_orders(
         self, drawn: Sequence[list[int]], until: Budget, best: HeldPlans | None = None
@@ -270,7 +263,7 @@ class _FleetSearch:
         at_once = max(1, len(able) // VEHICLES_A_GROUP)
         while not self.budget.is_over and idle <= most_idle:
             left = at_once if max_rounds is None else max_rounds - self.rounds
-            tasks = self._groups(min(at_once, left), rng)
+            tasks = self._groups(min(at_once, left), rng, longer=2 * idle >= most_idle)
             idle += at_once - len(tasks)
             ways = unseen[: min(at_once, left - len(tasks) if max_rounds is not None else left)]
             del unseen[: len(ways)]
@@ -290,19 +283,22 @@ class _FleetSearch:
                 else:
                     idle += 1
 
-    def _groups(self, most: int, rng: np.random.Generator) -> list[PoolTask]:
+    def _groups(self, most: int, rng: np.random.Generator, *, longer: bool) -> list[PoolTask]:
         """Groups to plan anew, no vehicle twice."""
         tasks: list[PoolTask] = []
         busy: set[int] = set()
         for _ in range(most):
-            task = self._task(rng, busy)
+            task = self._task(rng, busy, longer=longer)
             if task is not None:
                 tasks.append(task)
                 busy.update(task.numbers)
         return tasks
 
-    def _task(self, rng: np.random.Generator, busy: set[int]) -> PoolTask | None:
-        """A group and how to plan it, unless that was asked of the same plans before."""
+    def _task(self, rng: np.random.Generator, busy: set[int], *, longer: bool) -> PoolTask | None:
+        """A group and how to plan it, unless that was asked of the same plans before.
+
+        Where the quick searches hardly gain any more, what was asked before is improved for longer.
+        """
         open_ = [row for row in self.whole if not busy & set(row[0])]
         first = next((row for row in open_ if self._lost(row[0]) > LOST_BY[row[1]]), None)
         if first is not None:
@@ -317,6 +313,9 @@ class _FleetSearch:
         if not suits or (how, *sorted(group), now) in self.asked:
             how = "in turn"
         asked = (how, *(group if how == "in turn" else sorted(group)), now)
+        if longer and asked in self.asked and any(self.vehicles[k].at_will for k in group):
+            how = "with time"  # their words were improved but at once
+            asked = (how, *group, now)
         if asked in self.asked:
             return None
         self.asked.add(asked)

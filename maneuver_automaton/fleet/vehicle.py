@@ -315,10 +315,11 @@ class FleetMember:
         most: int = QUICK,
         known: float = math.inf,
         again: bool = False,
+        patiently: bool = False,
     ) -> OwnPlan | None:
         """The cheapest way found past what the others do; None if there is none below a cost.
 
-        One that does not switch at will is improved if it is searched for `again`.
+        A word is improved for longer if `patiently`, any other plan if searched for `again`.
         """
         others = [standing_still(one) for one in self.beside(others)]
         if not others:
@@ -348,7 +349,10 @@ class FleetMember:
             past = replace(past, goals=goals)
             if goals != own.goals:
                 own, query = replace(own, goals=goals), self._query(replace(problem, goals=goals))
-            best = self._round_the_arrived(query, past, budget)
+            # round those that stay at their goals, wherever they are now, with rests
+            if blocked_ends(past) is None:
+                word = self._first(self._query(past), budget, QUICK).word
+                best = None if word is None else with_waits(query, word)
         if best is None or best.cost > NEARLY * self.ways[0].cost:
             word = self._first(query, budget, most).word
             if word is not None and word.cost < (best.cost if best else math.inf):
@@ -357,7 +361,8 @@ class FleetMember:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
-        best = words_of(query, budget=budget, schedule=AT_ONCE, known=best).to_the_end().word
+        schedule = WITH_TIME if patiently else AT_ONCE
+        best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
         if not best.cost < known:
             return None
         return self._word_found(query, best, aims)
@@ -472,13 +477,6 @@ class FleetMember:
                 rows = (aim for aim, is_free in zip(aims, free, strict=True) if is_free)
                 found += [(k, aim) for aim in itertools.islice(rows, MOST_AIMS)]
         return tuple(found)
-
-    def _round_the_arrived(self, query: LatticeQuery, past: Problem, budget: Budget) -> Word | None:
-        """A way round those that stay at their goals, wherever they are now, with rests."""
-        if blocked_ends(past) is not None:
-            return None
-        word = self._first(self._query(past), budget, QUICK).word
-        return None if word is None else with_waits(query, word)
 
     def _planned(self, problem: Problem, budget: Budget, *, improve: bool) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""

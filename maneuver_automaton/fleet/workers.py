@@ -280,9 +280,10 @@ class DaskWorkers:
 # -- a fleet's plans, in pieces of work
 
 How: TypeAlias = Literal[
-    "alone", "in order", "better alone", "in turn", "by priorities", "by conflicts"
+    "alone", "in order", "better alone", "in turn", "with time", "by priorities", "by conflicts"
 ]
-"""Ways of each by itself; plans in an order; better ways, or plans one after another or at once."""
+"""Ways of each by itself; plans in an order; better ways, or plans one after another, also improved
+for longer, or at once."""
 
 
 class PoolTask(NamedTuple):
@@ -315,7 +316,8 @@ def done(turns: Turns, task: PoolTask) -> Done:
         return Done(None)
     if task.how == "in order":
         return Done(turns.one_after_another(numbers, held), turns.queries)
-    if task.how == "in turn":
+    turns.patiently = task.how == "with time"
+    if task.how in ("in turn", "with time"):
         return Done(turns.anew(numbers, held), turns.queries)
     search = by_priorities if task.how == "by priorities" else by_conflicts
     return Done(search(turns, numbers, held, task.known), turns.queries)

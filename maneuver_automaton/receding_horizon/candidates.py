@@ -110,8 +110,13 @@ def preference(
     Source: the paper, Sec. 5.1.
     """
     known = one.origin is not Origin.SEARCHED
-    at_first = _cost_of_first(problem, one.plan, step)
-    return -float(f"{at_first:.9g}"), not known, len(one.plan.trims), one.plan.word
+    plan = one.plan
+    if plan.maneuvers or not plan.trims or problem.place_costs:
+        at_first = problem.cost_of(first_part(plan, step))
+    else:
+        times = first_times(plan.durations.tolist(), step)
+        at_first = problem.cost_of_trims(plan.trims[: len(times)], np.array(times))
+    return -float(f"{at_first:.9g}"), not known, len(plan.trims), plan.word
 
 
 def candidate(
@@ -161,14 +166,6 @@ def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | Non
     trims, times = merged(plan.trims[len(plan.trims) - len(left) :], left)
     whole = problem.cost_of(plan) if whole is None else whole
     return whole - problem.cost_of_trims(trims, np.array(times))
-
-
-def _cost_of_first(problem: Problem, plan: Plan, until: float) -> float:
-    """Cost of the first `until` seconds of a plan."""
-    if plan.maneuvers or not plan.trims or problem.place_costs:
-        return problem.cost_of(first_part(plan, until))
-    times = first_times(plan.durations.tolist(), until)
-    return problem.cost_of_trims(plan.trims[: len(times)], np.array(times))
 
 
 def is_rest_of(plan: Plan, rest: Plan | None) -> bool:
@@ -228,7 +225,9 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> StepPlan | No
         ]
         for one in sorted(found, key=lambda candidate: candidate.cost):
             plan, begin = one.plan, one.plan.start_time
-            if steps == 1 or _share(plan.pose_at(begin + settings.step), goal) <= MOST_USED:
+            away, turn = goal.off(plan.pose_at(begin + settings.step))
+            used = away / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT)
+            if steps == 1 or max(used) <= MOST_USED:  # of the tolerance, 1 at the edge of the set
                 samples = plan.sample(max_step_m=FINE, max_step_rad=FINE)
                 if all(within(pose, goal) for pose in samples.pose):
                     return one
@@ -237,9 +236,3 @@ def holding(here: Problem, settings: Settings, goal_index: int) -> StepPlan | No
             if second is None and all(within(pose, goal) for pose in poses):
                 second = one
     return second
-
-
-def _share(pose: Array, goal: Goal) -> float:
-    """How much of a goal's tolerance is used up at a pose, 1 at the edge of the set."""
-    distance, turn = goal.off(pose)
-    return max(distance / max(goal.tolerance_m, EXACT), turn / max(goal.tolerance_rad, EXACT))

@@ -40,11 +40,7 @@ from maneuver_automaton.receding_horizon.over_maneuvers import (
     with_trims_at_ends,
     within_its_margin,
 )
-from maneuver_automaton.receding_horizon.settings import (
-    Settings,
-    filling_rest,
-    switches_at_will,
-)
+from maneuver_automaton.receding_horizon.settings import Settings, filling_rest, switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import StepSearch
 from maneuver_automaton.search.choose import load_search as load_words

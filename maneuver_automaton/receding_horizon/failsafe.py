@@ -227,11 +227,7 @@ def _plan(
 
 
 def _coast(
-    word: list[Trim],
-    times: list[float],
-    between: list[Maneuver | None],
-    trim: Trim,
-    lasting: float,
+    word: list[Trim], times: list[float], between: list[Maneuver | None], trim: Trim, lasting: float
 ) -> None:
     """Append a coast to a word, or prolong its last one."""
     if word and word[-1].name == trim.name:

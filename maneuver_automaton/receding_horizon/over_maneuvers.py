@@ -26,7 +26,7 @@ from maneuver_automaton.receding_horizon.log import Decision, Origin
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on, rested
 from maneuver_automaton.receding_horizon.settings import switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
-from maneuver_automaton.receding_horizon.step_search import StepSearch
+from maneuver_automaton.receding_horizon.step_search import NEARLY, StepSearch
 from maneuver_automaton.refinement.fitting import fitted_plans
 from maneuver_automaton.refinement.improve import WordSchedule, words_of
 from maneuver_automaton.search.choose import search_insertion
@@ -39,6 +39,9 @@ FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
 PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
 OTHERS = 3  # costlier words that are tried where the cheapest ones are not free
+NEARER = (NEARLY, 0.8, 0.6, 0.4)  # of a lost plan as far as it is free, where one may stand
+NEARER_SHARE = 0.4  # of the time left for the way there, which takes at most ...
+ROUNDABOUT = 2.0  # times as long as the plan did
 HALVINGS = 10  # of a plan's duration, to find out when it is hit
 
 
@@ -115,12 +118,12 @@ class OverManeuvers(StepSearch):
             share = WORDS_SHARE
         guarded = bool(here.obstacles or here.zones) or bounded(here)
         found: list[StepPlan] = []
-        for index, goal in enumerate(problem.goals):
+        for index in open_goals(problem):
             if self.for_plans.is_over:
                 break
             words = search_insertion(
                 problem,
-                goal,
+                problem.goals[index],
                 budget=self.for_plans.part(share),
                 alternatives=OTHERS if guarded else 0,
                 upper_bound=upper - committed,
@@ -197,8 +200,7 @@ class OverManeuvers(StepSearch):
         any case.
         """
         rest, here = self.now.rest, self.here
-        if here.moves:
-            yield from self.approaches()
+        yield from self.approaches() if here.moves else self._nearer()
         motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
         kept = [plan for plan in motions if plan is not None and plan.trims]
         self.tried = [*kept]
@@ -208,6 +210,21 @@ class OverManeuvers(StepSearch):
                     yield plan, Decision.APPROACHED if moves_on(plan) else Decision.STOPPED
             if here.moves and until == self.until:
                 yield from self._evasions()
+
+    def _nearer(self) -> Iterator[tuple[Plan, Decision]]:
+        """Ways to places on a plan that has just been lost, the furthest first, to stand there."""
+        now, rest, automaton = self.now, self.now.rest, self.here.automaton
+        lost = now.last is not None and now.last.decision.leads
+        if rest is None or automaton.rest is None or not lost:
+            return
+        reach = self._contact(rest).contact - rest.start_time
+        for after in (share * reach for share in NEARER if share * reach > now.busy):
+            place, stands = rest.pose_at(rest.start_time + after), automaton.trims[automaton.rest]
+            still = Plan(place, (stands,), durations=[0.0])
+            found = self.planned_anew(NEARER_SHARE, improve=False, then=still)
+            direct = found is not None and found.plan.duration <= ROUNDABOUT * reach
+            if found is not None and direct and not self._hit(found.plan):
+                yield found.plan, Decision.APPROACHED
 
     def heedless(self, static: Problem) -> Plan | None:
         """A plan to the goal of the problem without what moves in it: the lattice's first."""

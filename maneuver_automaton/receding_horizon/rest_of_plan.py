@@ -294,9 +294,7 @@ def _in_time(
 def quickest(problem: Problem) -> Problem:
     """The problem in least time, without a limit of time."""
     return replace(
-        problem,
-        cost=Cost(time=1.0),
-        horizon=Horizon(max_trims=problem.horizon.max_trims),
+        problem, cost=Cost(time=1.0), horizon=Horizon(max_trims=problem.horizon.max_trims)
     )
 
 

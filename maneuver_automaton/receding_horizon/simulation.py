@@ -381,10 +381,7 @@ def _closed_loop(
             controller.last = applied[-1]
             then = applied[-1].number + 1
             now = controller.step(
-                track.poses[-1],
-                track.state,
-                obstacles=seen and seen(then),
-                passed=track.passed,
+                track.poses[-1], track.state, obstacles=seen and seen(then), passed=track.passed
             )[1]
             value = now.value
             controller.last = applied[-1]

@@ -203,7 +203,8 @@ def folder() -> Iterator[Path]:
             Path("x.yaml").write_text(SCENARIO)
             Path("loop.yaml").write_text(LOOP)
             Path("none.yaml").write_text(SCENARIO + "bounds_m: {x: [-0.5, 0.5]}\n")
-            Path("fleet.yaml").write_text(FLEET + "receding_horizon: {step_s: 0.5}\n")
+            fleet = FLEET.replace("time_limit_s: 1", "time_limit_s: 20")  # it ends before
+            Path("fleet.yaml").write_text(fleet + "receding_horizon: {step_s: 0.5}\n")
             Path("road.xml").write_text(ALONE)
             Path("two.xml").write_text(TOGETHER)
             Path("many").mkdir()

@@ -83,6 +83,31 @@ def test_undisturbed_the_first_plan_is_what_it_costs(problem):
     assert_nothing_interrupted(loop)
 
 
+@pytest.mark.parametrize(
+    ("automaton", "body", "far"),
+    [
+        (unicycle_automaton(), Disc(0.22), 6.0),
+        pytest.param(car_automaton(), Box([4.0, 1.8], [1.4, 0.0]), 40.0, marks=pytest.mark.slow),
+    ],
+    ids=["unicycle", "car"],
+)
+def test_it_comes_near_a_goal_that_becomes_occupied(automaton, body, far):
+    box = Obstacle(Box([0.6, 0.6], [far, 0.0]))
+    loop = simulate(
+        posed([far, 0.0, 0.0], automaton=automaton, footprint=body),
+        step=0.5,
+        steps=60,
+        obstacles=lambda number: [box] if number >= 4 else [],
+        time_limit=20.0,
+    )
+    assert "the goal is blocked" in loop.reason
+    off = far - loop.poses[:, 0]
+    front = 0.22 if isinstance(body, Disc) else 3.4
+    assert (np.diff(off) <= 1e-9).all()  # never away
+    assert 0.0 < off[-1] - 0.3 - front < 0.1 * far
+    assert loop.steps[-1].decision is Decision.STOPPED
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
 def test_disturbed_it_stays_feasible_and_interrupts_no_maneuver(seed):
