@@ -316,6 +316,9 @@ class Problem:
                 f"cost: {type(self.cost).__name__} has no hash; need a value that does not change, "
                 "such as a frozen dataclass"
             )
+        for name, kind in (("bounds", Bounds), ("horizon", Horizon), ("search", SearchSettings)):
+            if not isinstance(value := getattr(self, name), kind):
+                raise ValueError(f"{name}: got {value!r:.60}, need {kind.__name__}(...)")
         object.__setattr__(self, "goals", _as_goals(self.goals))
         self._settle_states()
         if self.automaton.translated is not None:

@@ -358,3 +358,9 @@ def test_every_parameter_is_documented():
     described = inspect.getdoc(Problem).split("Parameters\n")[1].split("Raises\n")[0]
     for name in inspect.signature(Problem).parameters:
         assert re.search(rf"^{name} : ", described, flags=re.MULTILINE), name
+
+
+@pytest.mark.parametrize("name", ["bounds", "horizon", "search"])
+def test_nothing_is_no_setting(name):
+    with pytest.raises(ValueError, match=rf"^{name}: got None, need \w+\(\.\.\.\)$"):
+        problem(**{name: None})
