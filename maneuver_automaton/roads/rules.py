@@ -350,10 +350,10 @@ def _met(
 
     begin, last = scene.start.time, scene.last_time
     every = [one for some in walls.values() for one in some]
-    times = sorted({begin, last, *(t for _, *ends in every for t in ends if begin < t < last)})
+    times = sorted({begin, *(t for _, *ends in every for t in ends if begin < t < last)})
     top = float(np.abs(vehicle.model.reduced_limits[0]).max())
     places, met = shapely.Point(scene.start.middle[:2]), [False for _ in scene.goals]
-    for low, high in itertools.pairwise(times):
+    for low, high in itertools.pairwise([*times, last]):
         around = shapely.buffer(places, TOUCHES + WIDER * min(top * (high - low), FAR))
         left = shapely.intersection(road, around)
         there = [wall for wall, since, until in every if since <= low and high <= until]

@@ -329,3 +329,9 @@ def test_a_goal_behind_is_told(tmp_path):
     assert road_planner(scene).hindrance == (
         "; the goal is 25 m behind the start, and no lanelets lead back to it"
     )
+
+
+def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
+    asked = problem(goal=goal(place(10.0, 2.0, 4.0), time=(0, 0)))
+    scene = scene_of(tmp_path, *LANES, phantom(5, (80, 4, 0, 120)), asked)
+    assert road_planner(scene).hopeless() is None
