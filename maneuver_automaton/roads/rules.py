@@ -187,6 +187,7 @@ PIECE = 1e-11  # [m, rad] of rounding that each piece of a motion adds to its en
 TOUCHES, FAR = 1e-3, 1e5  # [m] what is nearer is not apart, and what is further is not looked at
 WIDER = 1.01  # than a circle: shapely draws it as a polygon inside
 MOST_NAMES = 20  # of road users who are looked at one by one
+SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
 Wall: TypeAlias = tuple[
     Any, float, float
 ]  # a shapely geometry, and from when until when it is there
@@ -322,7 +323,10 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
     met, alone = _met(scene, vehicle, road, walls), dict[str, list[bool]]()
     if all(met):
         return ["" for _ in met]
-    empty = _met(scene, vehicle, road, {})
+    empty, whole = _met(scene, vehicle, road, {}), [False for _ in met]
+    if not all(empty):
+        grown = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), 0.5 * SEAM)
+        whole = _met(scene, vehicle, shapely.buffer(grown, -0.5 * (SEAM + vehicle.width)), {})
     if any(empty):
         alone = {
             name: _met(scene, vehicle, road, {k: v for k, v in walls.items() if k != name})
@@ -334,6 +338,8 @@ def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
         who = f"{' and '.join(names) or 'road users'} leave{'s' if len(names) == 1 else ''}"
         closed = f"{who} no way to it as wide as the vehicle until {goal.time[1]:.6g} s"
         narrow = f"no way to it is as wide as the vehicle, {vehicle.width:.3g} m"
+        if whole[k]:
+            narrow += f"; lanelets that are not stated to be neighbours are up to {SEAM:g} m apart"
         said.append("" if met[k] else closed if empty[k] else narrow)
     return said
 

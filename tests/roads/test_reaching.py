@@ -274,11 +274,18 @@ def test_who_leaves_a_way_shuts_nothing_off(tmp_path, parts):
     assert plan_road(scene, time_limit=LIMIT).plan is not None
 
 
-def test_a_road_that_is_cut_is_told(tmp_path):
-    lanes = (piece(1, 0, 60), piece(2, 70, 200))
+@pytest.mark.parametrize(
+    "cut, more",
+    [
+        (10.0, ""),
+        (4e-3, "; lanelets that are not stated to be neighbours are up to 0.01 m apart"),
+    ],
+)
+def test_a_road_that_is_cut_is_told(tmp_path, cut, more):
+    lanes = (piece(1, 0, 60), piece(2, 60 + cut, 200))
     scene = scene_of(tmp_path, *lanes, problem(goal=goal(place(150.0, 2.0, 20.0))))
     assert plan_road(scene).reason == (
-        "no goal can be reached: no way to it is as wide as the vehicle, 1.61 m"
+        "no goal can be reached: no way to it is as wide as the vehicle, 1.61 m" + more
     )
 
 
