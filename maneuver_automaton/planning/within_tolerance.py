@@ -74,8 +74,8 @@ class WithinTolerance(PlanningStep):
             results[k] = result
             for at, cost in result.improvements:
                 found.note(cost, at=at)
-            for plan in (result.plan, *(other.plan for other in result.alternatives)):
-                for index in () if plan is None else _goals_met(problem, plan):
+            for plan in filter(None, (result.plan, *(one.plan for one in result.alternatives))):
+                for index in _goals_met(problem, plan):
                     loose = _with_loose_ends(problem, plan, problem.goals[index], found.for_better)
                     if any(not found.may_check or found.offer(one, index) for one in loose):
                         break  # with the cheapest end that passes
