@@ -40,7 +40,7 @@ from maneuver_automaton.search.state_lattice import GraphSearch, graph_of
 
 FILES = ("field/nova04.json", "field/carina16.mprim", "sbpl/mprim/pr2.mprim")
 SPAN = 100  # cells from side to side of the room
-SEEDS = 6
+SEEDS = 8
 CALLS = 5
 
 
@@ -232,4 +232,4 @@ def main(files):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or [DATA / one for one in FILES if present(one)])
+    main([Path(one) for one in sys.argv[1:]] or [DATA / one for one in FILES if present(one)])

@@ -32,7 +32,10 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     out, and whoever has them must ask again.
     """
     reason, notes = outside(problem.start, problem.bounds), tuple[str, ...]()
-    sure = _surely_free(problem)
+    sure = [False] * (1 + len(problem.goals))  # proven free by the kernels, all in one call
+    if problem.obstacles and not (problem.parts or problem.start.size > 3 or problem.moves):
+        aside = ends_of(problem).clearances.tolist()
+        sure = [one > problem.margin + CLEARLY for one in aside]
     if reason:
         reason = f"the start is outside the bounds: {reason}"
     elif problem.obstacles and not sure[0]:
@@ -55,13 +58,6 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
             reason=reasons[0] if len(reasons) == 1 else many,
         )
     return None
-
-
-def _surely_free(problem: Problem) -> list[bool]:
-    """Whether the kernels prove the start and every goal (1 + n,) free, all in one call."""
-    if not problem.obstacles or problem.parts or problem.start.size > 3 or problem.moves:
-        return [False] * (1 + len(problem.goals))
-    return [one > problem.margin + CLEARLY for one in ends_of(problem).clearances.tolist()]
 
 
 def proven_free(problem: Problem, poses: Sequence[Array]) -> list[bool]:

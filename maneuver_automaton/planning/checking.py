@@ -28,7 +28,7 @@ from maneuver_automaton.models import Model, Unicycle
 from maneuver_automaton.places import Clearance
 from maneuver_automaton.planning.on_the_way import what_is_missed
 from maneuver_automaton.planning.result import Workspace, workspace_of
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.closed_form import may_drive
 from maneuver_automaton.primitives.primitive import Trajectory
 from maneuver_automaton.problem import Goal, Problem, moves
@@ -115,6 +115,10 @@ def check_plan(
             prices=tuple(one.price for one in prices),
             whole=problem.cost_of(plan) if prices else 0.0,
         )
+        ends = None  # reduced states in which a vehicle with inertia begins and ends
+        if not problem.automaton.is_kinematic:
+            last = problem.last_trim(replace(goal, pose=plan.end))
+            ends = problem.first_trim.reduced_state, last.reduced_state
         audit = audit_plan(
             plan,
             goal,
@@ -124,7 +128,7 @@ def check_plan(
             obstacles=problem.obstacles,
             body_height=problem.body_height,
             margin=problem.margin,
-            states=_end_states(problem, plan, goal),
+            states=ends,
             zones=problem.zones,
             places=places,
             via=problem.via,
@@ -369,14 +373,6 @@ def _rows_within_reach(
     return [slice(first, last) for first, last in runs.reshape(-1, 2).tolist() if last - first > 1]
 
 
-def _end_states(problem: Problem, plan: Plan, goal: Goal) -> tuple[Array, Array] | None:
-    """Reduced states in which a vehicle with inertia begins and ends."""
-    if problem.automaton.is_kinematic:
-        return None
-    last = problem.last_trim(replace(goal, pose=plan.end))
-    return problem.first_trim.reduced_state, last.reduced_state
-
-
 def _origin(goal: Goal) -> tuple[float, float]:
     return origin_near(goal.pose[:2])
 
@@ -426,16 +422,10 @@ def _first_forbidden(
             unknown = k
             break
         start = moving.switching_poses[k, :3]
-        for rows in _forbidden_rows(zone, own, model):
+        forbidden = np.r_[False, ~admitted_stretches(zone, own, model), False]
+        for first_row, end in np.flatnonzero(np.diff(forbidden)).reshape(-1, 2).tolist():
             numbers.append(k)
-            courses.append(Course(start, seen.course.pose[rows, :3]))
+            courses.append(Course(start, seen.course.pose[first_row : end + 1, :3]))
     entered = checker.courses_hit(courses)
     found = [first, unknown, None if entered is None else numbers[entered[0]]]
     return min((one for one in found if one is not None), default=None)
-
-
-def _forbidden_rows(zone: Zone, maneuver: Maneuver, model: Model) -> list[slice]:
-    """Runs of samples of a maneuver's course along which a zone does not admit it."""
-    forbidden = ~admitted_stretches(zone, maneuver, model)
-    runs = np.flatnonzero(np.diff(np.concatenate([[False], forbidden, [False]]).astype(np.int8)))
-    return [slice(first, last + 1) for first, last in runs.reshape(-1, 2).tolist()]

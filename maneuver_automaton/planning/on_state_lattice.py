@@ -8,10 +8,11 @@ from dataclasses import replace
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import POLISHED
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import blocked_ends, goals_off_lattice, why_off_lattice
 from maneuver_automaton.planning.incumbents import ROUNDING, Incumbents, PlanningStep
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
-from maneuver_automaton.problem import Problem
+from maneuver_automaton.problem import Problem, moves
 from maneuver_automaton.search.lattice import in_frame_of_problem
 from maneuver_automaton.search.lattice_task import WEIGHT
 from maneuver_automaton.search.result import plan_of
@@ -20,6 +21,7 @@ from maneuver_automaton.search.state_lattice import Graph, GraphSearch, graph_of
 ALONE = 32768  # expansions of the exact search until one that is greedy begins beside it
 GREEDY = 4  # times fewer expansions than the exact search has in its turn
 MOST_CHUNK = 1 << 20
+RELAXED_SHARE = 0.5  # of the time, where others search on if the cheapest path is refused
 MOST_WIDER = 2  # times that a window is widened where there is no plan
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
@@ -29,7 +31,8 @@ class OnStateLattice(PlanningStep):
 
     Every node within the tolerance of a goal is an aim. Obstacles are met where the body comes
     nearer than `MARGIN` to them, as in the checks of a plan. Of a library that has no such graph
-    nothing is offered.
+    nothing is offered. What moves, and limits of time, are left out of the graph: where its
+    cheapest plan meets them too, no other is cheaper; where it does not, others are searched for.
     """
 
     def prepare(self, problem: Problem, workspace: Workspace) -> bool:
@@ -37,7 +40,9 @@ class OnStateLattice(PlanningStep):
         load_kernels("lattice", "state lattice")
         if goals_off_lattice(problem) is not None:
             return True  # which is told without a search
-        return graph_of(problem, range(len(problem.goals)), workspace.prepared) is not None
+        lasting, goals = _lasting(problem), range(len(problem.goals))
+        graph = graph_of(lasting, goals, workspace.on(lasting.obstacles).prepared)
+        return graph is not None and lasting is problem
 
     def is_due(self, found: Incumbents) -> bool:
         """Always: what is blocked, and what there is no time for, is told."""
@@ -55,29 +60,48 @@ class OnStateLattice(PlanningStep):
         if not goals:
             ended.verdict, ended.is_complete = goals_off_lattice(problem), True
             return
-        graph = graph_of(problem, goals, found.workspace.prepared)
+        lasting = _lasting(problem)
+        graph = graph_of(lasting, goals, found.workspace.on(lasting.obstacles).prepared)
         if graph is None:
             return
-        found.likeness, ended.is_complete = POLISHED, True
+        found.likeness = POLISHED
         found.offer_nearly_met()
         found.counts.update(expansions=0, collision_queries=0)
         if problem.search.backwards:
             graph = graph.backwards() or graph
-        least, why, ended.nodes = _search(found, graph)
-        ended.why = why
+        relaxed = lasting is not problem
+        part = budget.stage(RELAXED_SHARE) if relaxed else budget
+        least, why, ended.nodes = _search(found, graph, part, relaxed)
+        ended.is_complete = not relaxed or why[0] is PlanStatus.UNREACHABLE
+        ended.why = why if ended.is_complete else None
         if not problem.search.improve:  # A* with a weight is off by that factor at most
             least /= problem.search.weight or WEIGHT
         if found.plans and budget.watch is not None and budget.watch.problem is problem:
             budget.watch.bound = max(budget.watch.bound, min(least, found.cost))
-        complete = why[0] is not PlanStatus.OUT_OF_BUDGET
+        complete = ended.is_complete and why[0] is not PlanStatus.OUT_OF_BUDGET
         ended.bound = LowerBound(value=least, kind="exhaustive" if complete else "open")
 
 
-def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, str], Array | None]:
-    """Search a lattice to the end; least cost of a plan, why there is none, nodes if asked for."""
+def _lasting(problem: Problem) -> Problem:
+    """The problem without what moves and without limits of time; itself if it has neither."""
+    horizon = replace(problem.horizon, max_time=None, stay=False)
+    timed = problem.horizon.max_time is not None or problem.horizon.stay
+    if not (problem.moves or timed):
+        return problem
+    still = tuple(one for one in problem.obstacles if not moves(one))
+    return replace(problem, obstacles=still, horizon=horizon)
+
+
+def _search(
+    found: Incumbents, graph: Graph, budget: Budget, relaxed: bool
+) -> tuple[float, tuple[PlanStatus, str], Array | None]:
+    """Search a lattice to the end; least cost of a plan, why there is none, nodes if asked for.
+
+    A `relaxed` graph leaves out conditions that its cheapest path may not meet.
+    """
     least, wider, why, nodes = math.inf, 0, (PlanStatus.UNREACHABLE, _NO_PATH), None
     while True:
-        exact = _best(found, graph)
+        exact = _best(found, graph, budget, relaxed)
         if found.problem.search.show_nodes:
             nodes = in_frame_of_problem(graph.query, exact.nodes)
         if exact.alive:  # the time, or the number of expansions, is over
@@ -85,13 +109,18 @@ def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, s
             late = found.why_unchecked or f"no plan within {spent}"
             return min(least, exact.least_open), (PlanStatus.OUT_OF_BUDGET, late), nodes
         least = min(least, exact.cost, found.cost)
-        if exact.cost < found.cost * (1.0 - ROUNDING) and graph.fine is not graph.coarse:
-            if found.budget.is_over:
+        refused = exact.cost < found.cost * (1.0 - ROUNDING)
+        if refused and (relaxed or graph.fine is not graph.coarse):
+            if relaxed or budget.is_over:
+                least = min(least, exact.cut)
                 return least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked), nodes
             graph = replace(graph, fine=graph.coarse)  # it was refused: keep away from obstacles
         elif exact.cut < min(found.cost, least) * (1.0 - ROUNDING):
-            if not found.plans and _is_closed(found, graph):
-                break
+            back = graph.backwards() if graph.lattice.sign > 0 and not found.plans else None
+            if back is not None:  # a search from the goals may come to its end within the window
+                one = _best(found, back, budget, relaxed)
+                if not one.alive and one.cut == one.cost == math.inf:
+                    break
             if not found.plans and wider == MOST_WIDER:
                 why = PlanStatus.NO_PLAN, "none in a window around all that stands, and no proof"
                 least = min(least, exact.cut)
@@ -104,9 +133,9 @@ def _search(found: Incumbents, graph: Graph) -> tuple[float, tuple[PlanStatus, s
     return least, why, nodes
 
 
-def _best(found: Incumbents, graph: Graph) -> GraphSearch:
+def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> GraphSearch:
     """A search for the cheapest path, with a greedy one beside it if there is no plan for long."""
-    budget, settings = found.budget, found.problem.search
+    settings = found.problem.search
     weight = settings.weight or WEIGHT
     exact = GraphSearch.of(graph, weight=1.0 if settings.improve else weight, budget=budget)
     chunk, turns = ALONE, [exact]
@@ -123,18 +152,11 @@ def _best(found: Incumbents, graph: Graph) -> GraphSearch:
             )
             if one.cost < found.cost and not one.alive:
                 word, goal = one.word()
-                found.note(one.cost)
-                found.offer(plan_of(found.problem, word), goal)
+                if not relaxed:
+                    found.note(one.cost)
+                if found.offer(plan_of(found.problem, word), goal, proven=not relaxed):
+                    found.note(one.cost)
         chunk = min(2 * chunk, MOST_CHUNK)
         if len(turns) == 1 and settings.improve and not found.plans:
             turns.append(GraphSearch.of(graph, weight=weight, budget=budget))
     return exact
-
-
-def _is_closed(found: Incumbents, graph: Graph) -> bool:
-    """Whether a search from the goals comes to its end within the window."""
-    back = graph.backwards() if graph.lattice.sign > 0 else None
-    if back is None:
-        return False
-    one = _best(found, back)
-    return not one.alive and one.cut == one.cost == math.inf

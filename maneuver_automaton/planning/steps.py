@@ -157,7 +157,7 @@ def search_steps(problem: Problem) -> Steps:
         steps.append(AlongPaths(polish))
     if linked and (not searched or (method == "auto" and _suits_words(problem))):
         steps.append(FreeWords())
-    on_nodes = bool(problem.place_costs) and automaton.lattice is not None and searched
+    on_nodes = automaton.lattice is not None and not automaton.body_velocities.any() and searched
     if only_maneuvers_turn(automaton) and not on_nodes:  # a sequence ends at a node by chance
         steps.append(TurnedByManeuvers())
     if linked and searched:

@@ -74,16 +74,18 @@ class WithinTolerance(PlanningStep):
             results[k] = result
             for at, cost in result.improvements:
                 found.note(cost, at=at)
-            for plan in (result.plan, *(other.plan for other in result.alternatives)):
-                if plan is not None:
-                    _offer_loosened(found, plan)
+            for plan in filter(None, (result.plan, *(one.plan for one in result.alternatives))):
+                for index in _goals_met(problem, plan):
+                    loose = _with_loose_ends(problem, plan, problem.goals[index], found.for_better)
+                    if any(not found.may_check or found.offer(one, index) for one in loose):
+                        break  # with the cheapest end that passes
         exact = results[0]
         if not found.plans:
             late = PlanStatus.OUT_OF_BUDGET, found.why_unchecked
             ended.why = late if late[1] else _why_none(problem, exact, found.why_refused, budget)
             return
         bound = exact.bound if exact.problem.goals == problem.goals else None
-        ended.bound, ended.nodes = bound or formula_bound(problem), exact.nodes
+        ended.bound, ended.nodes = ended.bound or bound or formula_bound(problem), exact.nodes
 
 
 def _questions(problem: Problem) -> Iterator[Problem]:
@@ -175,16 +177,6 @@ def _poses_within(
                 pose[places] += shift
                 pose[2] += angle
                 yield pose
-
-
-def _offer_loosened(found: Incumbents, plan: Plan) -> None:
-    """Offer the plan with the cheapest end within the tolerance, or its own, that passes."""
-    problem = found.problem
-    for index in _goals_met(problem, plan):
-        loose = _with_loose_ends(problem, plan, problem.goals[index], found.for_better)
-        for candidate in loose:
-            if not found.may_check or found.offer(candidate, index):
-                return
 
 
 def _with_loose_ends(problem: Problem, plan: Plan, goal: Goal, budget: Budget) -> list[Plan]:

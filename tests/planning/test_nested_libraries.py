@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.groups import SE2
+from tests.matrix.vehicles import VEHICLES
 from tests.planning.test_among_obstacles import assert_moved
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
 SAME = 1e-3  # of a cost: polishing ends in one optimum with steps of another size
+AMONG = 1e-2  # of a cost among obstacles, where plans are improved in small steps
+QUICK = ("unicycle", "dubins", "stage")
 SEARCH = ma.SearchSettings(max_expansions=2000)
 LONGEST = (pytest.mark.slow, pytest.mark.exhaustive)
 TURNS = ma.UserModel(
@@ -62,3 +66,34 @@ def test_what_turns_in_another_way_is_moved_with_its_problem():
     pytest.importorskip("casadi")
     here = problem(3, [10.77, -4.52, -0.48])
     assert assert_moved(here, SE2([30.0, -20.0, 2.5]))
+
+
+def without_a_third(vehicle):
+    """The library of a vehicle without a third of its trims; those at its ends stay."""
+    whole, drawn = vehicle.automaton, np.random.default_rng([6, 0])
+    ends = {vehicle.end_trim, vehicle.moving_trim}
+    ends |= {trim.name for trim in whole.trims if trim.is_rest}
+    spare = [name for name in drawn.permutation(whole.trim_names).tolist() if name not in ends]
+    kept = set(whole.trim_names) - set(spare[: max(1, len(spare) // 3)])
+    maneuvers = [one for one in whole.maneuvers if {one.source, one.target} <= kept]
+    trims = tuple(trim for trim in whole.trims if trim.name in kept)
+    return replace(whole, trims=trims, maneuvers=tuple(maneuvers))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in VEHICLES if n != "grid"],
+)
+def test_trims_beside_those_of_a_library_cost_nothing(name):
+    """By the same number of expansions, in free space and beside a box."""
+    vehicle = VEHICLES[name]
+    x, y = vehicle.goal[:2]
+    far = vehicle.reach
+    box = ma.Box([0.125 * far, 0.25 * far], [0.5 * x, 0.5 * y + 0.05 * far])
+    for within, more in ((SAME, {}), (AMONG, {"obstacles": [box]})):
+        whole = vehicle.problem(**more)
+        few = ma.plan(replace(whole, automaton=without_a_third(vehicle)), time_limit=120)
+        if few.plan is not None:
+            best = ma.plan(whole, time_limit=120)
+            assert best.plan is not None, best.reason
+            assert best.cost <= few.cost * (1.0 + within)

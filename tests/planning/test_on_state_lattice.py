@@ -15,14 +15,14 @@ from shapely.affinity import rotate, translate
 
 from maneuver_automaton._kept import Prepared
 from maneuver_automaton.budget import UNLIMITED
-from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.lattice import Lattice, Move, automaton_of_lattice
 from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.planner import Planner
-from maneuver_automaton.problem import Bounds, Goal, Problem, SearchSettings
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import state_lattice
 from maneuver_automaton.search.free_costs import FreeTable
 from tests.formats.outside import DATA, needs_data
@@ -239,6 +239,30 @@ def test_goals_a_quarter_turn_apart_share_a_table(looks_ahead, factor, tables):
         assert result.gap == 0.0
     graph = state_lattice.graph_of(result.problem, [0], planner.workspace.prepared)
     assert len(graph.tables) == tables
+
+
+@pytest.mark.parametrize("goal", [
+    Goal(pose=[3.0, 1.0, 0.3], free_heading=True),
+    Goal(pose=[3.1, 1.1, 0.2], tolerance_m=0.6, tolerance_rad=1.6),
+])  # fmt: skip
+def test_what_moves_aside_and_limits_of_time_leave_the_optimum_and_its_proof(goal):
+    wall = Box([0.4, 1.0], center=[1.5, 0.6])
+    still = Problem(library(), [0, 0, 0], goal, footprint=BODY, obstacles=wall, search=WORK)
+    least = plan(still, time_limit=60.0)
+    crossing = Motion([0.0, 9.0], [[-9.0, -3.0, 0.0], [9.0, -3.0, 0.0]])
+    others = [
+        replace(still, obstacles=[wall, Obstacle(Disc(0.3), motion=crossing)]),
+        replace(still, horizon=Horizon(max_time=least.plan.duration + 0.1)),
+        replace(still, horizon=Horizon(stay=True)),
+    ]
+    for problem in others:
+        result = plan(problem, time_limit=60.0)
+        assert (result.cost, result.bound.kind) == (pytest.approx(least.cost), "exhaustive")
+    waits = Motion([0.0, 3.0, 6.0], [[1.5, -0.6, 0.0], [1.5, -0.6, 0.0], [9.0, -9.0, 0.0]])
+    in_the_way = replace(still, obstacles=[wall, Obstacle(Disc(0.3), motion=waits)])
+    result = plan(in_the_way, time_limit=60.0)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert least.cost <= result.lower_bound + 1e-9 <= result.cost + 2e-9
 
 
 def test_a_table_holds_the_costs_of_plain_dijkstra():
