@@ -275,7 +275,7 @@ def test_who_leaves_a_way_shuts_nothing_off(tmp_path, parts):
 
 
 @pytest.mark.parametrize(
-    "cut, more",
+    ("cut", "more"),
     [
         (10.0, ""),
         (4e-3, "; lanelets that are not stated to be neighbours are up to 0.01 m apart"),
