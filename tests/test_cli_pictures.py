@@ -77,7 +77,7 @@ def test_nobody_draws_beside_another_program_or_on_one_processor(monkeypatch):
         with draughtsman(wanted=wanted) as one:
             assert one is None
     monkeypatch.setattr(pictures, "is_main_program", lambda: True)
-    monkeypatch.setattr(pictures, "_processors", lambda: 1)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {0})
     with draughtsman(wanted=True) as one:
         assert one is None
 

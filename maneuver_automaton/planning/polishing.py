@@ -428,7 +428,7 @@ def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
         return False
     known, goal_index = found.plans[0].plan, found.plans[0].goal_index
     price = polished_price(problem)
-    task = polish_task(problem, goal_index, price.places(known))
+    task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
     count, rows = _intervals()(known.duration), np.hstack([course.pose, course.reduced_state])
     passed, via, dof = passed_on_the_way(problem, known), list[NodeOnTheWay](), known.start.size
@@ -453,13 +453,18 @@ def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
     settings, work = PolishSettings(), iterations_within(budget)
     if work is not None:
         settings = replace(settings, max_iterations=min(work, settings.max_iterations))
-    motion = polish_through(
-        task, guess, via, stage_cost=price.stage_cost(known), settings=settings, budget=budget
-    )
+    stage_cost, before = price.stage_cost(known), found.cost
+    try:
+        motion = polish_through(
+            task, guess, via, stage_cost=stage_cost, settings=settings, budget=budget
+        )
+    except RuntimeError:  # the solver gave up on a number; the plan in hand stays
+        found.counts.update(solver_errors=1)
+        return False
     found.counts.update(polished=1)
-    return not isinstance(motion, str) and found.offer(
-        _plan_of(problem, goal_index, motion), goal_index
-    )
+    if not isinstance(motion, str):
+        found.offer(_plan_of(problem, goal_index, motion), goal_index)
+    return found.cost < before
 
 
 def _limit(most: float | None) -> float:

@@ -94,7 +94,7 @@ def fleet_loop() -> FleetLog:
     """Two that cross, pushed a little after every step."""
     noise = Disturbance(position_m=0.01, heading_rad=0.01)
     fleet = robots.crossing(tolerance=0.1, margin=0.2)
-    return simulate_fleet(fleet, step=0.5, steps=40, first_time_limit=1.0, disturbance=noise)
+    return simulate_fleet(fleet, step=0.5, steps=40, first_time_limit=20.0, disturbance=noise)
 
 
 @functools.cache
