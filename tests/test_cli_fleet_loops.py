@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from maneuver_automaton import fleet
-from maneuver_automaton.cli import run
+from maneuver_automaton.cli import fleets, run
 from maneuver_automaton.fleet import plan_fleet, simulate_fleet
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.groups import SE2
@@ -102,7 +101,7 @@ class TestMpc:
         """Bit for bit, from the same first plans: these go by the clock."""
         scenario = load_scenario("x.yaml")
         first = plan_fleet(scenario.fleet, time_limit=20.0, max_rounds=2)
-        monkeypatch.setattr(fleet, "plan_fleet", lambda *_, **__: first, raising=False)
+        monkeypatch.setattr(fleets, "plan_fleet", lambda *_, **__: first)
         assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--time-limit", "20"]) == 0
         written = load_fleet_loop("out/closed_loop.json", scenario.fleet)
         log = simulate_fleet(
@@ -125,7 +124,7 @@ class TestMpc:
         by = SE2(np.array([30.0, -20.0, 1.1]))
         first = plan_fleet(scenario.fleet, time_limit=20.0, max_rounds=2)
         monkeypatch.setattr(
-            fleet, "plan_fleet", lambda one, **_: plan_fleet(one, time_limit=20.0, max_rounds=2)
+            fleets, "plan_fleet", lambda one, **_: plan_fleet(one, time_limit=20.0, max_rounds=2)
         )
         text = to_yaml(scenario)
         Path("moved.yaml").write_text(_moved(scenario, by))
