@@ -85,6 +85,9 @@ class FleetProblem:
             raise ValueError("fleet: there is no vehicle, need at least one")
         numbered = tuple(str(k + 1) for k in range(n))
         object.__setattr__(self, "problems", tuple(self.problems))
+        for one in self.problems:
+            if not isinstance(one, Problem):
+                raise ValueError(f"fleet: got {one!r:.60}, need a Problem for each vehicle")
         object.__setattr__(self, "names", tuple(self.names) or numbered)
         object.__setattr__(self, "leaves", tuple(self.leaves) or (False,) * n)
         object.__setattr__(self, "priority", tuple(map(float, self.priority)) or (0.0,) * n)

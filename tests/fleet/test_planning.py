@@ -149,6 +149,11 @@ def test_bad_fleets_are_refused(change, message):
         FleetProblem(fleets.crossing().problems, **change)
 
 
+def test_a_fleet_is_of_problems():
+    with pytest.raises(ValueError, match="^fleet: got 'a', need a Problem for each vehicle$"):
+        FleetProblem({"a": fleets.swap(2).problems[0]})
+
+
 def test_times_of_vehicles_are_free():
     fixed = replace(fleets.crossing().problems[0], horizon=Horizon(time=20.0))
     with pytest.raises(ValueError, match="vehicle '1' has a fixed time"):
