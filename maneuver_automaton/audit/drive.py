@@ -79,6 +79,15 @@ class DrivenPlan:
         """Twists (m, dof) at shares of elements, (m,) each."""
         return values_at(SERIES @ self.twists[elements], shares)
 
+    def may_stand(self, elements: IntArray, shares: Array) -> NDArray[np.bool_]:
+        """Whether (m,) no control, if there may be none, is a rest at shares of elements."""
+        low, high = self.model.control_limits.T
+        if (low > 0.0).any() or (high < 0.0).any():
+            return np.zeros(shares.shape, dtype=np.bool_)
+        states = values_at(SERIES @ self.states[elements], shares)
+        none = np.zeros((shares.size, low.size))
+        return np.asarray(np.abs(self.model.body_velocity(states, none)).max(axis=1) == 0.0)
+
     def between_samples(self) -> tuple[Spans, IntArray]:
         """Stretches between the plan's own samples, and the number of the primitive of each."""
         of, begins = self.frames, self.frames.times[:-1]

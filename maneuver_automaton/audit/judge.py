@@ -254,8 +254,9 @@ def _missed_on_the_way(
         return element, np.clip(share, 0.0, 1.0)
 
     def rests(time: float) -> bool:
-        speeds = np.abs(drive.twists_at(*located(np.array([time]))))
-        return not drive.model.reduced_names or float(speeds.max()) <= AT_REST
+        at = located(np.array([time]))
+        stands = float(np.abs(drive.twists_at(*at)).max()) <= AT_REST
+        return not drive.model.reduced_names or stands or bool(drive.may_stand(*at).all())
 
     seen = [one.shifted(goal.pose[places]) for one in via]
     met = passages(seen, times, lambda at: frames.at(*located(at)), rests, in_order=in_order)

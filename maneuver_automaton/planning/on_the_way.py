@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.via import MET, Via, instants_met, passages
 
@@ -125,17 +126,16 @@ class _Seen:
     times: Array  # [s] between which it goes on smoothly
     pose_at: Callable[[Array], Array]
     rests: list[tuple[float, float]]  # [s] from when to when it stands
-    at_will: bool  # whether it may stop for no time
+    stops: list[tuple[float, float]]  # [s] from when to when it may stop for no time
     begin: float  # [s] of the world's clock
 
     def may_stop(self, time: float) -> bool:
-        """Whether the vehicle is at rest at a time."""
-        return self.at_will or self.standing(time) >= 0.0
+        """Whether the vehicle is at rest at a time, or may be for no time."""
+        return _since(self.stops, time) >= 0.0 or self.standing(time) >= 0.0
 
     def standing(self, time: float) -> float:
         """How long it stands from a time on [s]; less than 0 if it does not."""
-        ends = [last for first, last in self.rests if first - MET <= time <= last + MET]
-        return max(max(ends) - time, 0.0) if ends else -1.0
+        return _since(self.rests, time)
 
     def passing(self, number: int, via: Via, before: Passed | None, since: float) -> Passed | None:
         """How a pose on the way is passed from a time on, or what is known of it already."""
@@ -186,7 +186,7 @@ def _seen(problem: Problem, plan: Plan, ended: Array | None = None) -> _Seen:
         times=np.unique(np.concatenate([near.sample().time, near.switching_times])),
         pose_at=pose_at,
         rests=_rests(problem, near),
-        at_will=not problem.has_inertia,
+        stops=_stops(problem, near),
         begin=plan.start_time,
     )
 
@@ -207,19 +207,46 @@ def _times(problem: Problem, plan: Plan) -> list[float | None]:
 
 def _rests(problem: Problem, plan: Plan) -> list[tuple[float, float]]:
     """From when to when [s] a plan is in trims in which the vehicle stands, for no time too."""
-    found = list[tuple[float, float]]()
-    time, model = 0.0, problem.automaton.model
-    for k, (trim, lasting) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
+    found, model = list[tuple[float, float]](), problem.automaton.model
+    for trim, begin, end in _coasts(plan):
         if model.reduced_names:
             velocity = model.body_velocity(trim.reduced_state, trim.control)
             still = float(np.abs(velocity).max()) <= AT_REST
         else:
             still = trim.is_rest
-        if still and found and found[-1][1] == time:
-            found[-1] = found[-1][0], time + lasting
+        if still and found and found[-1][1] == begin:
+            found[-1] = found[-1][0], end
         elif still:
-            found.append((time, time + lasting))
+            found.append((begin, end))
+    return found
+
+
+def _stops(problem: Problem, plan: Plan) -> list[tuple[float, float]]:
+    """From when to when [s] a plan is in trims from which the vehicle switches to rest at will."""
+    if not problem.has_inertia:
+        return [(0.0, plan.duration)]
+    model, none = problem.automaton.model, np.zeros(len(problem.automaton.model.control_names))
+    low, high = model.control_limits.T
+    if (low > 0.0).any() or (high < 0.0).any():
+        return []
+    return [
+        (begin, end)
+        for trim, begin, end in _coasts(plan)
+        if not model.body_velocity(trim.reduced_state, none).any()
+    ]
+
+
+def _coasts(plan: Plan) -> Iterator[tuple[Trim, float, float]]:
+    """The trims of a plan, and from when to when [s] each is coasted in."""
+    time = 0.0
+    for k, (trim, lasting) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
+        yield trim, time, time + lasting
         time += lasting
         maneuver = plan.maneuvers[k] if k < len(plan.maneuvers) else None
         time += maneuver.duration if maneuver is not None else 0.0
-    return found
+
+
+def _since(spans: list[tuple[float, float]], time: float) -> float:
+    """How long a span goes on from a time on [s]; less than 0 if the time is in none."""
+    ends = [last for first, last in spans if first - MET <= time <= last + MET]
+    return max(max(ends) - time, 0.0) if ends else -1.0

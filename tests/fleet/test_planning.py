@@ -150,7 +150,7 @@ def test_bad_fleets_are_refused(change, message):
 
 
 def test_a_fleet_is_of_problems():
-    with pytest.raises(ValueError, match="^fleet: got 'a', need a Problem for each vehicle$"):
+    with pytest.raises(ValueError, match=r"^fleet: got 'a', need a Problem for each vehicle$"):
         FleetProblem({"a": fleets.swap(2).problems[0]})
 
 

@@ -1,5 +1,6 @@
 """Poses on the way beside every other condition: judged by `verify`, and by figures of its own."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton.groups import SE2
 from tests.inertia import CAR, resting
+from tests.matrix.scenes import base
+from tests.matrix.vehicles import VEHICLES
 from tests.planning.test_along_poses import ROBOT, START, dubins, planned
 
 GOAL, PAST = [8.0, 0.0, 0.0], ma.Via([4, 1, 0.2])
@@ -113,3 +116,11 @@ def test_with_inertia_it_passes_without_a_rest_and_rests_where_it_is_told_to(fre
     assert max(speeds) < 1e-6
     moved, _ = passing(SE2(np.array([400.0, -90.0, 2.0])))
     assert moved.cost == pytest.approx(found.cost, rel=1e-5)
+
+
+def test_a_trailer_whose_speed_is_a_control_stops_for_no_time():
+    one = base(VEHICLES["car_with_trailer"]).problem
+    via = ma.Via([3.7, 1.2, 0.2], stop=True)
+    result = ma.plan(replace(one, via=(via,), search=ma.SearchSettings(max_expansions=2000)))
+    assert [passed.number for passed in result.via] == [1]
+    assert ma.verify(result.problem, result.plan).passed
