@@ -20,7 +20,9 @@ def lazily(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]
     module = sys.modules[package]
     assert module.__spec__ is not None
     loader: Any = module.__spec__.loader
-    homes = {name: home for home, name in _IMPORT.findall(loader.get_source(package))}
+    if (source := loader.get_source(package)) is None:
+        raise ImportError(f"{package}: installed without its .py files, which say what it names")
+    homes = {name: home for home, name in _IMPORT.findall(source)}
 
     def get(name: str) -> Any:
         if name not in homes:

@@ -17,6 +17,7 @@ import enum
 import functools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -401,6 +402,36 @@ SHORT = 1e-3  # radii of the body: a step so short is not made shorter
 TIGHT = 2e-3  # radii of the body: pieces nearer than this are held back by their line
 
 
+@dataclass(slots=True, eq=False)
+class _Steps:
+    """How far a solve may lead, and the best so far where places have a price, told anew each time.
+
+    Far from the point about which it is told a place may cost more than was said.
+    """
+
+    shortest: float = 0.0  # [m] so short a step is not made shorter
+    trust: float = math.inf  # [m] from the point
+    before: float = math.inf  # objective at the point
+    finder: Solver | None = None  # that found the point
+    kept: Point | None = None  # the best whose lines held
+    least: float = math.inf  # its objective
+
+    def is_refused(self, solver: Solver, answer: SolverAnswer, far: float) -> bool:
+        """Whether it cost more with the same lines; of what costs more the next step is shorter."""
+        costs_more = answer.objective > self.before and far > self.shortest
+        if costs_more:
+            self.trust = 0.5 * far
+        refused = costs_more and solver is self.finder
+        self.finder = solver
+        return refused
+
+    def is_settled(self, found: Point, answer: SolverAnswer) -> bool:
+        """Whether another solve would gain little; keeps what lines held and costs least."""
+        if answer.objective < self.least:
+            self.kept, self.least = found, answer.objective
+        return answer.objective > (1.0 - SETTLED) * self.before
+
+
 def polish(
     model: Model,
     ends: MotionEnds,
@@ -463,11 +494,9 @@ def polish(
     price = PRICE * guess.duration / reach if elastic else math.inf
     best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
-    former: Solver | None = None  # that found the point
     needed = 0.0  # [s] to build a program that was not built
-    begin, trust, known = Begin.GUESS, near if scene.places else math.inf, None
-    kept: Point | None = None  # the best whose lines held, where places have a price
-    before, least = math.inf, math.inf  # objectives of the point and of that
+    begin, known = Begin.GUESS, None
+    steps = _Steps(SHORT * reach, near) if scene.places else _Steps()
     rounds = settings.rounds + (PLACE_ROUNDS if scene.places else 0)
     for _ in range(FIXED_ROUNDS if fixed_planes else rounds):
         if budget.is_over:
@@ -485,17 +514,13 @@ def polish(
             solver = built
         apart = apart.with_margins(program, point, fixed=fixed_planes)
         found, moved, known, answer = solve_from(
-            solver, program, point, apart, begin=begin, known=known, trust=trust
+            solver, program, point, apart, begin=begin, known=known, trust=steps.trust
         )
         far = float(np.abs(found.state[:, :2] - point.state[:, :2]).max())
         total = total.then(answer)
-        if scene.places and answer.objective > before and far > SHORT * reach:
-            # Places cost other than was said, or lines were added.
-            trust, known = 0.5 * far, None
-            if solver is former:
-                begin = Begin.NEARBY
-                continue
-        former = solver
+        if scene.places and steps.is_refused(solver, answer, far):
+            begin = Begin.NEARBY
+            continue
         if answer.is_feasible or not total.is_feasible:
             best = found
         if elastic or answer.status is not SolveStatus.SOLVED:
@@ -503,8 +528,10 @@ def polish(
         total = total._replace(status=SolveStatus.FAILED, reason="touches between nodes")
         missed = pairs_near(program, found, MISSED * reach)
         held_back = program.scene.movers and found.durations.sum() < QUICKER * point.durations.sum()
-        if trust > near and far > near and apart.lacks(missed):
-            trust = TRUST * near  # it went through what was not near: once more, in short steps
+        if steps.trust > near and far > near and apart.lacks(missed):
+            steps.trust = (
+                TRUST * near
+            )  # it went through what was not near: in short steps
             continue
         needs = held_near(program, found, MISSED * reach)
         if not all(np.isin(need, have).all() for have, need in zip(held, needs, strict=True)):
@@ -519,7 +546,7 @@ def polish(
             solver, begin = None, Begin.NEARBY
             continue
         point = found
-        if trust < near:
+        if steps.trust < near:
             missed = pairs_near(program, found, near)
         apart = moved.joined(program, point, missed)
         alike = apart is moved and (not scene.places or far < ALIKE * reach)
@@ -527,20 +554,18 @@ def polish(
         if apart is moved and not fixed_planes:
             apart = moved.split(program, point, TIGHT * reach)
         if apart is moved and moved.is_kept(program, point):
-            if scene.places and answer.objective < least:
-                kept, least = found, answer.objective
-            settled = not scene.places or answer.objective > (1.0 - SETTLED) * before
-            if settled and far < 0.99 * trust and not held_back:
+            settled = not scene.places or steps.is_settled(found, answer)
+            if settled and far < 0.99 * steps.trust and not held_back:
                 total = total._replace(status=answer.status, reason=answer.reason)
                 break
         else:
             apart = apart.faced(program, point)
-        before = answer.objective
+        steps.before = answer.objective
         if apart is not moved:
             solver, begin = None, Begin.NEARBY if begin is Begin.SAME else begin
-    if kept is not None:
-        best = kept
-        total = total._replace(status=SolveStatus.SOLVED, reason="settled", objective=least)
+    if steps.kept is not None:
+        best = steps.kept
+        total = total._replace(status=SolveStatus.SOLVED, reason="settled", objective=steps.least)
     return _polished(best, total, max(budget.elapsed - began, needed))
 
 

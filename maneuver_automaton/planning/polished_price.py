@@ -16,11 +16,7 @@ from maneuver_automaton.costs import Cost, StageCost, terms_of
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import (
-    LEAST_DURATION,
-    MOST_DURATION,
-    PlacesAt,
-)
+from maneuver_automaton.optimal_control.scene import LEAST_DURATION, MOST_DURATION, PlacesAt
 from maneuver_automaton.places import PER, rates_along
 from maneuver_automaton.problem import Problem
 

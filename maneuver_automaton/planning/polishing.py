@@ -25,12 +25,7 @@ from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import (
-    BodyPart,
-    Guard,
-    NodeOnTheWay,
-    PlacesAt,
-)
+from maneuver_automaton.optimal_control.scene import BodyPart, Guard, NodeOnTheWay, PlacesAt
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.on_the_way import passed_on_the_way
 from maneuver_automaton.planning.polished_price import (
@@ -42,7 +37,13 @@ from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem, moves
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
-from maneuver_automaton.refinement.guesses import PathGuesses, course_guess, path_guesses, timed
+from maneuver_automaton.refinement.guesses import (
+    PathGuesses,
+    course_guess,
+    guess_at,
+    path_guesses,
+    timed,
+)
 from maneuver_automaton.refinement.polish import (
     PolishedMotion,
     PolishResult,
@@ -430,26 +431,20 @@ def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
     price = polished_price(problem)
     task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
-    count, rows = _intervals()(known.duration), np.hstack([course.pose, course.reduced_state])
-    passed, via, dof = passed_on_the_way(problem, known), list[NodeOnTheWay](), known.start.size
-    times, nodes = [0.0], [0]
-    for one in passed:
-        times.append(one.time - known.start_time)
-        nodes.append(round(count * times[-1] / known.duration))
-        state = np.array([np.interp(times[-1], course.time, row) for row in rows.T])
-        asked = problem.via[one.number - 1]
+    passed, count = passed_on_the_way(problem, known), _intervals()(known.duration)
+    times = np.array([0.0, *(one.time - known.start_time for one in passed), known.duration])
+    nodes = np.round(count * times / known.duration).astype(int)
+    if np.diff(nodes).min() < 1:
+        return False
+    guess = guess_at(course, np.interp(np.arange(count + 1), nodes, times))
+    via, dof = list[NodeOnTheWay](), known.start.size
+    for one, node in zip(passed, nodes[1:-1].tolist(), strict=True):
+        state, asked = guess.state[node], problem.via[one.number - 1]
         pose = (one.pose if asked.radius > 0.0 else asked.pose).tolist()
         pose[2] = None if asked.free_heading else pose[2]
         free = (None,) * (len(state) - dof)
         seen = replace(task, goal=tuple(pose), goal_state=free).ends(float(state[2])).end
-        via.append((nodes[-1], (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
-    times, nodes = [*times, known.duration], [*nodes, count]
-    if min(np.diff(nodes)) < 1:
-        return False
-    at = np.interp(np.arange(count + 1), nodes, times)
-    state = np.stack([np.interp(at, course.time, row) for row in rows.T], axis=1)
-    which = np.clip(np.searchsorted(course.time, at[:-1], side="right") - 1, 0, len(rows) - 2)
-    guess = Guess(state=state, control=course.control[which], duration=known.duration)
+        via.append((node, (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
     settings, work = PolishSettings(), iterations_within(budget)
     if work is not None:
         settings = replace(settings, max_iterations=min(work, settings.max_iterations))

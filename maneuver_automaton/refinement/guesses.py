@@ -226,8 +226,13 @@ def _hitched(
 
 def course_guess(course: Trajectory, *, intervals: Step) -> Guess:
     """Guess from a motion that any model can make: an automaton's plan."""
+    lasting = float(course.time[-1] - course.time[0])
+    return guess_at(course, np.linspace(0.0, lasting, intervals(lasting) + 1))
+
+
+def guess_at(course: Trajectory, at: Array) -> Guess:
+    """Guess from a motion, with nodes at times (n,) [s] since it began."""
     time = course.time - course.time[0]
-    at = np.linspace(0.0, float(time[-1]), intervals(float(time[-1])) + 1)
     rows = np.hstack([course.pose, course.reduced_state])
     state = np.stack([np.interp(at, time, column) for column in rows.T], axis=1)
     which = np.clip(np.searchsorted(time, at[:-1], side="right") - 1, 0, len(time) - 2)

@@ -188,9 +188,7 @@ TOUCHES, FAR = 1e-3, 1e5  # [m] what is nearer is not apart, and what is further
 WIDER = 1.01  # than a circle: shapely draws it as a polygon inside
 MOST_NAMES = 20  # of road users who are looked at one by one
 SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
-Wall: TypeAlias = tuple[
-    Any, float, float
-]  # a shapely geometry, and from when until when it is there
+Wall: TypeAlias = tuple[Any, float, float]  # a shapely geometry, from when and until when [s]
 PER_RADIAN, PER_SPEED = 5.0, 1.0  # [m/rad], [s]: what counts as one metre when samples are compared
 
 
