@@ -529,9 +529,7 @@ def polish(
         missed = pairs_near(program, found, MISSED * reach)
         held_back = program.scene.movers and found.durations.sum() < QUICKER * point.durations.sum()
         if steps.trust > near and far > near and apart.lacks(missed):
-            steps.trust = (
-                TRUST * near
-            )  # it went through what was not near: in short steps
+            steps.trust = TRUST * near  # it went through what was not near: in short steps
             continue
         needs = held_near(program, found, MISSED * reach)
         if not all(np.isin(need, have).all() for have, need in zip(held, needs, strict=True)):
