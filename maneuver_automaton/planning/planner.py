@@ -45,7 +45,7 @@ class Planner:
     >>> controls = {"ahead": (1, 0), "left": (0, 1), "right": (0, -1)}
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> planner = Planner(robot, obstacles=[Box([1, 4], [3, 0])], footprint=Box([0.4, 0.4]))
-    >>> planner.plan([0, 0, 0], [6, 0, 0], time_limit=0.2).audit.passed
+    >>> planner.plan([0, 0, 0], [6, 0, 0], time_limit=2.0).audit.passed
     True
     >>> planner.with_obstacles([]).plan([0, 0, 0], [6, 0, 0]).plan.word
     ('ahead',)

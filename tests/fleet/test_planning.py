@@ -124,7 +124,7 @@ def test_random_fleets_keep_apart(seed):
 
 
 def test_improvements_only_improve():
-    result = plan_fleet(fleets.random_fleet(6, 11), time_limit=6.0, max_rounds=20)
+    result = plan_fleet(fleets.random_fleet(6, 11), time_limit=60.0, max_rounds=20)
     values = [value for _, value in result.improvements]
     assert values == sorted(values, reverse=True)
     assert result.cost == pytest.approx(values[-1])
@@ -271,10 +271,10 @@ def test_an_obstacle_of_its_own_may_pass_its_goal_later():
     """A plan alone is told to stay too, and its checks look at where it stays."""
     cart = Obstacle(Disc(0.4), motion=Motion([0.0, 12.0], [[4.0, -6.0, 0.0], [4.0, 6.0, 0.0]]))
     fleet = fleets.fleet_of([([0, 0, 0], [4, 0, 0])], obstacles=(cart,))
-    result = plan_fleet(fleet, time_limit=5.0, max_rounds=0)
+    result = plan_fleet(fleet, time_limit=60.0, max_rounds=0)
     assert result.status is FleetStatus.FOUND
     assert result.last_s > 6.0  # alone in the world it would be there after four seconds
-    too_soon = plan_fleet(fleets.fleet_of([([0, 0, 0], [4, 0, 0])]), time_limit=2.0, max_rounds=0)
+    too_soon = plan_fleet(fleets.fleet_of([([0, 0, 0], [4, 0, 0])]), time_limit=60.0, max_rounds=0)
     assert not verify_fleet(fleet, too_soon.plans).passed
     assert verify_fleet(fleet, result.plans).passed
 

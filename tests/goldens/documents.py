@@ -105,7 +105,7 @@ def all_cases() -> dict[str, Case]:
 
 def _cases() -> Iterator[tuple[str, Case]]:
     for name, (text, (command, *more)) in TEXTS.items():
-        limit = [] if "inertia" not in name else ["--time-limit", "1"]
+        limit = [] if "inertia" not in name else ["--time-limit", "5"]
         yield name, Case(arguments=[command, "x.yaml", *more, *limit], text=text, quick=True)
     for path in sorted(SCENARIOS.glob("*.yaml")):
         limit = ["--time-limit", LIMITS.get(path.stem, "3")]

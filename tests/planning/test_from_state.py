@@ -82,7 +82,7 @@ def test_moved_problem_has_the_moved_plan() -> None:
 def test_polished_is_no_costlier_and_keeps_its_ends() -> None:
     problem = problem_of("second_order_car")
     alone = ma.plan(problem, time_limit=5.0)
-    polished = ma.plan(replace(problem, search=ma.SearchSettings()), time_limit=1.0)
+    polished = ma.plan(replace(problem, search=ma.SearchSettings()), time_limit=10.0)
     assert polished.cost <= alone.cost * (1.0 + 1e-9)
     assert polished.audit.passed
 
