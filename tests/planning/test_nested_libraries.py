@@ -18,7 +18,7 @@ pytestmark = compiled_only
 SAME = 1e-3  # of a cost: polishing ends in one optimum with steps of another size
 AMONG = 1e-2  # of a cost among obstacles, where plans are improved in small steps
 QUICK = ("unicycle", "dubins", "stage")
-SEARCH = ma.SearchSettings(max_expansions=2000)
+SEARCH = ma.SearchSettings(max_expansions=300)
 LONGEST = (pytest.mark.slow, pytest.mark.exhaustive)
 TURNS = ma.UserModel(
     name="turns",
