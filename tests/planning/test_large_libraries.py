@@ -53,7 +53,7 @@ CASES = {
     "bounds": replace(BASE, bounds=Bounds(x=(-0.5, 5.0), y=(-0.5, 2.0)), margin=0.05),
 }
 
-LONGER = ("car", "switches cost", "two parts", "bounds")
+LONGER = ("car", "switches cost", "two parts", "bounds", "least times", "few trims")
 
 
 @functools.cache

@@ -60,6 +60,7 @@ def made(tmp_path_factory):
         (folder / "road.xml").write_text(ROAD)
         with pytest.MonkeyPatch.context() as patch:
             patch.chdir(folder)
+            patch.setattr(films, "MOST_FRAMES", 6)
             with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
                 assert run([command, "road.xml", "--animate", "--html"]) == 0
         return folder, out.getvalue(), err.getvalue()
