@@ -190,7 +190,7 @@ def test_a_broken_archive_is_told_by_its_name(export, tmp_path):
 
 
 @compiled_only
-@pytest.mark.parametrize("y", quick_are([3.5], [3.5, -1.0]))
+@pytest.mark.parametrize("y", quick_are([3.5], [3.5, -1.0], exhaustive=True))
 def test_the_car_of_a_file_changes_lanes(export, tmp_path, y):
     """By maneuvers that lead from a speed to itself, at 10 m/s: 12.28 s straight ahead."""
     text = (export / "primitives" / "left.xml").read_text()

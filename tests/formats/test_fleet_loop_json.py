@@ -98,6 +98,7 @@ def test_a_vehicle_is_written_as_one_alone(log):
             np.testing.assert_allclose(plan.end, one["steps"][-1]["pose"], atol=1e-9)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_vehicles_with_inertia_and_other_kinds(tmp_path):
     scenario = load_scenario(SCENARIOS / "fleets" / "airfield.yaml")

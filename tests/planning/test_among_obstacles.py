@@ -427,7 +427,7 @@ def plan_is_worth_it(problem):
     return blocked_ends(replace(problem, bounds=Bounds())) is None and bool(problem.obstacles)
 
 
-@pytest.mark.parametrize("part", quick_are([], range(4)))
+@pytest.mark.parametrize("part", quick_are([], range(4), exhaustive=True))
 def test_turned_and_shifted_a_little(part):
     rng = np.random.default_rng([1, part])
     plans = 0

@@ -178,6 +178,7 @@ def test_a_moved_problem_has_the_moved_plan():
     assert there.cost == pytest.approx(here.cost, abs=0.05)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_zones_hold_in_closed_loop():
     problem = posed(ALONG, Zone(shape=ACROSS, max_speed=0.5), search=SearchSettings())

@@ -102,6 +102,7 @@ def test_an_occupancy_map_and_a_moving_obstacle():
     assert clearance > 0.0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_zones_hold_in_space():
     zone = Zone(shape=Box([1.0, 3.0], [4.0, 0.3]), trims=("up", "left up"))

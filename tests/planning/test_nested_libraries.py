@@ -48,8 +48,8 @@ def problem(count: int, goal: list[float]) -> ma.Problem:
 @pytest.mark.parametrize(
     ("goal", "optimum", "counts"),
     [
-        ([10.77, -4.52, -0.48], 11.83, (3, 5)),
-        pytest.param([10.77, -4.52, -0.48], 11.83, (9,), marks=pytest.mark.slow),
+        ([10.77, -4.52, -0.48], 11.83, (3,)),
+        pytest.param([10.77, -4.52, -0.48], 11.83, (5, 9), marks=LONGEST),
         pytest.param([0.28, 10.81, -2.24], 21.951, (3, 5, 9), marks=LONGEST),
     ],
 )
@@ -82,7 +82,7 @@ def without_a_third(vehicle):
 
 @pytest.mark.parametrize(
     "name",
-    [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in VEHICLES if n != "grid"],
+    [n if n in QUICK else pytest.param(n, marks=LONGEST) for n in VEHICLES if n != "grid"],
 )
 def test_trims_beside_those_of_a_library_cost_nothing(name):
     """By the same number of expansions, in free space and beside a box."""

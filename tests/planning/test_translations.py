@@ -92,6 +92,7 @@ def test_a_boat_is_polished_though_its_heading_is_in_its_pose_and_in_its_state()
     assert anyhow.cost <= facing.cost * (1.0 + 1e-6)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_loop_of_a_boat_goes_on_within_a_maneuver():
     """When its plan turns depends on what is found in time, so it is stopped in the first turn."""

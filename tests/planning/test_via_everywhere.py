@@ -122,6 +122,8 @@ def test_with_inertia_it_passes_without_a_rest_and_rests_where_it_is_told_to(fre
 def test_a_trailer_whose_speed_is_a_control_stops_for_no_time():
     one = base(VEHICLES["car_with_trailer"]).problem
     via = ma.Via([3.7, 1.2, 0.2], stop=True)
-    result = ma.plan(replace(one, via=(via,), search=ma.SearchSettings(max_expansions=2000, improve=False)))
+    result = ma.plan(
+        replace(one, via=(via,), search=ma.SearchSettings(max_expansions=2000, improve=False))
+    )
     assert [passed.number for passed in result.via] == [1]
     assert ma.verify(result.problem, result.plan).passed

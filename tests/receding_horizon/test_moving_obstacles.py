@@ -57,6 +57,7 @@ class TestWaitingAndEvading:
         assert (total[1:] <= total[:-1] + 1e-8).all()
         assert loop.cost < 7.0
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_what_stands_on_the_goal_is_waited_for(self):
         loop = simulate(among(on_the_goal()), step=0.5, time_limit=0.3)

@@ -77,6 +77,7 @@ def test_the_value_falls_past_all_that_is_on_the_way():
     assert loop.passed[1].until - loop.passed[1].time == pytest.approx(1.5)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_moved_loop_is_the_loop_moved():
     by = ma.SE2([5.0, -3.0, 2.0])
@@ -134,16 +135,6 @@ def test_a_controller_alone_sees_what_it_passed():
     assert log.value == pytest.approx(3.5)
 
 
-@pytest.mark.slow
-def test_past_something_that_moves():
-    coming = ma.Obstacle(ma.Disc(0.6), motion=ma.Motion([0, 20], [[6, 4, 0], [6, -6, 0]]))
-    body = ma.Box([0.4, 0.3])
-    loop = judged(
-        ma.simulate(replace(PAST, obstacles=coming, footprint=body), step=1.0, time_limit=2.5)
-    )
-    assert loop.min_clearance_m > 0.0
-
-
 @pytest.mark.parametrize(
     ("disturbance", "said"),
     [
@@ -156,6 +147,7 @@ def test_what_meets_no_pose_is_refused(disturbance, said):
         ma.simulate(PAST, step=1.0, disturbance=disturbance)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_within_a_tolerance_a_vehicle_measured_wrongly_passes():
     via = ma.Via([4, 0], free_heading=True, tolerance_m=0.5)

@@ -249,6 +249,7 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
         assert [step.decision for step in loop.steps[1:]] == [Decision.KEPT] * (len(loop.steps) - 1)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
     """It looks at words itself: looked at before, they would take half of its time."""

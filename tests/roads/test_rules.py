@@ -177,7 +177,10 @@ def test_a_moved_scene_has_the_moved_drive(tmp_path):
     np.testing.assert_allclose(here.decision.states, there.decision.states, atol=1e-7)
 
 
-@pytest.mark.parametrize("move", [plan_roads, pytest.param(drive_roads, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "move",
+    [plan_roads, pytest.param(drive_roads, marks=[pytest.mark.slow, pytest.mark.exhaustive])],
+)
 def test_several_vehicles_obey_each_for_itself(tmp_path, move):
     lights = light(8, ("red", 40), ("green", 1000))
     first, second = (

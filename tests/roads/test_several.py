@@ -203,7 +203,7 @@ class TestLoop:
         assert several.reached
         assert several.results["100"].driven.duration == alone.driven.duration
 
-    @pytest.mark.parametrize("seed", quick_are([1], range(4)))
+    @pytest.mark.parametrize("seed", quick_are([1], range(4), exhaustive=True))
     def test_who_has_a_plan_at_first_reaches_its_goal(self, folder, seed):
         rng, starts = np.random.default_rng(seed), []
         for k in range(4):

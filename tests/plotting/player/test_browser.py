@@ -177,6 +177,7 @@ def _has_layers(page):
     ]  # fmt: skip
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "limit"),
