@@ -206,7 +206,8 @@ def test_the_car_of_a_file_changes_lanes(export, tmp_path, y):
         "schema: 1\nvehicle: {model: accelerating_car, wheelbase_m: 2.5, max_steering_rad: 0.5,\n"
         "  max_speed_m_s: 12, min_speed_m_s: 0, max_acceleration_m_s2: 4}\n"
         "automaton: {file: car.zip}\nstart: {pose: [0, 0, 0], trim: speed 10}\n"
-        f"goal: {{pose: [122.8, {y}, 0], trim: speed 10}}\nsearch: {{polish: false, max_expansions: 500}}\n"
+        f"goal: {{pose: [122.8, {y}, 0], trim: speed 10}}\n"
+        "search: {polish: false, max_expansions: 500}\n"
     )
     problem = load_scenario(file).problem
     result = plan(problem, time_limit=60.0)

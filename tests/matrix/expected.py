@@ -128,21 +128,20 @@ def _long() -> Iterator[tuple[str, str]]:
 
 QUICK = frozenset(_quick())
 LONG = frozenset(_long())  # with -m slow; all that is in neither takes longest, -m exhaustive
-SLOW_MUTANTS = dict.fromkeys(
-    (
-        "alternatives_among_obstacles",
-        "clearance",
-        "heights",
-        "max_time_among_obstacles",
-        "loop_clearance",
-        "moved_problem_among_obstacles",
-        "moving_ends",
-        "no_steering_at_rest",
-        "off_library_start",
-        "planner_with_all",
-        "polishing",
-        "polishing_past_movers",
-        "same_plan_twice_among_obstacles",
-    ),
-    [pytest.mark.slow],
-) | {"carried_parts": [pytest.mark.slow, pytest.mark.exhaustive]}
+_MUTANTS = (
+    "alternatives_among_obstacles",
+    "clearance",
+    "heights",
+    "max_time_among_obstacles",
+    "loop_clearance",
+    "moved_problem_among_obstacles",
+    "moving_ends",
+    "no_steering_at_rest",
+    "off_library_start",
+    "planner_with_all",
+    "polishing",
+    "polishing_past_movers",
+    "same_plan_twice_among_obstacles",
+)
+SLOW_MUTANTS = {name: [pytest.mark.slow] for name in _MUTANTS}
+SLOW_MUTANTS["carried_parts"] = [pytest.mark.slow, pytest.mark.exhaustive]
