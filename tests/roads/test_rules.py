@@ -126,6 +126,7 @@ def test_a_limit_holds_from_its_lanelet_on(tmp_path, drive):
     assert speed[middle[:, 0] > 90.0].max() < 8.05
 
 
+@pytest.mark.slow
 def test_a_limit_that_the_goal_does_not_allow_is_told(tmp_path):
     one = piece(1, 0, 200, "<speedLimit>8</speedLimit>")
     scene = scene_of(tmp_path, one, problem(goal=place(130.0, 100), speed=8.0))
