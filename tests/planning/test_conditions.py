@@ -124,24 +124,6 @@ def test_unreachable_is_said_with_a_proof_only():
     assert plan(far, time_limit=LIMIT).status is PlanStatus.UNREACHABLE
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_large_library_keeps_a_least_coasting_time():
-    free = Problem(GRID, [0, 0, 0], [3, 1, 0.5], horizon=Horizon(max_trims=3))
-    longer = replace(free, horizon=Horizon(max_trims=3, min_coast=0.3))
-    result = plan(longer, time_limit=LIMIT)
-    assert result.status is PlanStatus.FOUND
-    assert result.plan.durations.min() >= 0.3 - 1e-9
-    assert result.cost > plan(free, time_limit=LIMIT).cost
-    effort = replace(longer, cost=Cost(effort=1.0))
-    slow = plan(effort, time_limit=LIMIT)
-    limit = 0.7 * slow.plan.duration
-    hurry = replace(effort, horizon=Horizon(max_trims=3, min_coast=0.3, max_time=limit))
-    quick = plan(hurry, time_limit=LIMIT)
-    assert quick.plan.duration <= limit + 1e-9
-    assert quick.cost > slow.cost
-
-
 def test_no_first_plan_has_no_time():
     result = plan(replace(TO_FIVE, horizon=Horizon(max_time=4.0)), time_limit=LIMIT)
     assert result.plan is None

@@ -122,20 +122,6 @@ def test_a_moved_problem_has_the_moved_plan(name):
     assert assert_moved(CASES[name], SE2([3.0, -2.0, 0.7]))
 
 
-@pytest.mark.parametrize(
-    "name", quick_are(["mixed"], ["mixed", "effort in a fixed time"], exhaustive=True)
-)
-def test_the_same_expansions_find_the_same_plan(name):
-    again = plan(CASES[name], time_limit=LIMIT)
-    assert again.plan.word == planned(name).plan.word
-    np.testing.assert_array_equal(again.plan.durations, planned(name).plan.durations)
-
-
-def test_a_short_time_limit_gets_less_far_and_no_worse():
-    first = plan(replace(BASE, search=replace(SEARCH, improve=False)), time_limit=LIMIT)
-    assert planned("mixed").cost < first.cost
-
-
 def test_alternatives_and_moving_obstacles():
     """Words of all trims stay out of searches that know only a few."""
     result = plan(BASE, time_limit=LIMIT, alternatives=2)

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.groups import SE2
 from tests.matrix.vehicles import VEHICLES
-from tests.planning.test_among_obstacles import assert_moved
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -58,14 +56,6 @@ def test_turns_of_few_curvatures_are_polished_to_those_of_many(goal, optimum, co
     pytest.importorskip("casadi")
     costs = [ma.plan(problem(count, goal), time_limit=60).cost for count in counts]
     assert costs == pytest.approx([optimum] * len(counts), rel=SAME)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_what_turns_in_another_way_is_moved_with_its_problem():
-    pytest.importorskip("casadi")
-    here = problem(3, [10.77, -4.52, -0.48])
-    assert assert_moved(here, SE2([30.0, -20.0, 2.5]))
 
 
 def without_a_third(vehicle):
