@@ -28,7 +28,6 @@ LOOP = (
     .replace("time_limit_s: 1}", "time_limit_s: 0.5}")
     + "receding_horizon: {step_s: 0.5, disturbance: {position_m: 0.003, seed: 3}}\n"
 )
-STARTED = "receding_horizon: {step_s: 0.5"
 
 
 @pytest.fixture

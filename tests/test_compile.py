@@ -269,7 +269,7 @@ numba._dynfunc = types.SimpleNamespace(make_function=lambda *parts: 1)
 }
 
 
-@pytest.mark.parametrize("kind", quick_are(["a part has another name"], UNKNOWN_NUMBA))
+@pytest.mark.parametrize("kind", quick_are([], UNKNOWN_NUMBA))
 def test_a_numba_with_unknown_insides_compiles_as_it_does(example, kind):
     code, said = UNKNOWN_NUMBA[kind]
     first, complaint = told(code + CALL, example, NUMBA_CACHE_DIR=example / "cache")

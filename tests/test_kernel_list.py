@@ -234,6 +234,7 @@ print(own.inspect_asm(own.signatures[0]).count("ymm"), type(own._cache).__name__
 """
 
 
+@pytest.mark.slow
 def test_numba_functions_of_a_user_are_compiled_as_without_the_package():
     answers = {
         subprocess.run(

@@ -183,15 +183,14 @@ def test_a_moved_problem_has_a_moved_plan():
 
 
 def test_plans_say_what_they_cost_and_where():
-    work = SearchSettings(max_expansions=200)
+    work = SearchSettings(max_expansions=200, improve=False)
     here = problem(Clearance(2.0, 1.0), Ground(LAWN, 2.0), search=work)
     result = plan(here, time_limit=60.0)
     assert result.audit.passed
     assert result.certificate is None
     assert result.cost == pytest.approx(here.cost_of(result.plan))
-    assert result.cost <= here.cost_of(
-        plan(replace(here, place_costs=()), time_limit=60.0).plan
-    ) * (1 + 1e-9)
+    without = plan(replace(here, place_costs=()), time_limit=60.0)
+    assert result.cost <= here.cost_of(without.plan) * (1 + 1e-9)
     assert result.audit.place_price == pytest.approx(
         result.cost - here.invariant_cost_of(result.plan), abs=1e-3 * result.cost
     )
@@ -204,28 +203,18 @@ def test_plans_say_what_they_cost_and_where():
         parts["invariant"] + sum(one["price"] for one in parts["places"])
     )
     assert "place_price" in document["audit"]
-    plain = plan_to_dict(plan(replace(here, place_costs=()), time_limit=60.0))
+    plain = plan_to_dict(without)
     assert "cost_parts" not in plain
     assert "place_price" not in plain["audit"]
     planner = Planner(CAR, obstacles=WALLS, footprint=BODY, place_costs=Clearance(2.0, 1.0))
     assert planner.problem([0, 0, 0], [18, 0.5, 0]).place_costs == planner.place_costs
 
 
-def test_a_car_keeps_to_the_middle():
-    here = load_scenario("scenarios/clearance_corridor.yaml").problem
-    here = replace(here, search=replace(here.search, max_expansions=8000))
-    result = plan(here, time_limit=60.0)
-    poses = result.plan.sample().pose
-    first = poses[(poses[:, 0] > 6.0) & (poses[:, 0] < 9.0)]
-    assert np.abs(first[:, 1]).max() < 0.1
-    without = plan(replace(here, place_costs=()), time_limit=60.0)
-    assert result.cost < here.cost_of(without.plan)
-    assert result.audit.min_clearance_m > without.audit.min_clearance_m
-
-
+@pytest.mark.slow
 def test_the_way_leads_round_ground_that_has_a_price():
     """Straight across it costs 31, round both pieces 20.4 along cells: which leads the search."""
     here = load_scenario("scenarios/priced_ground.yaml").problem
+    here = replace(here, search=replace(here.search, max_expansions=100))
     result = plan(here, time_limit=60.0)
     assert result.cost < 21.5
     way = shapely.LineString(result.plan.sample().pose[:, :2])

@@ -26,12 +26,14 @@ NEED_MORE = {
     "two_trailers": 12_000,
 }
 COSTLY = {  # seconds to improve them so far: the first plan is looked at
+    "clearance_corridor",
     "helicopter_city",
     "hovercraft",
     "lane_change",
     "narrow_corridor",
     "off_the_library",
     "omnidirectional",
+    "priced_ground",
     "robot_with_inertia",
     "through_poses",
     "tpcap_full",

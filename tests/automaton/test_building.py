@@ -72,27 +72,6 @@ def test_images_are_what_solving_finds():
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-def test_half_of_a_users_library_is_solved_where_left_and_right_are_alike():
-    wheels = UserModel(
-        name="wheels", group=SE2, control_names=("left", "right"),
-        reduced_names=("left_speed", "right_speed"),
-        velocity=lambda z, u: [0.5 * (z[0] + z[1]), 0.0, z[1] - z[0]],
-        dynamics=lambda z, u: [u[0] - z[0], u[1] - z[1]],
-        control_limits=[-2.0, 2.0], reduced_limits=[-2.0, 2.0],
-    )  # fmt: skip
-    trims = trims_of(wheels, {"speed": [1.0], "turn_rate": [-0.5, 0.0, 0.5]}).trims
-    build, whole = build_library(wheels, trims), build_library(wheels, trims, mirror=False)
-    assert (build.solved, build.mirrored, build.failures) == (3, 3, ())
-    assert (whole.solved, whole.mirrored, whole.failures) == (6, 0, ())
-    assert build.worst_defect < 1e-6
-    for a, b in zip(build.automaton.maneuvers, whole.automaton.maneuvers, strict=True):
-        assert (a.name, a.source, a.target) == (b.name, b.source, b.target)
-        assert a.duration == pytest.approx(b.duration, rel=1e-5)
-        assert a.displacement == pytest.approx(b.displacement, abs=1e-4)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
 def test_a_killed_build_goes_on_and_comes_to_the_same_file(tmp_path):
     whole, killed = tmp_path / "whole.json", tmp_path / "killed.json"
     build_library(CRAFT, TRIMS, path=whole)

@@ -183,21 +183,6 @@ def test_bad_limits_are_refused(more, message):
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-def test_plans_without_a_change_of_direction_cost_more_than_the_best_one():
-    problem = among((), goal=(0.0, 2.0, 0.0))
-    cheapest = ma.plan(problem).cost
-    forward = {str(angle): (1.0, angle) for angle in (-0.6, 0.0, 0.6)}
-    without = ma.plan(replace(problem, automaton=ma.Automaton.of_controls(CAR, forward))).cost
-    bound = ma.lower_bound(
-        problem, max_direction_changes=0, incumbent=without, max_work=6 * WORK, time_limit=1e3
-    )
-    assert cheapest < bound.value <= without
-    with pytest.raises(ValueError, match="max_direction_changes must be at least 0, got -1"):
-        ma.lower_bound(problem, max_direction_changes=-1)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
 def test_a_trailer_moves_at_most_as_the_car_that_pulls_it():
     car = ma.CarWithTrailer(
         wheelbase=2.8, hitch_length=3.0, max_steering=0.6, max_speed=2.0, min_speed=-1.0

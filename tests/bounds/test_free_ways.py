@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.free_ways import drawn, planned, wrong
+from benchmarks.free_ways import drawn, wrong
 from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Problem, Unicycle, plan
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.bounds import goals_blocked, separation
@@ -41,14 +41,6 @@ def test_no_drawn_scene_is_called_impossible(seed):
 def test_none_of_5000_drawn_scenes_is_called_impossible(first):
     said = {k: what for k in range(first, first + 100) if (what := wrong(drawn(k)))}
     assert said == {}
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.parametrize("first", batches(range(0, 300, 10), quick=1))
-def test_no_drawn_scene_that_is_planned_is_called_impossible(first):
-    said = {k: planned(drawn(k)) for k in range(first, first + 10)}
-    assert not [one for one in said.items() if ":" in one[1]]
 
 
 @pytest.mark.skipif(not FIELD.exists(), reason="the scenes of others are not here")

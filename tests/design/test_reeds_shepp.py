@@ -60,7 +60,7 @@ def test_lengths_are_those_of_ompl():
     assert np.abs(reeds_shepp_length(goals) - stated).max() < 1e-8
 
 
-@settings(max_examples=draws(100))
+@settings(max_examples=draws(40))
 @given(goal=GOALS)
 def test_a_path_driven_back_or_mirrored_is_as_long(goal):
     length = reeds_shepp_length(goal)
@@ -68,7 +68,7 @@ def test_a_path_driven_back_or_mirrored_is_as_long(goal):
     assert reeds_shepp_length(goal * [1.0, -1.0, -1.0]) == pytest.approx(length, abs=1e-6)
 
 
-@settings(max_examples=draws(100))
+@settings(max_examples=draws(40))
 @given(first=GOALS, last=GOALS)
 def test_two_paths_are_no_shorter_than_one(first, last):
     there = (SE2(first) @ SE2(last)).pose

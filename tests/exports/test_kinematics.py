@@ -130,9 +130,9 @@ def test_they_are_the_derivatives_of_the_motion(model, state, seed, rate, tmp_pa
     save_csv(driven.plan(), tmp_path / "a.csv", step=1.0 / rate, model=model)
     found = table(tmp_path / "a.csv")
     times = found["time_s"]
-    x = driven.at(np.linspace(0.0, driven.duration, 60001))
+    x = driven.at(np.linspace(0.0, driven.duration, 6001))
     upto = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(x[:, :2], axis=0), axis=1)))
-    length = np.interp(times, np.linspace(0.0, driven.duration, 60001), upto)
+    length = np.interp(times, np.linspace(0.0, driven.duration, 6001), upto)
     np.testing.assert_allclose(found["arc_length_m"], length, atol=2e-4)
     inside = np.abs((times / SEGMENT + 0.5) % 1.0 - 0.5) > 0.01  # away from jumps of the control
     speed, bend, felt, jerk = driven.differences(times[inside])

@@ -22,12 +22,6 @@ LARGE = {
     "cl-cbs/map_50by50_obst25_agents20_ex8": 533.9,
     "db-cbs/window4_unicycle": 31.0,
 }
-LARGEST = {
-    "cl-cbs/map_50by50_obst25_agents15_ex4": 409.1,
-    "cl-cbs/map_100by100_obst50_agents50_ex4": 2194.0,
-    "cl-cbs/map_300by300_obst100_agents100_ex1": 12189.0,
-    "db-cbs/swap2_trailer": 13.0,
-}
 
 
 def check(name, most):
@@ -44,17 +38,3 @@ def check(name, most):
 )
 def test_few_vehicles(name):
     check(name, SMALL[name])
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LARGE)
-def test_many_vehicles(name):
-    check(name, LARGE[name])
-
-
-@pytest.mark.slow
-@pytest.mark.exhaustive
-@pytest.mark.parametrize("name", LARGEST)
-def test_most_vehicles(name):
-    check(name, LARGEST[name])

@@ -108,6 +108,7 @@ def test_all_change_places_where_nobody_has_a_way():
     assert is_good(fleet, result)
 
 
+@pytest.mark.slow
 def test_one_waits_in_a_bay_until_two_have_passed():
     """It drives aside to where it gets home from, not behind the goals of the others.
 
@@ -176,7 +177,7 @@ def test_reasons_name_when_and_where_they_meet():
 @pytest.mark.parametrize(("name", "cost"), [("fleet-idle", 4.5), ("standing-vehicle", 8.2)])
 def test_files_that_were_met(name, cost, tmp_path, capsys):
     file = FIELD / f"{name}.yaml"
-    result = plan_fleet(load_scenario(file).fleet, time_limit=60.0, max_rounds=8)
+    result = plan_fleet(load_scenario(file).fleet, time_limit=60.0, max_rounds=4)
     assert is_good(result.problem, result)
     assert result.cost < cost
     assert run(["plan", str(file), "--out", str(tmp_path), "--time-limit", "2", "--quiet"]) == 0

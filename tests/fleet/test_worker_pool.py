@@ -7,13 +7,11 @@ import pickle
 import pytest
 
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.fleet import FleetStatus, plan_fleet, verify_fleet, workers
+from maneuver_automaton.fleet import plan_fleet, workers
 from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.fleet.workers import Done, PoolTask, WorkerPool
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet import fleets
-from tests.fleet.test_arriving import beside_its_goal
-from tests.fleet.test_levels import over_a_truck
 from tests.scenario.test_vehicles import SCENARIOS
 
 
@@ -96,27 +94,6 @@ def test_any_number_of_processes_finds_the_same_plans(fleet):
     assert answers(runs[0])
     assert all(answers(one) == answers(runs[0]) for one in runs)
     assert all(one.counts == runs[0].counts for one in runs)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_orders_and_turns_alternate_alike_for_any_number_of_processes():
-    """Nobody finds a place here: all orders are tried, and turns between them."""
-    fleet = beside_its_goal(tolerance=0.0, gap=0.65, stays=0.0)
-    runs = [plan_fleet(fleet, time_limit=300.0, max_rounds=0, jobs=jobs) for jobs in (1, 2)]
-    assert "a" not in runs[0].plans
-    assert answers(runs[0]) == answers(runs[1])
-    assert runs[0].counts == runs[1].counts
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_what_a_vehicle_is_made_of_travels_too():
-    """A model of one's own, with functions that have no name."""
-    fleet = over_a_truck(1.5)
-    result = plan_fleet(fleet, time_limit=60.0, max_rounds=2, jobs=2)
-    assert result.status is FleetStatus.FOUND
-    assert verify_fleet(fleet, result.plans).passed
 
 
 @pytest.mark.slow

@@ -19,7 +19,6 @@ from maneuver_automaton.formats.fleet_loop_json import (
 )
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.receding_horizon import Disturbance
-from maneuver_automaton.scenario import load_scenario
 from tests.fleet.robots import crossing
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
@@ -96,21 +95,6 @@ def test_a_vehicle_is_written_as_one_alone(log):
         if len(one["steps"]) > 1:
             plan = plan_of_document(driven_document(one))
             np.testing.assert_allclose(plan.end, one["steps"][-1]["pose"], atol=1e-9)
-
-
-@pytest.mark.slow
-def test_vehicles_with_inertia_and_other_kinds(tmp_path):
-    scenario = load_scenario(SCENARIOS / "fleets" / "airfield.yaml")
-    log = simulate_fleet(scenario.fleet, step=1.0, steps=3, first_time_limit=1.0)
-    path = tmp_path / "closed_loop.json"
-    write_document(fleet_loop_to_dict(log, verify_driven(log)), path)
-    again = load_fleet_loop(path, scenario.fleet)
-    same(
-        fleet_loop_to_dict(again, verify_driven(again)), fleet_loop_to_dict(log, verify_driven(log))
-    )
-    for name in log.problem.names:
-        for one, other in zip(log.driven[name], again.driven[name], strict=True):
-            np.testing.assert_allclose(one.end, other.end, atol=1e-9)
 
 
 def test_who_leaves_ends_where_it_left(tmp_path):

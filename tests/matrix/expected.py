@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import pytest
+
 from tests.matrix.cells import cells
 from tests.matrix.vehicles import VEHICLES
 
@@ -86,21 +88,18 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     ("stage", "moved_problem_among_obstacles"),
     *(("user", feature) for feature in ("loop", "polishing")),
 }
-WITH_INERTIA_LONG = ("plan_file",)
 LONG_ONE_BY_ONE = {  # with -m slow
     *(("car", feature) for feature in ("discs", "zones", "margin", "bounds", "min_coast")),
     *(("car", feature) for feature in ("planner_with_all", "free_heading_among_obstacles")),
     ("car_with_trailer", "planner_with_all"),
-    ("car_with_trailer", "carried_parts"),
     ("glider", "heights"),
     ("car", "several_parts"),
     ("grid", "zones_crossed"),
     *(("boat_in_current", feature) for feature in ("loop", "plan_file")),
-    ("user", "discs"),
     ("boat", "max_time_among_obstacles"),
     ("boat", "moved_problem_among_obstacles"),
     ("boat", "pictures"),
-    *(("user", feature) for feature in ("max_trims", "resume", "alternatives", "moving_ends")),
+    *(("user", feature) for feature in ("max_trims", "resume", "moving_ends")),
     ("user", "same_plan_twice_among_obstacles"),
     ("hovercraft", "max_trims"),
     ("second_order_unicycle", "loop_obstacles"),
@@ -122,29 +121,27 @@ def _quick() -> Iterator[tuple[str, str]]:
 
 def _long() -> Iterator[tuple[str, str]]:
     for feature, vehicle in cells():
-        with_inertia = VEHICLES[vehicle].inertia and feature in WITH_INERTIA_LONG
-        chosen = with_inertia or vehicle == "dubins" or (vehicle, feature) in LONG_ONE_BY_ONE
+        chosen = vehicle == "dubins" or (vehicle, feature) in LONG_ONE_BY_ONE
         if chosen and (feature, vehicle) not in QUICK:
             yield feature, vehicle
 
 
 QUICK = frozenset(_quick())
 LONG = frozenset(_long())  # with -m slow; all that is in neither takes longest, -m exhaustive
-SLOW_MUTANTS = frozenset(
-    {
-        "alternatives_among_obstacles",
-        "carried_parts",
-        "clearance",
-        "heights",
-        "max_time_among_obstacles",
-        "loop_clearance",
-        "moved_problem_among_obstacles",
-        "moving_ends",
-        "no_steering_at_rest",
-        "off_library_start",
-        "planner_with_all",
-        "polishing",
-        "polishing_past_movers",
-        "same_plan_twice_among_obstacles",
-    }
+_MUTANTS = (
+    "alternatives_among_obstacles",
+    "clearance",
+    "heights",
+    "max_time_among_obstacles",
+    "loop_clearance",
+    "moved_problem_among_obstacles",
+    "moving_ends",
+    "no_steering_at_rest",
+    "off_library_start",
+    "planner_with_all",
+    "polishing",
+    "polishing_past_movers",
+    "same_plan_twice_among_obstacles",
 )
+SLOW_MUTANTS = {name: [pytest.mark.slow] for name in _MUTANTS}
+SLOW_MUTANTS["carried_parts"] = [pytest.mark.slow, pytest.mark.exhaustive]

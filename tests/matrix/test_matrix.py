@@ -34,10 +34,7 @@ def test_a_feature_works_for_a_vehicle(feature, vehicle):
 
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=[pytest.mark.slow] if name in SLOW_MUTANTS else [])
-        for name in FEATURES
-    ],
+    [pytest.param(name, marks=SLOW_MUTANTS.get(name, ())) for name in FEATURES],
 )
 def test_a_check_fails_where_its_feature_is_ignored(name):
     feature = FEATURES[name]

@@ -137,14 +137,6 @@ def test_plans_keep_what_is_promised(name):
     assert costs[-1] == pytest.approx(result.cost, rel=1e-7)  # before its end is closed
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_the_rest_that_pads_is_a_trim():
-    fixed = replace(EASY, cost=Cost(effort=1.0), horizon=Horizon(time=20.0, max_trims=3))
-    result = plan(fixed, time_limit=LIMIT)
-    assert result.plan is None or len(result.plan.word) <= 3
-
-
 def test_a_price_on_a_fixed_time_changes_no_plan():
     # what the rest that pads costs is no reason to stop looking for something cheaper
     horizon = Horizon(time=32.0)
@@ -427,7 +419,7 @@ def plan_is_worth_it(problem):
     return blocked_ends(replace(problem, bounds=Bounds())) is None and bool(problem.obstacles)
 
 
-@pytest.mark.parametrize("part", quick_are([], range(4)))
+@pytest.mark.parametrize("part", quick_are([], range(4), exhaustive=True))
 def test_turned_and_shifted_a_little(part):
     rng = np.random.default_rng([1, part])
     plans = 0

@@ -15,7 +15,6 @@ from maneuver_automaton.planning.among_zones import admitted_automaton, quickene
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
-from maneuver_automaton.receding_horizon import RecedingHorizon, simulate
 from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
@@ -135,23 +134,6 @@ def test_maneuvers_keep_to_zones_too():
     assert check_plan(problem, found, problem.goals[0]).passed
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_vehicle_with_inertia_slows_down():
-    model_limit = Zone(shape=ACROSS, max_speed=0.5)
-    problem = posed([6.0, 0.0, 0.0], model_limit, automaton=unicycle_automaton())
-    result = plan(problem, time_limit=LIMIT)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert result.audit.passed
-    assert result.cost > plan(replace_zones(problem), time_limit=LIMIT).cost
-
-
-def replace_zones(problem: Problem) -> Problem:
-    from dataclasses import replace
-
-    return replace(problem, zones=())
-
-
 def test_what_a_zone_admits_of_an_automaton():
     automaton = unicycle_automaton()
     forwards = admitted_automaton(automaton, (Zone(shape=ACROSS, reverse=False),))
@@ -176,16 +158,6 @@ def test_a_moved_problem_has_the_moved_plan():
     there = plan(problem.moved(SE2([3.0, -1.0, 0.8])), time_limit=LIMIT)
     assert there.plan.word == here.plan.word
     assert there.cost == pytest.approx(here.cost, abs=0.05)
-
-
-@pytest.mark.slow
-def test_zones_hold_in_closed_loop():
-    problem = posed(ALONG, Zone(shape=ACROSS, max_speed=0.5), search=SearchSettings())
-    loop = simulate(problem, step=0.5, time_limit=1.5, steps=40)
-    assert loop.reached, loop.reason
-    assert all(audit.passed for audit in loop.audits)
-    _, step = RecedingHorizon(problem, step=0.5, time_limit=1.5).step(problem.start)
-    assert check_plan(problem, step.plan, problem.goals[0]).passed
 
 
 def test_a_zone_that_forbids_nothing_is_refused():

@@ -22,7 +22,10 @@ def counted(problem, n=3000):
 
 
 @pytest.mark.parametrize(
-    "name", quick_are(["cluttered_room", "parking"], ["cluttered_room", "parking", "trailer"])
+    "name",
+    quick_are(
+        ["cluttered_room", "parking"], ["cluttered_room", "parking", "trailer"], exhaustive=True
+    ),
 )
 def test_each_is_better_and_audited_and_the_last_is_the_answer(name):
     problem = counted(load_scenario(f"scenarios/{name}.yaml").problem, 1000)

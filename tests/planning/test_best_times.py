@@ -80,11 +80,12 @@ def test_slopes_are_differences(name):
         assert slopes[k] == pytest.approx((ahead - behind) / 2e-4, abs=0.05 * np.abs(slopes).max())
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_plan_has_the_best_of_its_times():
     here = problem(COSTS["clearance"])
-    here = replace(here, search=replace(here.search, max_expansions=300))
-    result = ma.plan(here, time_limit=2.0)
+    here = replace(here, search=replace(here.search, max_expansions=100))
+    result = ma.plan(here, time_limit=60.0)
     assert result.audit.passed
     again = with_relaxed_end(here, result.plan, here.goals[0])
     assert again is None or here.cost_of(again) > result.cost * (1.0 - 2e-3)

@@ -8,18 +8,14 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton, Plan
-from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Box
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.planning.checking import Condition, check_plan
-from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.primitives.driving import drive
+from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.refinement.fitting import broken_condition
 from tests import scenes
-from tests.inertia import ROBOT, resting
 
 LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 AHEAD = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)})
@@ -46,21 +42,6 @@ def test_each_condition_of_the_horizon_is_checked(horizon, reason):
     checked = check_plan(problem, TRIP, problem.goals[0])
     assert (checked.passed, checked.reason) == (not reason, reason)
     assert checked.broken is (Condition.WORD if reason else None)
-
-
-@pytest.mark.parametrize(("samples", "broken"), [(100, None), (2000, Condition.TIME)])
-def test_a_long_audit_is_not_begun_late(samples, broken):
-    """With 10 ms left to check: an audit among obstacles takes 15 us a sample, and a while."""
-    rest = resting(ROBOT).trims[0]
-    course = drive(
-        ROBOT, [0, 0], control=[[0.25, 0], [-0.25, 0]], durations=[1, 1], max_step_m=0.5 / samples
-    )
-    hop = Maneuver.along(course, name="hop", source="rest", target="rest")
-    trip = Plan([0, 0, 0], (rest, rest), durations=[0, 0], maneuvers=(hop,))
-    library = Automaton(ROBOT, (rest,), (hop,))
-    problem = Problem(library, [0, 0, 0], trip.end, obstacles=Box([1, 1], [5, 5]))
-    late = Budget(began=0.0, deadline=1.0, clock=lambda: 1.076)
-    assert check_plan(problem, trip, problem.goals[0], budget=late).broken is broken
 
 
 def test_trims_of_no_time_are_not_counted():
@@ -122,27 +103,3 @@ def test_unreachable_is_said_with_a_proof_only():
     assert plan(short, time_limit=LIMIT).status is PlanStatus.UNREACHABLE
     far = replace(problem, horizon=Horizon(max_time=2.9))
     assert plan(far, time_limit=LIMIT).status is PlanStatus.UNREACHABLE
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_large_library_keeps_a_least_coasting_time():
-    free = Problem(GRID, [0, 0, 0], [3, 1, 0.5], horizon=Horizon(max_trims=3))
-    longer = replace(free, horizon=Horizon(max_trims=3, min_coast=0.3))
-    result = plan(longer, time_limit=LIMIT)
-    assert result.status is PlanStatus.FOUND
-    assert result.plan.durations.min() >= 0.3 - 1e-9
-    assert result.cost > plan(free, time_limit=LIMIT).cost
-    effort = replace(longer, cost=Cost(effort=1.0))
-    slow = plan(effort, time_limit=LIMIT)
-    limit = 0.7 * slow.plan.duration
-    hurry = replace(effort, horizon=Horizon(max_trims=3, min_coast=0.3, max_time=limit))
-    quick = plan(hurry, time_limit=LIMIT)
-    assert quick.plan.duration <= limit + 1e-9
-    assert quick.cost > slow.cost
-
-
-def test_no_first_plan_has_no_time():
-    result = plan(replace(TO_FIVE, horizon=Horizon(max_time=4.0)), time_limit=LIMIT)
-    assert result.plan is None
-    assert "first_plan" not in result.timing_s

@@ -69,6 +69,7 @@ def test_a_bend_hardly_wider_than_it_has_to_be(width):
     assert is_driven(found)
 
 
+@pytest.mark.slow
 def test_a_path_that_was_broken_off_is_followed_to_its_end(monkeypatch):
     """Where the time is short the search gets its share first; then the path has what is left."""
     monkeypatch.setattr("maneuver_automaton.search.lattice.ASIDE_SHARE", 1e-9)

@@ -10,12 +10,10 @@ import shapely
 
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import UNLIMITED
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanStatus, plan
-from maneuver_automaton.planning.lattice_words import late_at_first
-from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from maneuver_automaton.refinement.improve import WordSchedule, words_of
 from maneuver_automaton.search import lattice, lattice_task
 from maneuver_automaton.search.lattice import forward_word, reversed_query
@@ -59,11 +57,6 @@ def assert_free(one):
     assert not shapely.intersects(bodies_of(one)[1], box_of(WALL)).any()
 
 
-def coasts_of(one):
-    lasting = zip(one.trims, one.durations.tolist(), strict=True)
-    return [time for trim, time in lasting if time > 0.0 and not trim.is_rest]
-
-
 @pytest.fixture(scope="module")
 def usual():
     """The plan without any condition."""
@@ -71,69 +64,6 @@ def usual():
     assert result.status is PlanStatus.FOUND
     assert_free(result.plan)
     return result
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_any_heading_is_as_good_among_obstacles():
-    """A goal whose heading points back costs a turn; where any will do, it costs none."""
-    goal = Goal(pose=[6.0, 0.0, 3.0])
-    fixed = plan(posed(goal), time_limit=60.0)
-    free = plan(posed(replace(goal, free_heading=True)), time_limit=60.0)
-    assert free.status is PlanStatus.FOUND
-    np.testing.assert_allclose(free.plan.end[:2], [6.0, 0.0], atol=1e-9)
-    assert free.cost < fixed.cost - 1.0
-    assert_free(free.plan)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.parametrize("share", [1.3, 1.1])
-def test_a_longest_time_is_kept_among_obstacles(usual, share):
-    """Effort alone would take its time; the longest time leaves it less."""
-    most = share * usual.plan.duration
-    problem = posed(cost=Cost(effort=1.0), horizon=Horizon(max_time=most))
-    result = plan(problem, time_limit=60.0)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert result.plan.duration <= most * (1.0 + 1e-9)
-    assert_free(result.plan)
-
-
-def test_words_may_be_late_at_first_where_cheaper_ones_are_quicker():
-    """What shortcuts and polishing make of them is in time; a word by effort is late for good."""
-    limit = Horizon(max_time=5.0)
-    by_time = lattice_query(posed(horizon=limit, cost=Cost(time=2.0)), (0,))
-    assert by_time.most_time == pytest.approx(5.0)
-    assert late_at_first(by_time).most_time == np.inf
-    by_effort = lattice_query(posed(horizon=limit, cost=Cost(time=2.0, effort=1.0)), (0,))
-    assert late_at_first(by_effort).most_time == pytest.approx(5.0)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_fixed_time_is_kept_among_obstacles(usual):
-    total = 1.4 * usual.plan.duration
-    result = plan(posed(horizon=Horizon(time=total)), time_limit=60.0)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert result.plan.duration == pytest.approx(total, rel=1e-12)
-    assert_free(result.plan)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_no_trim_lasts_less_than_it_must_among_obstacles():
-    automaton = unicycle_automaton()
-    problem = posed(horizon=Horizon(min_coast=0.4))
-    query = lattice_query(problem, (0,))
-    words = list(words_of(query, budget=counted(4000), schedule=WordSchedule()))
-    assert words
-    for word in words:
-        for trim, time in zip(word.trims, word.durations.tolist(), strict=True):
-            assert time == 0.0 or time >= 0.4 * (1 - 1e-9) or automaton.trims[trim].is_rest
-    result = plan(problem, time_limit=60.0)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert all(time >= 0.4 * (1.0 - 1e-9) for time in coasts_of(result.plan))
-    assert_free(result.plan)
 
 
 def test_settings_of_the_lattice_are_read(monkeypatch):
@@ -197,25 +127,6 @@ def test_a_fast_car_passes_a_box(along, aside):
     query = lattice_query(problem, (0,))
     word = next(iter(words_of(query, budget=counted(5000), schedule=WordSchedule())))
     assert word.duration < 6.5
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_zone_is_crossed_slowly_and_left_fast():
-    """A strip of 1 m at 0.4 m/s: neither the whole way slowly, nor 40 m around it."""
-    strip = Zone(shape=Box([1.0, 60.0], [5.0, 0.0]), max_speed=0.4)
-    problem = posed((10.0, 0.0, 0.0), states=SLOW, obstacles=(), zones=(strip,))
-    result = plan(problem, time_limit=60.0)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert result.plan.duration < 18.0
-    times, bodies = bodies_of(result.plan)
-    speeds = np.linalg.norm(np.diff(result.plan.pose_at(times)[:, :2], axis=0), axis=1)
-    speeds /= np.diff(times)
-    inside = shapely.intersects(bodies, box_of(strip.shape))
-    both = inside[1:] & inside[:-1]
-    assert both.any()
-    assert speeds[both].max() < 0.4 + 1e-6
-    assert speeds.max() > 0.9
 
 
 def test_nothing_is_refused_by_the_checks_where_an_obstacle_moves():

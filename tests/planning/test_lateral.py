@@ -136,19 +136,6 @@ def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
     assert found.cost == pytest.approx(limited.cost, rel=5e-3)
 
 
-@compiled_only
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_zone_holds_in_its_half_of_the_plane(limited):
-    zone = Zone(shape=BEYOND, max_lateral_acceleration=1.0)
-    found = plan(posed(zones=[zone]), time_limit=200.0)
-    rows = driven(CAR, found.plan)
-    there = rows[:, 0] >= 15.0
-    assert across(CAR, rows[there]).max() <= 1.0 + 1e-9
-    assert rows[:, 3].min() >= -1e-6
-    assert "polished" in found.plan.word
-
-
 @pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only

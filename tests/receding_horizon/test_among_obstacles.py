@@ -170,7 +170,7 @@ def test_held_in_the_goal_beside_a_wall():
     assert list(loop.collisions) == []
 
 
-@pytest.mark.parametrize("seed", quick_are([0], [0, 5]))
+@pytest.mark.parametrize("seed", [0])
 def test_a_moved_scene_has_the_moved_loop(seed):
     problem = replace(seeded(seed), bounds=Bounds())
     move = SE2(np.array([30.0, -7.0, 2.2]))

@@ -99,7 +99,11 @@ def test_five_hundred_loops(name: str, seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["hovercraft", *(pytest.param(one, marks=pytest.mark.slow) for one in OTHERS)]
+    "name",
+    [
+        "hovercraft",
+        *(pytest.param(one, marks=[pytest.mark.slow, pytest.mark.exhaustive]) for one in OTHERS),
+    ],
 )
 def test_the_value_falls_by_what_was_driven_between_disturbances(name: str) -> None:
     """One disturbance, then none: the paper's decrease holds in every step but that one."""

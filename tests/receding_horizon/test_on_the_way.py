@@ -77,15 +77,6 @@ def test_the_value_falls_past_all_that_is_on_the_way():
     assert loop.passed[1].until - loop.passed[1].time == pytest.approx(1.5)
 
 
-@pytest.mark.slow
-def test_a_moved_loop_is_the_loop_moved():
-    by = ma.SE2([5.0, -3.0, 2.0])
-    one, other = (
-        ma.simulate(problem, step=1.5, time_limit=2.0) for problem in (PAST, PAST.moved(by))
-    )
-    assert other.cost == pytest.approx(one.cost, rel=1e-3)
-
-
 def test_pushed_before_it_the_pose_is_met_all_the_same_and_a_stay_is_made_up_for():
     push = ma.Disturbance(pushes={1: (0.3, 0.2, 0.5), 7: (0.3, 0.1, -0.2)})
     loop = ma.simulate(PAST, step=1.0, time_limit=2.0, disturbance=push, steps=60)
@@ -134,16 +125,6 @@ def test_a_controller_alone_sees_what_it_passed():
     assert log.value == pytest.approx(3.5)
 
 
-@pytest.mark.slow
-def test_past_something_that_moves():
-    coming = ma.Obstacle(ma.Disc(0.6), motion=ma.Motion([0, 20], [[6, 4, 0], [6, -6, 0]]))
-    body = ma.Box([0.4, 0.3])
-    loop = judged(
-        ma.simulate(replace(PAST, obstacles=coming, footprint=body), step=1.0, time_limit=2.5)
-    )
-    assert loop.min_clearance_m > 0.0
-
-
 @pytest.mark.parametrize(
     ("disturbance", "said"),
     [
@@ -154,15 +135,3 @@ def test_past_something_that_moves():
 def test_what_meets_no_pose_is_refused(disturbance, said):
     with pytest.raises(ValueError, match=said):
         ma.simulate(PAST, step=1.0, disturbance=disturbance)
-
-
-@pytest.mark.slow
-def test_within_a_tolerance_a_vehicle_measured_wrongly_passes():
-    via = ma.Via([4, 0], free_heading=True, tolerance_m=0.5)
-    problem = ma.Problem(
-        ROBOT, [0, 0, 0], ma.Goal([8, 0, 0], tolerance_m=0.5, tolerance_rad=0.5), via=via
-    )
-    noise = ma.Disturbance(measured_position_m=0.05, position_m=0.02)
-    loop = ma.simulate(problem, step=1.0, time_limit=2.0, disturbance=noise, steps=40)
-    assert loop.reached, loop.reason
-    assert min(np.hypot(*(pose[:2] - [4, 0])) for pose in driven_poses(loop)[1]) <= 0.5

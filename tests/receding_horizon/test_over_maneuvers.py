@@ -32,7 +32,7 @@ from maneuver_automaton.receding_horizon import (
     simulate,
 )
 from maneuver_automaton.receding_horizon.rest_of_plan import rested
-from tests.inertia import ROBOT, car_automaton, resting, unicycle_automaton
+from tests.inertia import car_automaton, unicycle_automaton
 from tests.matrix.vehicles import VEHICLES
 from tests.quickly import quick_are
 from tests.search.cases import compiled_only
@@ -250,15 +250,6 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
 
 
 @pytest.mark.slow
-def test_at_first_a_planner_has_all_the_time_where_there_are_zones(monkeypatch):
-    """It looks at words itself: looked at before, they would take half of its time."""
-    monkeypatch.setattr(over_maneuvers, "search_insertion", lambda *_, **__: 1 / 0)
-    zone = Zone(shape=Box([0.5, 0.5], [1.5, 0.5]), max_speed=0.9)
-    _, step = ManeuverHorizon(posed(zones=[zone]), step=0.5).step([0.0, 0.0, 0.0])
-    assert step.decision is Decision.PLANNED
-
-
-@pytest.mark.slow
 def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
     push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
     loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
@@ -318,32 +309,6 @@ def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, sto
     assert step.decision is Decision.APPROACHED
     assert step.plan.end[0] == pytest.approx(stops_at)
     assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.parametrize("robot", ["stops and steers", "polished"])
-def test_a_loop_with_motions_of_its_own_goes_on_from_its_file(robot, tmp_path):
-    """Neither strokes nor what polishing finds is in the library: the log tells their courses."""
-    automaton = resting(ROBOT) if robot == "stops and steers" else unicycle_automaton()
-    problem = posed(
-        [3.0, 1.0, 1.0],
-        automaton=automaton,
-        obstacles=[Box([0.4, 0.4], [1.5, -1.5])],
-        footprint=Box([0.4, 0.3]),
-        search=SearchSettings(max_expansions=80),
-    )
-    whole = simulate(problem, step=0.9, time_limit=60.0)
-    assert whole.reached, whole.reason
-    begun = simulate(problem, step=0.9, time_limit=60.0, steps=3)
-    save_closed_loop(begun, tmp_path / "loop.json")
-    steps, poses = load_steps(tmp_path / "loop.json", problem.automaton)
-    assert any("course" in one for one in plan_entries(tmp_path / "loop.json"))
-    assert steps[-1].plan.word == begun.steps[-1].plan.word
-    rest = simulate(replace(problem, start=poses[-1]), step=0.9, time_limit=60.0, last=steps[-1])
-    assert rest.reached
-    assert np.abs(rest.poses - whole.poses[3:]).max() < 1e-9
-    assert rest.cost == pytest.approx(whole.cost, abs=1e-9)
 
 
 def plan_entries(path):
@@ -495,23 +460,6 @@ class TestAmongWhatMoves:
                 obstacles=problem.obstacles,
             )
             assert audit.passed, audit.reason
-
-    @pytest.mark.exhaustive
-    @pytest.mark.slow
-    def test_what_has_stopped_is_planned_around_as_if_it_had_always_stood(self):
-        stopped = Motion([0.0, 1.0], [[2.5, 3.0, 0.0], [2.5, 0.2, 0.0]])
-        gone = Obstacle(Box([0.1, 30.0], [4.0, 0.0]), present_s=(0.0, 1.5))
-        problem = posed(
-            [5.0, 0.0, 0.0],
-            start_time=2.0,
-            obstacles=[Obstacle(Disc(0.4), motion=stopped), gone],
-            footprint=Box([0.4, 0.3]),
-            search=SearchSettings(max_expansions=300),
-        )
-        still = replace(problem, obstacles=[Disc(0.4, [2.5, 0.2])])
-        one, two = (simulate(p, step=1.0, time_limit=60.0) for p in (problem, still))
-        assert one.reached
-        assert one.cost <= two.cost * 1.2
 
     @pytest.mark.parametrize("inertia", quick_are([False], [True, False]))
     def test_what_appears_where_it_stands_is_foreseen(self, inertia):

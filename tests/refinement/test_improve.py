@@ -20,7 +20,6 @@ from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.words.transitions import SWITCH
-from maneuver_automaton.words.word import Word
 from tests import scenes
 from tests.quickly import quick_are
 from tests.reference import plain_end
@@ -128,29 +127,6 @@ def test_the_same_twice_to_the_last_bit(name):
     assert [word.cost.hex() for word in incumbents] == [word.cost.hex() for word in again]
     assert better.word.durations.tobytes() == better_again.word.durations.tobytes()
     assert better.attempts == better_again.attempts
-
-
-def incumbents_until(deadline, name="car"):
-    """What is found until a deadline of a clock that ticks at every look."""
-    ticks = itertools.count(1.0)
-    budget = Budget(began=0.0, deadline=deadline, expansions=2000, clock=lambda: next(ticks))
-    query = query_of(PROBLEMS[name])
-    first = improved(name)[1]
-    word = Word(trims=first.trims, durations=first.durations)
-    return [better.cost for better in improving(query, word, budget=budget)]
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_less_time_gives_the_beginning_of_what_more_time_gives():
-    improved("car")
-    whole = incumbents_until(math.inf)
-    assert len(whole) >= 3
-    for deadline in (1.0, 3.0, 7.0, 20.0, 45.0, 80.0, 120.0):
-        part = incumbents_until(deadline)
-        # but for the last, of which a part was tried
-        assert part[:-1] == whole[: len(part) - 1] if part else True
-        assert not part or part[-1] >= whole[min(len(part), len(whole)) - 1]
 
 
 def test_less_patience_gives_the_beginning_too():

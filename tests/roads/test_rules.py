@@ -126,8 +126,9 @@ def test_a_limit_holds_from_its_lanelet_on(tmp_path, drive):
     assert speed[middle[:, 0] > 90.0].max() < 8.05
 
 
+@pytest.mark.slow
 def test_a_limit_that_the_goal_does_not_allow_is_told(tmp_path):
-    one = piece(1, 0, 400, "<speedLimit>8</speedLimit>")
+    one = piece(1, 0, 200, "<speedLimit>8</speedLimit>")
     scene = scene_of(tmp_path, one, problem(goal=place(130.0, 100), speed=8.0))
     found = plan_road(scene, time_limit=60.0)
     assert found.plan is not None
@@ -177,7 +178,10 @@ def test_a_moved_scene_has_the_moved_drive(tmp_path):
     np.testing.assert_allclose(here.decision.states, there.decision.states, atol=1e-7)
 
 
-@pytest.mark.parametrize("move", [plan_roads, pytest.param(drive_roads, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "move",
+    [plan_roads, pytest.param(drive_roads, marks=[pytest.mark.slow, pytest.mark.exhaustive])],
+)
 def test_several_vehicles_obey_each_for_itself(tmp_path, move):
     lights = light(8, ("red", 40), ("green", 1000))
     first, second = (
@@ -288,7 +292,7 @@ def test_no_limit_is_exceeded_to_be_in_time(tmp_path, drive, limit, speed, besid
 
 @BOTH
 def test_a_start_beyond_the_limit_brakes_at_once(tmp_path, drive):
-    lane = piece(1, 0, 400, "<speedLimit>8</speedLimit>")
+    lane = piece(1, 0, 200, "<speedLimit>8</speedLimit>")
     result = drive(scene_of(tmp_path, lane, problem(goal=place(130.0, 300), speed=14.0)))
     _, _, speeds = driven_of(result)
     beyond = int((speeds > 8.0).sum())

@@ -68,15 +68,6 @@ def test_asked_in_any_order_it_is_dijkstra(seed):
     assert in_order.tolist() == distances(grid, field, places).tolist()  # to the last bit
 
 
-def test_little_is_looked_at_where_little_is_asked():
-    grid, world, _ = grid_and_world(DISC, [Obstacle(Box([1.0, 9.0], [5.0, 6.0]))], [0.0, 0.0, 0.0],
-                                    [10.0, 0.0, 0.0], pad=20.0)  # fmt: skip
-    here = world.into(np.array([[10.0, 0.0, 0.0]]))[:, :2]
-    (way,) = distances(grid, world.arrays.field, np.ascontiguousarray(here))
-    assert 10.0 - 2 * grid.layout.cell <= way <= 11.0
-    assert grid.state[1] < 0.2 * grid.value.size
-
-
 @compiled_only
 def test_beside_a_wall_no_more_is_looked_at_and_the_value_is_that_of_all():
     """Cells that a wall may cut come last, but what leads into one is known before."""
@@ -124,18 +115,6 @@ def test_no_free_pose_is_in_a_blocked_cell(name):
     assert blocked > 100
 
 
-def test_a_point_is_in_no_cell_deep_inside():
-    grid, world, _ = grid_and_world((), [Obstacle(Box([4.0, 4.0]))], [9, 0, 0], [-9, 0, 0])
-    closed = ~cells_open(grid, world.arrays.field)
-    assert closed.sum() * grid.layout.cell**2 == pytest.approx(16.0, rel=0.25)
-
-
-def test_without_obstacles_there_is_no_grid():
-    world = world_around(CAR, [])
-    grid = distance_grid(world, np.array([-9.0, -9.0, 9.0, 9.0]), np.zeros((1, 3)), np.ones(3))
-    assert (grid.layout.columns, grid.layout.rows) == (0, 0)
-
-
 def test_a_closed_ring_lets_nothing_out_and_an_open_one_does():
     court = Obstacle(Polygon(9.0 * RING, [8.0 * RING]))
     goal, start = np.zeros(3), np.array([15.0, 0.0, 0.0])
@@ -148,17 +127,6 @@ def test_a_closed_ring_lets_nothing_out_and_an_open_one_does():
     grid, world, _ = grid_and_world(CAR, opened, goal, start)
     outside = np.ascontiguousarray(world.into(start[None])[:, :2])
     assert distances(grid, world.arrays.field, outside)[0] < 16.0
-
-
-def test_many_cells_are_made_larger():
-    posts = [Obstacle(Disc(0.05, [x, y])) for x, y in ((0, 0), (0, 400), (400, 0), (400, 400))]
-    grid, world, _ = grid_and_world((Disc(0.2),), posts, [10, 10, 0], [390, 390, 0])
-    assert grid.value.size <= 1_200_000
-    assert grid.layout.stride % 2 == 1
-    field = world.arrays.field
-    # centres of cells are centres of cells of the field
-    off = (grid.layout.origin_x + 0.5 * grid.layout.cell - field.origin_x) / field.cell - 0.5
-    assert off == pytest.approx(round(off), abs=1e-6)
 
 
 def test_the_size_of_cells_is_found_however_far_the_goal_is():

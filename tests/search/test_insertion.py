@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
@@ -26,8 +26,7 @@ from maneuver_automaton.search import (
 )
 from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.choose import insertion_stages
-from maneuver_automaton.search.result import InsertionTask, TimedWord, plan_of
+from maneuver_automaton.search.result import TimedWord, plan_of
 from maneuver_automaton.search.setup import insertion_library, search_setup
 from maneuver_automaton.search.shortening import shortened
 from maneuver_automaton.words._kernels_times import TimesProblem
@@ -38,7 +37,6 @@ from tests.search.cases import (
     DUBINS,
     INTERPRETED,
     REEDS_SHEPP,
-    TABLE_2,
     VECTORS,
     compiled_only,
     end_off_goal,
@@ -47,7 +45,6 @@ from tests.search.cases import (
     reference_word,
     robot,
     vectors,
-    without_rest,
 )
 
 INEXACT = 5  # the file's Dubins path of this pair ends 1e-4 beside its goal
@@ -239,13 +236,6 @@ def test_a_solution_that_is_not_optimal_has_a_negative_certificate():
     assert certificate(problem, problem.goals[0], second) < -0.1
 
 
-def test_an_empty_word_has_no_certificate():
-    problem = replace(parking(), start=np.zeros(3))
-    assert certificate(problem, problem.goals[0], best(problem)) > -1e-9  # rest for all the time
-    free = replace(problem, horizon=Horizon())
-    assert certificate(free, free.goals[0], best(free)) is None
-
-
 # Grids of trims.
 
 
@@ -303,13 +293,6 @@ def test_a_goal_on_an_arc_may_have_a_cheaper_word():
 
 
 @compiled_only
-def test_a_number_of_trims_is_kept():
-    for most in (4, 5, 6):
-        solution = best(parking(max_trims=most))
-        assert len(solution.trims) <= most
-
-
-@compiled_only
 def test_words_do_not_grow_once_the_time_is_over(monkeypatch):
     """A grid whose seeds grow: the first word that may be long takes all the time."""
     long = []
@@ -353,40 +336,11 @@ def test_free_heading():
     assert certificate(problem, problem.goals[0], solution) > -1e-7
 
 
-@compiled_only
-def test_without_rest_a_fixed_time_is_met():
-    problem = parking(without_rest(TABLE_2), max_trims=6)
-    solution = best(problem)
-    assert solution.duration == pytest.approx(8.0, abs=1e-9)
-    assert_ends_at_the_goal(problem, solution)
-
-
-def test_start_equal_to_goal():
-    problem = replace(parking(), start=np.zeros(3))
-    assert names(problem, best(problem)) == ("rest",)
-    assert best(replace(problem, horizon=Horizon())).trims.size == 0
-
-
 def test_a_goal_out_of_reach():
     ahead = Problem(robot({"ahead": (1.0, 0.0), "fast": (2.0, 0.0)}), [0, 0, 0], [1.0, 1.0, 0])
     result = search_insertion(ahead, ahead.goals[0])
     assert result.status is SearchStatus.EXHAUSTED
     assert result.solutions == ()
-
-
-def test_a_limit_on_expansions_ends_the_search():
-    problem = replace(parking(), search=SearchSettings(max_expansions=1))
-    result = search_insertion(problem, problem.goals[0])
-    assert result.counts["seeds"] == 1
-    assert result.solutions
-
-
-@compiled_only
-def test_results_are_the_same_in_every_run():
-    problem = parking(max_trims=None)
-    first, second = best(problem), best(problem)
-    assert first.trims.tolist() == second.trims.tolist()
-    assert first.durations.tolist() == second.durations.tolist()
 
 
 # Every vehicle.
@@ -420,25 +374,6 @@ def test_a_known_plan_is_improved(name):
 
 
 @compiled_only
-def test_without_seeds_a_known_plan_alone_is_improved():
-    problem = parking(max_trims=None)
-    costly = search_insertion(problem, problem.goals[0], alternatives=8).solutions[-1]
-    found = search_insertion(problem, problem.goals[0], known=plan_of(problem, costly), seeds=0)
-    assert found.counts["seeds"] == 1
-    assert found.solutions[0].cost <= costly.cost + 1e-9
-
-
-@compiled_only
-def test_without_seeds_or_a_solution_of_a_known_plan_the_usual_words_are_improved():
-    problem = parking(max_trims=None)
-    usual = search_insertion(problem, problem.goals[0])
-    astray = Plan(problem.start, problem.automaton.trims[1:2], durations=[1.0])
-    for known in (None, astray):
-        found = search_insertion(problem, problem.goals[0], known=known, seeds=0)
-        assert found.solutions[0].cost == usual.solutions[0].cost
-
-
-@compiled_only
 @pytest.mark.parametrize("name", VEHICLES)
 def test_trims_last_as_long_as_they_have_to(name):
     problem = VEHICLES[name]()
@@ -447,16 +382,6 @@ def test_trims_last_as_long_as_they_have_to(name):
         moving = problem.automaton.body_velocities[solution.trims].any(axis=1)
         coasted = solution.durations[moving & (solution.durations > 0.0)]
         assert (coasted >= 0.3 - 1e-9).all()
-
-
-@compiled_only
-@pytest.mark.parametrize("name", VEHICLES)
-def test_the_last_stage_is_the_answer_and_none_is_dearer_than_the_one_before(name):
-    problem = VEHICLES[name]()
-    task = InsertionTask(problem=problem, goal=problem.goals[0])
-    stages = [stage.solutions[0].cost for stage in insertion_stages(task)]
-    assert stages == sorted(stages, reverse=True)
-    assert stages[-1] == best(problem).cost
 
 
 # Compiled and interpreted kernels.

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.budget import UNLIMITED, Budget
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
+from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
@@ -301,17 +301,6 @@ def test_joined_and_priced_by_hand():
     assert with_cost(query.word_of([], 0), query).cost == 0.0
 
 
-def test_a_lattice_without_a_way_out_is_exhausted():
-    ring = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    court = Polygon(1.4 * ring, [1.0 * ring])
-    for footprint in (BODY, (Disc(0.3),)):
-        shut_in = replace(BASE, obstacles=(Obstacle(court),), footprint=footprint)
-        limit = None if COMPILED else 30
-        found = first_plan(query_of(shut_in), budget=replace(UNLIMITED, expansions=limit))
-        assert found.word is None
-        assert found.enclosed == "obstacles enclose the start"
-
-
 def test_finer_resolutions_begin_one_after_the_other():
     begun = [after for after, _ in AT_WILL.stages]
     assert begun == sorted(begun)
@@ -340,22 +329,6 @@ def test_cells_have_numbers_of_64_bits_however_many_there_are():
     near = task_of(query_of(PROBLEMS["car"]), Resolution())
     # no two cells of the scene share a number
     assert near.cells.radix[0] * near.cells.fine_cell > 2.0 * 4.5
-
-
-def test_time_is_up():
-    found = first_plan(query_of(BASE), budget=Budget(began=0.0, deadline=-math.inf))
-    assert (found.word, found.expansions, found.exhausted) == (None, 0, False)
-
-
-def test_settings_are_heeded():
-    coarse = replace(BASE, search=SearchSettings(cell=1.5, headings=8, weight=1.0))
-    one, nodes, _ = grown(coarse)
-    task = one.search.task
-    assert (task.cells.cell, task.cells.headings, task.estimates.weight) == (1.5, 8, 2.0)
-    fine = grown(BASE)[1]
-    assert len(nodes) < len(fine)
-    found = first_plan(query_of(coarse), budget=replace(UNLIMITED, expansions=EXPANSIONS))
-    assert found.expansions <= EXPANSIONS
 
 
 # --- queries ---
@@ -388,35 +361,3 @@ def test_the_window_holds_the_ends_and_the_bounds_are_walls():
     assert not query.bounded
     assert query_of(PROBLEMS["bounds"]).bounded
     assert not query_of(replace(BASE, bounds=Bounds(x=(-9.0, 9.0)))).bounded
-
-
-@pytest.mark.parametrize("turn", [0.0, 0.4, -2.0])
-def test_bounds_are_kept_in_a_turned_world(turn):
-    # the world's frame is that of the map, the bounds are along the axes of the problem
-    cells = OccupancyMap([[1, 0], [1, 1]], resolution=0.6, origin=[2.2, 0.3, turn])
-    bounds = Bounds(x=(-0.5, 4.6), y=(-2.4, 1.4))
-    problem = Problem(CAR, [0, 0, 0], [4.5, 1.0, 2.5], obstacles=cells, bounds=bounds,
-                      footprint=BODY)  # fmt: skip
-    one, nodes, _ = grown(problem)
-    places = in_the_problem(one.query, nodes)[:, :2] + problem.start[:2]
-    assert outside(problem, places).max() < 1e-7
-    assert len(nodes) > (100 if COMPILED else 10)
-
-
-def test_a_goal_on_the_rim_of_the_bounds_is_not_enclosed():
-    wall = Box([1.0, 4.0], [5.5, 0.0])
-    problem = Problem(CAR, [1, 0, 0], [10, 0, 0], obstacles=wall, footprint=Box([2.0, 2.0]),
-                      bounds=Bounds(x=(0.0, 10.0), y=(-10.0, 10.0)))  # fmt: skip
-    found = first_plan(query_of(problem), budget=replace(UNLIMITED, expansions=60))
-    assert found.enclosed == ""
-
-
-def test_no_first_expansion_is_begun_that_would_be_late():
-    query = query_of(BASE)
-    search = pass_of(query, Resolution(), grid=distance_grids(query)[0])
-    assert search.first_takes > 0.0
-    late = Budget(began=0.0, deadline=0.5 * search.first_takes, clock=lambda: 0.0)
-    found = first_plan(query, budget=late)
-    assert (found.word, found.expansions, found.exhausted) == (None, 0, False)
-    search.run(1, math.inf)
-    assert search.first_takes == 0.0

@@ -16,11 +16,9 @@ from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.choose import insertion_stages
 from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
-from maneuver_automaton.search.result import InsertionTask, SearchStatus, plan_of
+from maneuver_automaton.search.result import SearchStatus, plan_of
 from maneuver_automaton.search.word_setup import word_setup
-from tests.goldens.inertia import sent
 from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only, lasting
 
@@ -161,14 +159,6 @@ def test_a_fixed_time_is_met_without_solving_every_word_for_it():
     assert found.solutions[0].cost == pytest.approx(66.0014, abs=1e-3)
     assert found.counts["steering_calls"] < 1_000_000  # every word in full takes 2,200,000
     assert plan_of(one, found.solutions[0]).duration == pytest.approx(6.8, abs=1e-8)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_words_that_climb_are_kept_though_no_node_is_at_the_altitude():
-    one = sent("helicopter", 1)
-    _, scanned, *_ = insertion_stages(InsertionTask(problem=one, goal=one.goals[0]))
-    assert scanned.solutions[0].cost < 8.21  # 8.54 without them
 
 
 def test_effort_prefers_slow_words():

@@ -87,7 +87,7 @@ def test_a_free_way_needs_no_rest():
     assert timed.duration == pytest.approx(6.0)
 
 
-@settings(max_examples=draws(16))
+@settings(max_examples=draws(8))
 @given(
     st.lists(
         st.tuples(st.floats(1.0, 5.0), st.floats(-8.0, 0.0), st.floats(0.4, 2.0)),

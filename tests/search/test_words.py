@@ -185,11 +185,6 @@ def test_the_pruned_search_is_the_head_of_the_complete_list(controls, alternativ
     assert_same_solutions(pruned, head)
 
 
-def test_results_are_the_same_in_every_run():
-    first, second = (search(parking(), alternatives=None) for _ in range(2))
-    assert [t.tolist() for _, t, _ in listed(first)] == [t.tolist() for _, t, _ in listed(second)]
-
-
 def test_small_buffers_change_nothing(monkeypatch):
     expected = search(parking(), alternatives=None)
     monkeypatch.setattr("maneuver_automaton.search.word_scan.CAPACITY", 40)
@@ -239,33 +234,12 @@ def test_minimum_time_agrees_with_brute_force_on_a_few_words():
                 assert any(np.abs(times - mine).max() < 1e-3 for mine in ours), (word, times)
 
 
-def test_longest_time():
-    fast = best(parking(cost=Cost(effort=1.0), time=None, max_time=3.39))
-    slow = best(parking(cost=Cost(effort=1.0), time=None))
-    assert fast.duration <= 3.39 + 1e-9
-    assert slow.duration > 3.39
-    assert fast.cost > slow.cost
-    never = search(parking(time=None, max_time=1.0))
-    assert never.status is SearchStatus.EXHAUSTED
-    assert never.solutions == ()
-
-
 @pytest.mark.xfail(strict=True, reason="the sign of the price of time is not looked at")
 def test_with_a_longest_time_every_solution_is_a_local_optimum():
     problem = parking(time=None, max_time=3.8)
     for solution in search(problem, alternatives=None).solutions:
         word, times = reference_word(problem, solution)
         assert word.cost(word.slsqp(times)) > solution.cost - 1e-6, names(problem, solution)
-
-
-def test_least_coasting_time():
-    problem = parking(min_coast=1.0)
-    result = search(problem, alternatives=None)
-    assert result.solutions
-    for solution in result.solutions:
-        moving = problem.automaton.body_velocities[solution.trims].any(axis=1)
-        assert solution.durations[moving].min() >= 1.0 - 1e-9
-        assert_valid(problem, solution)
 
 
 @compiled_only
@@ -328,12 +302,6 @@ def test_a_limit_on_words_ends_the_search():
         replace(parking(time=None, max_time=0.5), search=SearchSettings(max_expansions=1))
     )
     assert nothing.status is SearchStatus.OUT_OF_BUDGET
-
-
-def test_no_time_to_search():
-    result = search(parking(), budget=Budget(began=0.0, deadline=0.0), alternatives=None)
-    assert not result.complete
-    assert result.status in (SearchStatus.FOUND, SearchStatus.OUT_OF_BUDGET)
 
 
 # Libraries without rest, goals at the start, words that do not span.
@@ -432,29 +400,6 @@ def test_climbing_words_end_at_the_altitude():
         word, times = reference_word(problem, solution)
         again = word.slsqp(times)
         assert word.cost(again) == pytest.approx(solution.cost, abs=1e-6)
-
-
-def test_a_climb_may_come_first():
-    """A trim that only climbs leaves the plane to the others, wherever it stands in the word."""
-    craft = helicopter()
-    turn = craft.trims[craft.index_of("left")]
-    end = turn.coast(SE2xR([0.0, 0.0, 0.0, 0.0]), 1.2).pose + np.array([0.0, 0.0, 0.0, 2.0])
-    problem = Problem(craft, [0, 0, 0, 0], end, horizon=Horizon(max_trims=2))
-    first, second = search(problem, alternatives=2).solutions[:2]
-    assert (names(problem, first), names(problem, second)) == (("left", "lift"), ("lift", "left"))
-    assert second.durations == pytest.approx([2.0, 1.2])
-    assert_valid(problem, second)
-
-
-@compiled_only
-def test_a_climb_in_a_fixed_time():
-    problem = Problem(
-        helicopter(), [0, 0, 0, 0], [6.0, 3.0, 1.0, 2.0], cost=Cost(effort=1.0),
-        horizon=Horizon(time=9.0, max_trims=5),
-    )  # fmt: skip
-    solution = best(problem)
-    assert_valid(problem, solution)
-    assert "hover" in names(problem, solution)
 
 
 @compiled_only

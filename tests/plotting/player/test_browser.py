@@ -11,7 +11,6 @@ from maneuver_automaton.bounds import Narrowest
 from maneuver_automaton.cli import run
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.fleet import simulate_fleet
-from maneuver_automaton.formats.plan_json import load_plan
 from maneuver_automaton.planning import LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Bounds
 from tests.fleet.robots import crossing as robots
@@ -21,7 +20,6 @@ from tests.plotting.loops import pushed_loop
 from tests.plotting.player.browser import browser, opened, poses
 
 SCENARIOS = Path(__file__).parents[3] / "scenarios"
-ROADS = Path(__file__).parents[4] / "shared" / "data" / "commonroad" / "scenarios"
 MILLIMETRE = 1e-3
 
 
@@ -178,22 +176,6 @@ def _has_layers(page):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "limit"),
-    [("parallel_parking", 3), ("crossing_traffic", 2), ("trailer", 4), ("helicopter_city", 5)],
-)
-def test_a_scenario_is_played_as_its_plan_json_says(name, limit, tmp_path):
-    options = ["--html", "--no-plot", "--quiet", "--out", str(tmp_path), "--alternatives", "2"]
-    assert run(["plan", str(SCENARIOS / f"{name}.yaml"), "--time-limit", str(limit), *options]) == 0
-    plan = load_plan(tmp_path / "plan.json")
-    with browser() as running, opened(running, tmp_path / "plan.html") as page:
-        _follows(page, plan)
-        nearest = page.evaluate("Math.min(...player.data.motions[0].clearance.v)")
-        stated = dict(page.evaluate("player.data.facts"))["clearance"]
-        assert nearest == pytest.approx(float(stated.split()[0]), abs=0.02, rel=0.05)
-
-
-@pytest.mark.slow
 def test_a_closed_loop_is_played_as_its_file_says(tmp_path):
     file, options = SCENARIOS / "parking_noise.yaml", ["--html", "--no-plot", "--quiet"]
     run(["mpc", str(file), "--out", str(tmp_path), *options])
@@ -201,19 +183,6 @@ def test_a_closed_loop_is_played_as_its_file_says(tmp_path):
     with browser() as running, opened(running, tmp_path / "closed_loop.html") as page:
         shown = poses(page, [step["time_s"] for step in steps])
         np.testing.assert_allclose(shown, [step["pose"] for step in steps], atol=MILLIMETRE)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.skipif(not ROADS.is_dir(), reason="needs recordings of roads")
-def test_a_drive_is_played_as_its_file_says(tmp_path):
-    file, options = ROADS / "CHN_Sha-4_2_T-1.xml", ["--html", "--no-plot", "--quiet"]
-    run(["mpc", str(file), "--steps", "30", "--out", str(tmp_path), *options])
-    steps = json.loads((tmp_path / "closed_loop.json").read_text())["steps"]
-    with browser() as running, opened(running, tmp_path / "closed_loop.html") as page:
-        shown = poses(page, [step["time_s"] for step in steps[::7]])
-        there = [step["pose"] for step in steps[::7]]
-        np.testing.assert_allclose(shown, there, rtol=0.0, atol=MILLIMETRE)
 
 
 def test_the_page_of_a_fleets_loop_plays_what_was_driven(tmp_path):
