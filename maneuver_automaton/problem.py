@@ -818,15 +818,7 @@ _FIELDS = tuple(one.name for one in fields(Problem))
 def settled_state(
     automaton: Automaton, state: Any, what: str, *, trim: str | None = None
 ) -> tuple[Array | None, str | None]:
-    """A reduced state at an end, or else the name of the trim that has it, rather one at rest.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import load_stock_library
-    >>> car = load_stock_library("second_order_car")
-    >>> settled_state(car, {"speed": 1.0}, "start")[1], settled_state(car, [1.1, 0.2], "start")[1]
-    ('speed 1, steering 0', None)
-    """
+    """A reduced state at an end, or else the name of the trim that has it, rather one at rest."""
     if trim is not None:
         raise ValueError(f"{what}: both the trim {trim!r} and a state are given, need one of them")
     if automaton.translated is not None or automaton.lattice is not None:

@@ -81,14 +81,6 @@ def packed(plan: Plan, library: Automaton) -> Any:
 
     Primitives are numbers of the library, so that a plan takes some 200 bytes where `words_of` says
     it in names.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1.0, 0.0), "left": (0.0, 1.0)})
-    >>> plan = Plan([0, 0, 0], [robot["on"], robot["left"]], durations=[2.0, 1.0])
-    >>> unpacked(packed(plan, robot), robot).end.tolist()
-    [2.0, 0.0, 1.0]
     """
     numbers = {id(one): n for n, one in enumerate(_numbered(library))}
     rows = [numbers.get(id(one), -1) for one in (*plan.trims, *plan.maneuvers)]

@@ -38,16 +38,6 @@ def kinematics(rows: PlanArrays, samples: PlanArrays, model: Model | None) -> di
         ``v_x``, of a vehicle that slips sideways that of its path, nan where it turns on the spot;
         ``steering_rad`` of what steers; ``lateral_acceleration_m_s2``; and, with inertia,
         ``acceleration_m_s2``, ``jerk_m_s3`` and ``lateral_jerk_m_s3``.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Plan
-    >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.primitives import Trim
-    >>> left = Trim(name="left", body_velocity=[2.0, 0.0, 1.0], control=[2.0, 1.0])
-    >>> rows = Plan([0, 0, 0], (left,), durations=[1.5]).as_arrays(step=0.5)
-    >>> {key: column[-1].item() for key, column in kinematics(rows, rows, Unicycle()).items()}
-    {'arc_length_m': 3.0, 'curvature_1_m': 0.5, 'lateral_acceleration_m_s2': 2.0}
     """
     columns = {"arc_length_m": _arc_length(rows.time, samples, model)}
     rates, felt = np.zeros_like(rows.twist), np.zeros((len(rows.time), 2))

@@ -39,14 +39,7 @@ def check_cell(size: float, *, at: str) -> None:
 
 
 def bounds_around(cells: OccupancyMap) -> Bounds:
-    """The upright rectangle around a map: a planner has no business where nothing is known.
-
-    Examples
-    --------
-    >>> around = bounds_around(OccupancyMap([[0, 0]], resolution=0.5, origin=[2.0, 0.0, 0.0]))
-    >>> around.x, around.y
-    ((2.0, 3.0), (0.0, 0.5))
-    """
+    """The upright rectangle around a map: a planner has no business where nothing is known."""
     width, height = cells.extent
     corners = SE2(cells.origin).act(
         np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
@@ -62,13 +55,7 @@ def world_of(cells: OccupancyMap, path: Path, kind: str, *maps: MapFile) -> Stat
 
 
 def drawn_headings(case: int) -> Array:
-    """Headings (2,) of start and goal [rad], where a file states none: the same at every call.
-
-    Examples
-    --------
-    >>> drawn_headings(3).tolist() == drawn_headings(3).tolist()
-    True
-    """
+    """Headings (2,) of start and goal [rad], where a file states none: the same at every call."""
     return np.random.default_rng(case).uniform(-np.pi, np.pi, 2)
 
 

@@ -73,14 +73,7 @@ def n_problems(path: Path) -> int:
 
 
 def read_commonroad(path: Path) -> tuple[Statement, ...]:
-    """One problem of driving on roads for every planning problem of a file.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file is no scenario of CommonRoad, holds no planning problem, or an element is
-        missing or holds what it may not.
-    """
+    """One problem of driving on roads for every planning problem of a file."""
     root = read_xml(path, what="a scenario of CommonRoad", most=MOST_BYTES)
     if root.tag != ROOT:
         raise root.error(f"is no scenario of CommonRoad, need the element {ROOT}")

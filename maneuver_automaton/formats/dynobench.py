@@ -140,14 +140,7 @@ def dynobench_model(path: Path, document: Document, *, robot: int = 0) -> Stated
 
 
 def pose_and_state(dynamics: str, numbers: tuple[float, ...]) -> tuple[Array, Array]:
-    """The pose (3,) and the reduced state (n_z,) of a start or goal.
-
-    Examples
-    --------
-    >>> pose, hitch = pose_and_state("car_with_trailers", (1.0, 2.0, 0.5, 0.25))
-    >>> pose.tolist(), hitch.tolist()
-    ([1.0, 2.0, 0.5], [0.25])
-    """
+    """The pose (3,) and the reduced state (n_z,) of a start or goal."""
     pose, rest = np.array(numbers[:3]), np.array(numbers[3:])
     if dynamics == "car_with_trailers":
         rest = wrapped(pose[2] - rest)

@@ -77,14 +77,7 @@ class Mask(NamedTuple):
     origin: tuple[float, ...]  # [m, m, rad] of the lower left corner
 
     def regions(self) -> list[tuple[int, Polygon]]:
-        """Connected cells of one value above 0, each with the polygon that is their union.
-
-        Examples
-        --------
-        >>> mask = Mask(np.array([[0, 7, 7], [9, 0, 7]]), 0.5, (0.0, 0.0, 0.0))
-        >>> [(value, len(polygon.corners)) for value, polygon in mask.regions()]
-        [(7, 6), (9, 4)]
-        """
+        """Connected cells of one value above 0, each with the polygon that is their union."""
         import shapely
 
         found = []

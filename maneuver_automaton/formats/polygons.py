@@ -20,19 +20,6 @@ def simple_polygon(corners: ArrayLike, holes: Sequence[ArrayLike] = ()) -> Polyg
     """A polygon of rings as a file lists them.
 
     A corner that is listed twice in a row, or again at the end, counts once.
-
-    Raises
-    ------
-    ValueError
-        If a ring has no area, crosses or touches itself or another, or a hole is outside.
-
-    Examples
-    --------
-    >>> simple_polygon([[0, 0], [4, 0], [4, 2], [0, 0]]).corners.tolist()
-    [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0]]
-    >>> simple_polygon([[0, 0], [2, 2], [2, 0], [0, 2]])
-    Traceback (most recent call last):
-    ValueError: the ring crosses or touches itself at (1, 1), need a simple polygon
     """
     rings = [_ring(corners, "the ring"), *(_ring(hole, "a hole") for hole in holes)]
     import shapely

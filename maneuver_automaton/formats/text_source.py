@@ -60,13 +60,7 @@ def read_text(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") ->
 
 
 def lines_of(text: str) -> list[str]:
-    r"""Lines of a text from any system; one that is not finished counts.
-
-    Examples
-    --------
-    >>> lines_of("a\r\nb\n")
-    ['a', 'b']
-    """
+    r"""Lines of a text from any system; one that is not finished counts."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
     return lines[:-1] if lines[-1] == "" else lines
 
@@ -95,18 +89,7 @@ def check_columns(row: Sequence[str], names: Sequence[str], *, at: str) -> None:
 
 
 def finite(token: str, *, at: str) -> float:
-    """The number that a word states; `at` is its place, for the message.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is none, not finite, or so large that no computation with it has a digit left.
-
-    Examples
-    --------
-    >>> finite(" 2.5e-1", at="Case1.csv:1: value 4")
-    0.25
-    """
+    """The number that a word states; `at` is its place, for the message."""
     value = _number(token)
     if not math.isfinite(value):
         raise InvalidScenario(f"{at}: got {_brief(token)}, need a finite number")
@@ -116,18 +99,7 @@ def finite(token: str, *, at: str) -> float:
 
 
 def whole(token: str, *, at: str, least: int = 0) -> int:
-    """The whole number that a word states; `at` is its place, for the message.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is none, or less than `least`.
-
-    Examples
-    --------
-    >>> whole("4.0", at="Case1.csv:1: value 8")
-    4
-    """
+    """The whole number that a word states; `at` is its place, for the message."""
     value = _number(token)
     if not (value >= least and value.is_integer() and value < 2**53):
         raise InvalidScenario(f"{at}: got {_brief(token)}, need a whole number of at least {least}")

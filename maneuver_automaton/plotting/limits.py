@@ -41,17 +41,7 @@ class LimitArtists:
 
 
 def draw_limits(ax: Axes, zones: Sequence[Zone], bounds: Bounds) -> LimitArtists:
-    """Draw zones hatched, and the bounds of the pose dashed, on `ax`, which keeps its limits.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> from maneuver_automaton.collision import Box
-    >>> school = Zone(shape=Box([10.0, 4.0]), max_speed=1.0)
-    >>> drawn = draw_limits(Figure().add_subplot(), [school], Bounds(y=(-3.0, 3.0)))
-    >>> len(drawn.zones), len(drawn.bounds.get_segments())
-    (1, 2)
-    """
+    """Draw zones hatched, and the bounds of the pose dashed, on `ax`, which keeps its limits."""
     artists = LimitArtists(
         zones=tuple(
             PathCollection(
@@ -71,17 +61,7 @@ def draw_limits(ax: Axes, zones: Sequence[Zone], bounds: Bounds) -> LimitArtists
 
 
 def draw_ground(ax: Axes, grounds: Sequence[Ground]) -> list[Artist]:
-    """Shade ground that has a price, the darker the higher, on `ax`, which keeps its limits.
-
-    Examples
-    --------
-    >>> from matplotlib.figure import Figure
-    >>> from maneuver_automaton.collision import Box
-    >>> lawn, mud = Ground(Box([4.0, 2.0]), price=1.0), Ground(Box([1.0, 1.0]), price=3.0)
-    >>> drawn = draw_ground(Figure().add_subplot(), [lawn, mud])
-    >>> [round(float(one.get_facecolor()[0, 3]), 3) for one in drawn]
-    [0.1, 0.3]
-    """
+    """Shade ground that has a price, the darker the higher, on `ax`, which keeps its limits."""
     most = max((one.price for one in grounds if one.areas), default=1.0) or 1.0
     artists: list[Artist] = []
     for one in grounds:

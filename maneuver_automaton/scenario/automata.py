@@ -311,21 +311,6 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     second with turns on the spot; see `lattice_of_arcs`.
 
     Source: the paper, Table 2; LaValle (2006), *Planning Algorithms*, Sec. 15.3.1 and 15.3.2.
-
-    Raises
-    ------
-    ValueError
-        If there is no such preset, or it does not suit the vehicle.
-
-    Examples
-    --------
-    >>> preset_automaton("dubins", Unicycle()).controls.tolist()
-    [[1.0, 1.0], [1.0, 0.0], [1.0, -1.0]]
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5)
-    >>> parking = preset_automaton("parking", car)
-    >>> len(parking), len(parking.maneuvers)
-    (35, 242)
     """
     if name not in PRESETS:
         known = (*PRESETS, *stock_libraries())

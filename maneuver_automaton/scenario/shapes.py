@@ -139,13 +139,7 @@ def _zones_of_mask(
 
 
 def stated_zone(zone: Zone) -> dict[str, Any]:
-    """A zone in the words of a scenario file.
-
-    Examples
-    --------
-    >>> stated_zone(Zone(shape=Polygon([[0, 0], [1, 0], [1, 1]]), max_speed=0.5))
-    {'polygon_m': [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]], 'max_speed_m_s': 0.5}
-    """
+    """A zone in the words of a scenario file."""
     shape = zone.shape
     if isinstance(shape, Disc):
         raise ValueError("zones: a scenario file states a zone by a polygon, not by a disc")
@@ -160,13 +154,7 @@ def holes_entry(shape: Box | Polygon) -> dict[str, Any]:
 
 
 def stated_footprint(footprint: Sequence[Shape]) -> tuple[dict[str, Any], ...]:
-    """A body in the words of a scenario file, and of `plotting`.
-
-    Examples
-    --------
-    >>> stated_footprint([Box([4.0, 2.0], [1.0, 0.0])])
-    ({'rectangle_m': (4.0, 2.0), 'reference_m': (-1.0, 0.0)},)
-    """
+    """A body in the words of a scenario file, and of `plotting`."""
     entries: list[dict[str, Any]] = []
     for shape in footprint:
         if isinstance(shape, Box) and shape.heading == 0.0:

@@ -125,15 +125,7 @@ class Library:
         return classes[np.asarray(source)], classes[np.asarray(target)]
 
     def displacements(self, trims: Sequence[int]) -> Array:
-        """Displacement (n - 1, 4) of the transition after each trim of the automaton but the last.
-
-        Examples
-        --------
-        >>> from maneuver_automaton.models import Unicycle
-        >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-        >>> library_of(robot).displacements([0, 1, 0]).any()
-        np.False_
-        """
+        """Displacement (n - 1, 4) of the transition after each trim but the last."""
         return np.asarray(self.transitions.displacement[self.class_pair(trims[:-1], trims[1:])])
 
     def scratch(self) -> Scratch:
@@ -350,13 +342,7 @@ def most_different(twists: Array, n: int) -> IntArray:
 
 
 def four_columns(rows: Array) -> Array:
-    """Planar components (n, 3) with a height of zero; (n, 4) as they are, in an array of its own.
-
-    Examples
-    --------
-    >>> four_columns(np.array([[1.0, 0.0, 0.5]])).tolist()
-    [[1.0, 0.0, 0.5, 0.0]]
-    """
+    """Planar components (n, 3) with a height of zero; (n, 4) as they are, in a new array."""
     wide = np.zeros((len(rows), 4))
     wide[:, : rows.shape[1]] = rows
     return wide

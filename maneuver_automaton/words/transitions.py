@@ -97,15 +97,7 @@ def transitions_of(automaton: Automaton, prices: Array) -> Transitions:
 
 @kept_by_first
 def identities(automaton: Automaton) -> Transitions:
-    """The transitions of a vehicle that switches at will between all trims of an automaton.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> identities(robot).displacement.tolist()
-    [[[0.0, 0.0, 0.0, 0.0]]]
-    """
+    """The transitions of a vehicle that switches at will between all trims of an automaton."""
     none = np.zeros(0, dtype=np.int64)
     return Transitions(
         class_of=np.zeros(len(automaton), dtype=np.int64),

@@ -96,12 +96,6 @@ def normal_form(
     """A word of trims that switch at will without what lasts no longer than `shortest` [s].
 
     A trim that goes on is one trim.
-
-    Examples
-    --------
-    >>> trims, times = normal_form(np.array([0, 2, 0, 1]), np.array([1.0, 0.0, 0.5, 2.0]))
-    >>> trims.tolist(), times.tolist()
-    ([0, 1], [1.5, 2.0])
     """
     used = durations > shortest
     trims, durations = trims[used], durations[used]
@@ -193,16 +187,7 @@ def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:
 
 
 def is_word_of(automaton: Automaton, plan: Plan, word: Word) -> bool:
-    """Whether a word of trims that switch at will is that of a plan, with the same times.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> plan = Plan([0, 0, 0], robot.trims, durations=[2.0, 0.5])
-    >>> is_word_of(robot, plan, Word(trims=[0, 1], durations=[2.0, 0.5]))
-    True
-    """
+    """Whether a word of trims that switch at will is that of a plan, with the same times."""
     if word.trims.size != len(plan.trims) or plan.maneuvers:
         return False
     pairs = zip(plan.trims, word.trims.tolist(), strict=True)
