@@ -10,9 +10,14 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Disc, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import blocked_rectangles, outlines, united
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.footprint import footprint_polygons, merged, swept_region
 from maneuver_automaton.plotting.obstacles import round_times
-from maneuver_automaton.plotting.track import Track, joined_track
+from maneuver_automaton.plotting.track import (
+    Track,
+    footprint_polygons,
+    joined_track,
+    merged,
+    swept_region,
+)
 from maneuver_automaton.recording import Mover, Recording
 
 

@@ -15,11 +15,21 @@ from maneuver_automaton.collision.outline import outlines, rings_of
 from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import SEQUENCE, Color, fleet_colors, track_colors
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.limits import limit_boxes, shape_path
-from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
+from maneuver_automaton.plotting.obstacles import (
+    limit_boxes,
+    moving_shapes,
+    round_times,
+    shape_path,
+    static_shapes,
+)
 from maneuver_automaton.plotting.style import count_from_near, tidy, word_text
-from maneuver_automaton.plotting.track import Track, joined_track, track_of_plan
+from maneuver_automaton.plotting.track import (
+    Track,
+    footprint_polygons,
+    joined_track,
+    placed,
+    track_of_plan,
+)
 from maneuver_automaton.problem import Bounds, Goal, Via
 from maneuver_automaton.recording import Mover, Recording
 

@@ -21,7 +21,6 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
-from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import (
     MOVING,
@@ -37,8 +36,9 @@ from maneuver_automaton.plotting.paths import (
     JUMP_STYLE,
     draw_ends,
 )
-from maneuver_automaton.plotting.plane import draw_world, plane_entries, see
+from maneuver_automaton.plotting.pictures import draw_world, plane_entries, see
 from maneuver_automaton.plotting.together import DASHES, HATCH, TINY
+from maneuver_automaton.plotting.track import placed
 from maneuver_automaton.recording import Event, recording_of
 
 FRAMES_PER_SECOND = 15

@@ -16,9 +16,7 @@ from matplotlib.quiver import Quiver
 from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton.plotting.cast import Actor, Cast, Scenery
 from maneuver_automaton.plotting.colors import GREY, INK, MOST_TRIMS, SWEPT, Color, motion_names
-from maneuver_automaton.plotting.footprint import footprint_polygons, merged, placed, swept_region
-from maneuver_automaton.plotting.limits import region_path
-from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
+from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors, region_path
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
     Entries,
@@ -27,7 +25,14 @@ from maneuver_automaton.plotting.style import (
     mark_handle,
     shown_name,
 )
-from maneuver_automaton.plotting.track import Track, TrackPiece
+from maneuver_automaton.plotting.track import (
+    Track,
+    TrackPiece,
+    footprint_polygons,
+    merged,
+    placed,
+    swept_region,
+)
 from maneuver_automaton.problem import Goal, Via
 
 ARROW_SIZE = 0.13  # of the size of the path

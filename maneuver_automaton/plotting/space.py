@@ -20,8 +20,8 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
-from maneuver_automaton.plotting.limits import shape_path, turning
 from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.obstacles import shape_path, turning
 from maneuver_automaton.plotting.pages import space_page
 from maneuver_automaton.plotting.paths import WAY, trim_entries
 from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, Entries, line_handle, tidy

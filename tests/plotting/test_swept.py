@@ -14,9 +14,15 @@ from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed, swept_region
 from maneuver_automaton.plotting.paths import swept_area
-from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
+from maneuver_automaton.plotting.track import (
+    Track,
+    TrackPiece,
+    footprint_polygons,
+    placed,
+    swept_region,
+    track_of_plan,
+)
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.plotting.cases import document_of, parking_plan, plan_of

@@ -1,21 +1,26 @@
-"""What a player shows of a recording, as plain values that the browser draws."""
+"""The page that plays a recording: its content as plain values, which the browser draws."""
 
 from __future__ import annotations
 
+import html
+import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import BODIES, LEAST_MARK, Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import Color, track_colors
-from maneuver_automaton.plotting.distances import distance_times, nearest_others
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.over_time import distance_times, nearest_others
 from maneuver_automaton.plotting.player.numbers import (
     Local,
     body_entries,
@@ -32,11 +37,78 @@ from maneuver_automaton.plotting.player.numbers import (
     rounded,
     sample_times,
 )
-from maneuver_automaton.plotting.player.page import Player
 from maneuver_automaton.plotting.style import shown_name
-from maneuver_automaton.plotting.track import Track, joined_track
+from maneuver_automaton.plotting.track import Track, footprint_polygons, joined_track, placed
 from maneuver_automaton.recording import Curve, Fact, Mover, Recording, Search, recording_of
 from maneuver_automaton.recording.plans import stated
+
+SCRIPTS = ("motion.js", "view.js", "stage.js", "space.js", "charts.js", "panels.js", "player.js")
+FRAME_HEIGHT = 720  # [px] in a notebook
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Player:
+    """A plan to play: one HTML page, drawn by the browser from the numbers in it.
+
+    A content with ``back: {href, text}`` has a link to the page that leads here.
+
+    Examples
+    --------
+    >>> page = Player({"title": "A plan & its <name>"}).html
+    >>> page.startswith("<!doctype html>"), "http" in page
+    (True, False)
+    """
+
+    content: Mapping[str, Any] = field(repr=False)  # what `content_of` makes of a plan, and `back`
+
+    @property
+    def html(self) -> str:
+        """The whole page."""
+        page = _template()
+        # no text in the data can end the element that holds it
+        data = json.dumps(self.content, separators=(",", ":"), allow_nan=False)
+        for mark, text in (
+            ("{{title}}", html.escape(str(self.content["title"]))),
+            ("{{data}}", data.replace("<", "\\u003c")),
+        ):
+            page = page.replace(mark, text)
+        return page
+
+    def save(self, path: str | Path) -> None:
+        """Write the page; the file is replaced in one step.
+
+        Raises
+        ------
+        ValueError
+            If the ending is not .html.
+        OSError
+            If the file cannot be written; an old one stays as it was.
+        """
+        target = Path(path)
+        if target.suffix.lower() != ".html":
+            raise ValueError(f"player: got the file name {target.name}, need one ending in .html")
+        write_text_atomically(target, self.html)
+
+    def _repr_html_(self) -> str:
+        """The page in a frame of its own, for notebooks."""
+        return (
+            f'<iframe srcdoc="{html.escape(self.html)}" width="100%" height="{FRAME_HEIGHT}" '
+            'style="border:0" title="player"></iframe>'
+        )
+
+
+@cache
+def _template() -> str:
+    """The page without its data."""
+    folder = resources.files("maneuver_automaton.plotting.player")
+
+    def text(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    scripts = "\n".join(f"<script>\n{text(name)}</script>" for name in SCRIPTS)
+    page = text("player.html").replace("{{style}}", text("player.css"))
+    return page.replace("{{scripts}}", scripts)
+
 
 MOST_NODES = 20_000  # shown of a search
 Numbers = Mapping[str, int]  # of the trims on a page, by name
