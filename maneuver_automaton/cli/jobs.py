@@ -15,13 +15,14 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import (
+    Options,
     Parts,
     make_folder,
     problem_of,
+    refuse_unknown,
     states_several,
     writing,
 )
-from maneuver_automaton.cli.options import Options, refuse_unknown
 from maneuver_automaton.cli.pictures import draughtsman, draw
 from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario

@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.kinematics import accelerations, component, twist_rates
+from maneuver_automaton.exports.table import accelerations, component, twist_rates
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write

@@ -26,7 +26,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level
-from maneuver_automaton.formats.xml_source import Element, read_xml
+from maneuver_automaton.formats.text_source import Element, read_xml
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import AcceleratingCar
 from maneuver_automaton.primitives import Maneuver, Trim

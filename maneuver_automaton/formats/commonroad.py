@@ -33,9 +33,8 @@ from maneuver_automaton.formats.commonroad_rules import (
     signs_of,
     stop_lines,
 )
-from maneuver_automaton.formats.polygons import simple_polygon
-from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag, tags_below_root
+from maneuver_automaton.formats.statement import Statement, simple_polygon
+from maneuver_automaton.formats.text_source import Element, read_xml, root_tag, tags_below_root
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import GoalRegion, Lanelet, RoadBenchmark, RoadScene, RoadStart
 from maneuver_automaton.roads.scene import outlines_of, unwrapped

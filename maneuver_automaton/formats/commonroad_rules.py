@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from maneuver_automaton.formats.xml_source import Element
+from maneuver_automaton.formats.text_source import Element
 from maneuver_automaton.roads import Lanelet
 from maneuver_automaton.roads.lanelets import StopLine
 

@@ -21,8 +21,13 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, check_size, drawn_headings, world_of
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import (
+    Statement,
+    bounds_around,
+    check_size,
+    drawn_headings,
+    world_of,
+)
 from maneuver_automaton.formats.text_source import (
     MAX_MAP_BYTES,
     check_columns,

@@ -20,8 +20,13 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, check_cell, check_size, drawn_headings
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import (
+    Statement,
+    bounds_around,
+    check_cell,
+    check_size,
+    drawn_headings,
+)
 from maneuver_automaton.formats.text_source import (
     MAX_MAP_BYTES,
     finite,

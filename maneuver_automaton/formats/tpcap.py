@@ -21,8 +21,7 @@ from maneuver_automaton._files import open_input
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.polygons import simple_polygon
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import Statement, simple_polygon
 from maneuver_automaton.formats.text_source import finite, lines_of, read_text, whole
 
 FORMAT = "TPCAP"

@@ -33,7 +33,6 @@ from maneuver_automaton.problem import (
 )
 from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
-from maneuver_automaton.scenario.ground import GroundFile, StatedPlaces, places_of
 from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
@@ -45,8 +44,11 @@ from maneuver_automaton.scenario.schema import (
     StartPart,
 )
 from maneuver_automaton.scenario.shapes import (
+    GroundFile,
+    StatedPlaces,
     footprint_of,
     obstacles_of,
+    places_of,
     stated_footprint,
     zones_of,
 )

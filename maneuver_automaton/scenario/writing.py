@@ -17,7 +17,6 @@ from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Horizon, Problem, Unstated, Via
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
-from maneuver_automaton.scenario.ground import stated_places
 from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario, state_keys
 from maneuver_automaton.scenario.schema import (
@@ -32,6 +31,7 @@ from maneuver_automaton.scenario.schema import (
 from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     stated_obstacle,
+    stated_places,
     stated_zone,
 )
 from maneuver_automaton.scenario.vehicles import described
