@@ -389,7 +389,6 @@ class Ground:
         return replace(self, areas=tuple(one.moved(by) for one in self.areas), raster=raster)
 
     def _inside(self, places: Array) -> NDArray[np.bool_]:
-        """Whether places (..., 2) are in an area."""
         import shapely
 
         inside = np.zeros(places.shape[:-1], dtype=np.bool_)

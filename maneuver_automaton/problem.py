@@ -849,7 +849,6 @@ def moves(obstacle: AnyObstacle) -> bool:
 
 @kept_by_first
 def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim, float]]:
-    """Every trim of a library with its cost per second, by name."""
     rates = cost.rates(automaton.controls, automaton.body_velocities)
     return {
         trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
@@ -859,7 +858,6 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
 def _as_parts(
     model: Model, parts: Mapping[str, AnyShape | Sequence[AnyShape]]
 ) -> dict[str, tuple[Shape, ...]]:
-    """Shapes of what the vehicle carries, by name; each in the frame of its part."""
     known: tuple[str, ...] = getattr(model, "part_names", ())
     for name in parts:
         if name not in known:

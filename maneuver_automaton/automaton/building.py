@@ -349,14 +349,12 @@ class _Recipe:
 
 @functools.lru_cache(maxsize=1)
 def _program(recipe: _Recipe) -> TransferProgram:
-    """One program for all pairs that a process solves."""
     return transfer_program(
         recipe.nodes.model, objective=recipe.objective, settings=recipe.settings
     )
 
 
 def _solved(recipe: _Recipe, pair: Pair) -> Entry:
-    """One maneuver, as a line of the journal."""
     nodes, key = recipe.nodes, recipe.key_of(pair)
     source, target = nodes[pair[0]], nodes[pair[1]]
     limits = nodes.model.control_limits.copy()
@@ -429,7 +427,6 @@ def _assembled(
 
 
 def _maneuver_of(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
-    """The maneuver of a line of the journal."""
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
     return Maneuver.along(

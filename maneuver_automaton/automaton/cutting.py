@@ -238,7 +238,6 @@ def _end_of(maneuver: Maneuver, after: float) -> Maneuver:
 
 
 def _part(maneuver: Maneuver, course: Trajectory) -> Maneuver:
-    """A piece of a maneuver under its name."""
     duration = float(course.time[-1])
     return replace(maneuver, displacement=course.pose[-1], duration=duration, course=course)
 

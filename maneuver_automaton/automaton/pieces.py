@@ -177,7 +177,6 @@ def _coasted(entry: Piece, library: Automaton) -> Trim:
 
 
 def _in_library(entry: Piece, library: Automaton) -> Maneuver | None:
-    """The maneuver of the library that has the name and the ends of an entry."""
     sought = (entry["name"], entry["source"], entry["target"])
     return next(
         (one for one in library.maneuvers if (one.name, one.source, one.target) == sought), None

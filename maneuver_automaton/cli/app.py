@@ -285,7 +285,6 @@ def _document(written: Path, given: Given) -> Iterator[None]:
 
 
 def _run_jobs(name: str, document: str, given: Given) -> int:
-    """Plan or drive a file, or all of a folder."""
     from maneuver_automaton.cli.inputs import Budgets, Options
     from maneuver_automaton.cli.jobs import run_jobs
 

@@ -293,7 +293,6 @@ def _print_designed(path: Path, designed: DesignedLibrary) -> None:
 
 
 def _proven(designed: DesignedLibrary) -> list[str]:
-    """What is proven, in words."""
     everywhere = f"words of any length: factor {designed.any_length:.6g}, every start and goal"
     if designed.any_length > 1.0:
         everywhere += f"; {designed.hardest} loses most"

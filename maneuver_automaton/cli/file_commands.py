@@ -178,7 +178,6 @@ def _content(path: Path) -> dict[str, object]:
 
 
 def _named(source: Path) -> Iterator[Path]:
-    """Files that a scenario names, relative to it: maps, and their images."""
     obstacles = _content(source).get("obstacles")
     for obstacle in obstacles if isinstance(obstacles, list) else []:
         if isinstance(name := obstacle.get("map"), str):

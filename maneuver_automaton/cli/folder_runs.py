@@ -119,7 +119,6 @@ def _as_option() -> Iterator[None]:
 
 
 def _key(path: Path, parts: Parts, options: str) -> str:
-    """Hash of what a result is made from."""
     from maneuver_automaton import __version__
 
     digest = hashlib.sha256(repr((__version__, options, parts)).encode())
@@ -215,7 +214,6 @@ def _document(path: Path) -> Document | None:
 
 
 def _used(folder: Path, documents: dict[Path, Document | None]) -> Iterator[Path]:
-    """Maps that other files of the folder name."""
     for path in _files(folder):
         if _ending(path) == ".scen":
             with contextlib.suppress(InvalidScenario):  # told when the file is planned

@@ -118,7 +118,6 @@ def _mirrored(
 
 
 def _angles(points: Array) -> Array:
-    """Angles (n,) from the x axis, in [0, one turn)."""
     angles = np.mod(np.arctan2(points[:, 1], points[:, 0]), 2.0 * np.pi)
     return np.where(angles > 2.0 * np.pi - 1e-12, 0.0, angles)
 

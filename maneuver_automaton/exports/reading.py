@@ -202,7 +202,6 @@ def load_recording(
 
 
 def _driven_on_roads(file: ResultFile) -> RoadFleetResult:
-    """What a file holds of drives on roads."""
     path, document = file.path, file.document
     roads = {
         str(k if one.scene.benchmark is None else one.scene.benchmark.problem): one

@@ -261,7 +261,6 @@ def _ackermann(
 
 
 def _carried(mover: Mover, rows: PlanArrays) -> list[tuple[str, Array]]:
-    """Names and poses (n, dof) of the parts that the vehicle carries."""
     model = mover.model
     if model is None or not model.part_names:
         return []
@@ -283,7 +282,6 @@ def _in_world(pose: Array, twist: Array) -> Array:
 
 
 def _rates(time: Array, pose: Array) -> Array:
-    """Rates (n, dof) of poses, by differences."""
     if len(time) < 2:
         return np.zeros_like(pose)
     return np.asarray(np.gradient(pose, time, axis=0))

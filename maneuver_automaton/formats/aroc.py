@@ -268,7 +268,6 @@ def _occupancy(row: Element) -> Occupancy:
 
 
 def _controls(one: ArocPrimitive) -> Array:
-    """Inputs (n - 1, 2) from state to state."""
     return np.repeat(one.inputs, (len(one.states) - 1) // len(one.inputs), axis=0)
 
 

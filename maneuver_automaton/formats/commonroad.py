@@ -307,7 +307,6 @@ def _text(element: Element | None, otherwise: str) -> str:
 
 
 def _shapes(element: Element) -> Iterator[Shape]:
-    """Rectangles, circles and polygons."""
     found = False
     for part in element.children:
         if part.tag not in ("rectangle", "circle", "polygon"):
@@ -351,7 +350,6 @@ def _start(state: Element, step: float) -> RoadStart:
 
 
 def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> Iterator[GoalRegion]:
-    """The goals of a problem, one of which is to be reached."""
     states = [
         one
         for element in problem.all("goalRegion")

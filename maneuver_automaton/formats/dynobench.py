@@ -298,7 +298,6 @@ Ends: TypeAlias = dict[str, tuple[Array, Array]]
 
 
 def _with_robot(world: Statement, vehicle: StatedVehicle, ends: Ends) -> Statement:
-    """The problem of one robot alone."""
     (start, start_state), (goal, goal_state) = ends.values()
     return replace(
         world,
@@ -325,7 +324,6 @@ def _vehicles(models: Sequence[StatedModel], ends: Sequence[Ends]) -> list[State
 
 
 def _end(document: Document, robot: int, what: str, model: StatedModel) -> tuple[Array, Array]:
-    """Pose and reduced state of the start or the goal."""
     need, where = STATES[model.dynamics], ("robots", robot, what)
     numbers = numbers_at(document, where, need.count(",") + 1, need)
     if abs(numbers[2]) > MOST_HEADING:
@@ -338,7 +336,6 @@ def _end(document: Document, robot: int, what: str, model: StatedModel) -> tuple
 def _check_state(
     document: Document, robot: int, what: str, state: Array, vehicle: StatedVehicle
 ) -> None:
-    """The reduced state of the start or the goal is within the limits."""
     model = vehicle.automaton.model
     rows = zip(model.reduced_names, state.tolist(), model.reduced_limits.tolist(), strict=True)
     for name, value, (low, high) in rows:

@@ -362,7 +362,6 @@ def _pose(numbers: Any, automaton: Automaton) -> Array:
 
 
 def _piece(step: FleetStep, name: str, row: Row, step_s: float, automaton: Automaton) -> Plan:
-    """What a vehicle drove in a step."""
     pose = _pose(row["vehicle_pose"], automaton)
     undisturbed = step.piece_of(name, pose, step.time + step_s, automaton.model)
     if row["driven"] is None:
@@ -373,7 +372,6 @@ def _piece(step: FleetStep, name: str, row: Row, step_s: float, automaton: Autom
 def _step_of(
     number: int, row: Row, did: Mapping[str, Mapping[int, tuple[Row, Plan, Plan]]]
 ) -> FleetStep:
-    """A step of all."""
     if row["number"] != number:
         raise ValueError(f"steps: number: got {row['number']}, need {number}")
     here = {name: its[number] for name, its in did.items() if number in its}

@@ -327,14 +327,12 @@ def _is_chain(turns: dict[tuple[int, int], _LatticeTurn], a: int, k: int, n: int
 
 
 def _straight(heading: float, to: Array) -> Array:
-    """Poses (n, 3) [cells, cells, rad], at most a cell apart."""
     count = math.ceil(float(np.hypot(*to)) - ALIKE)
     places = np.linspace(0.0, 1.0, count + 1)[:, None] * to
     return np.column_stack([places, np.full(count + 1, heading)])
 
 
 def _along(first: float, last: float, turn: _LatticeTurn) -> Array:
-    """Poses (n, 3) [cells, cells, rad] of a straight, an arc and a straight."""
     angle = float(wrapped(last - first))
     side = math.copysign(turn.radius, angle)
     poses = [np.array([[0.0, 0.0, first]])]
@@ -359,7 +357,6 @@ def _along(first: float, last: float, turn: _LatticeTurn) -> Array:
 
 
 def _spin(first: float, last: float) -> Array:
-    """Poses (n, 3) of a turn on the spot."""
     angle = float(wrapped(last - first))
     count = math.ceil(abs(angle) / SPIN_STEP)
     return np.column_stack([np.zeros((count + 1, 2)), np.linspace(first, first + angle, count + 1)])

@@ -49,8 +49,6 @@ _A_KEY = re.compile(rf"(?m)^[\s{{\"']*({'|'.join(REQUIRED)})[\"']?\s*:")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Header:
-    """What the YAML states."""
-
     image: str
     resolution: float  # [m]
     origin: tuple[float, ...]  # [m, m, rad]

@@ -55,8 +55,6 @@ KEYS: Mapping[str, int] = {  # and how many numbers follow each
 
 @dataclass(frozen=True, slots=True)
 class _CfgWord:
-    """A word of the header and its line."""
-
     text: str
     line: int
 
@@ -160,7 +158,6 @@ def _end(
     what: str,
     cells: OccupancyMap,
 ) -> Array:
-    """Pose (3,) of start or end."""
     if CELL in numbers:
         return np.array(numbers[f"{what}{METRES}"])
     key = f"{what}{CELLS}"

@@ -117,7 +117,6 @@ def _number(token: str) -> float:
 
 
 def _brief(token: str) -> str:
-    """A word as a message shows it."""
     word = token.strip()
     return repr(brief(word, 40)) if word else "nothing"
 

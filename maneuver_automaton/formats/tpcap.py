@@ -31,8 +31,6 @@ _FIRST = re.compile(r"\s*[-+]?[.0-9]")
 
 @dataclass(frozen=True, slots=True)
 class _Value:
-    """A number of the file, as it is written, and its place."""
-
     token: str
     at: str
 

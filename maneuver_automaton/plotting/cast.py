@@ -131,7 +131,6 @@ def obstacle_boxes(obstacles: Sequence[AnyObstacle], times: Array) -> list[Array
 
 
 def _map_box(cells: OccupancyMap) -> Array:
-    """Corners (2, 2) of the box around the blocked cells of a map."""
     rows, columns = (np.flatnonzero(cells.blocked.any(axis=axis)) for axis in (1, 0))
     x = cells.resolution * np.array([columns[0], columns[-1] + 1.0])
     y = cells.resolution * np.array([rows[0], rows[-1] + 1.0])

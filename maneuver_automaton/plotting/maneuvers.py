@@ -161,7 +161,6 @@ def _count(automaton: Automaton) -> str:
 
 
 def _poses(maneuver: Maneuver) -> Array:
-    """Poses (n, dof) from the origin."""
     if maneuver.course is not None:
         return maneuver.course.pose
     return np.stack([np.zeros_like(maneuver.displacement), maneuver.displacement])

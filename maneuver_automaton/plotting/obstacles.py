@@ -129,7 +129,6 @@ def limit_boxes(zones: Sequence[Zone], bounds: Bounds) -> list[Array]:
 
 
 def _alike(zones: Sequence[Zone]) -> dict[str, list[Zone]]:
-    """Zones by what they ask for."""
     groups: dict[str, list[Zone]] = {}
     for zone in zones:
         groups.setdefault(zone.asks, []).append(zone)

@@ -223,7 +223,6 @@ def _compared(cast: Cast) -> list[Panel]:
 
 
 def _draw_curves(ax: Axes, *, cast: Cast, label: str) -> None:
-    """Curves of one label, each in the colour of its vehicle."""
     colors = {one.mover.name: one.color for one in cast.actors}
     for one in cast.recording.curves:
         if one.label == label:

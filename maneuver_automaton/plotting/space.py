@@ -130,7 +130,6 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
 
 
 def _ends(cast: Cast) -> list[tuple[Array, Color, str]]:
-    """Poses of starts and goals, with the colours and forms of their marks."""
     rows = []
     for one in cast.actors:
         colors = (START, GOAL) if cast.is_alone else (one.color, one.color)

@@ -193,8 +193,6 @@ def _goes_on(one: TrackPiece, other: TrackPiece) -> bool:
 
 
 class _Samples(NamedTuple):
-    """Columns of a trajectory."""
-
     time: Array
     pose: Array
     control: Array

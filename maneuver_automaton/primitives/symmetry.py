@@ -164,7 +164,6 @@ def _candidates(
 
 
 def _matrix(change: _Exchange) -> Array:
-    """The change as a matrix (n, n)."""
     return np.asarray(change.signs[:, None] * np.eye(len(change.order))[list(change.order)] + 0.0)
 
 

@@ -115,7 +115,6 @@ def _match(trims: Sequence[Trim], there: NDArray[np.bool_], source: Trim, rate: 
 
 
 def _distinct(headings: Array) -> list[float]:
-    """Headings modulo a full turn, each once, in order."""
     levels: list[float] = []
     for heading in sorted(headings.tolist()):
         if all(abs(wrapped(level - heading)) > HEADING_TOLERANCE for level in levels):

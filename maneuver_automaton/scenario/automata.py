@@ -99,7 +99,6 @@ def _joining(part: ManeuversPart | None) -> dict[str, Any]:
 
 
 def _of_controls(document: Document, trims: tuple[NamedTrim, ...], model: Model) -> Automaton:
-    """Trims of a kinematic vehicle, by their controls."""
     controls: dict[str, Any] = {}
     for k, trim in enumerate(trims):
         where = (*WHERE, "trims", k)
@@ -151,7 +150,6 @@ def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
 def _grid(
     document: Document, grid: GridPart, model: Model, part: ManeuversPart | None
 ) -> Automaton:
-    """Steady trims of a vehicle with a reduced state."""
     where: Where = (*WHERE, "grid")
     if grid.control is not None:
         raise document.error(

@@ -298,7 +298,6 @@ def state_keys(names: Sequence[str]) -> dict[str, str]:
 
 
 def _by_name(state: Mapping[str, float] | None, automaton: Automaton) -> dict[str, float] | None:
-    """A state of a file by the names that the model has."""
     if state is None:
         return None
     keys = state_keys(automaton.model.reduced_names)

@@ -90,7 +90,6 @@ class Player:
         write_text_atomically(target, self.html)
 
     def _repr_html_(self) -> str:
-        """The page in a frame of its own, for notebooks."""
         return (
             f'<iframe srcdoc="{html.escape(self.html)}" width="100%" height="{FRAME_HEIGHT}" '
             'style="border:0" title="player"></iframe>'
@@ -99,7 +98,6 @@ class Player:
 
 @cache
 def _template() -> str:
-    """The page without its data."""
     folder = resources.files("maneuver_automaton.plotting.player")
 
     def text(name: str) -> str:
@@ -197,7 +195,6 @@ def content_of(recording: Recording) -> dict[str, Any]:
 
 
 def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], list[Numbers]]:
-    """Name and colour of all trims, and for each vehicle their numbers."""
     entries: list[dict[str, str]] = []
     of_kind: dict[int, Numbers] = {}
     movers = [one.mover for one in cast.actors]
@@ -332,7 +329,6 @@ def _add_vehicles(
 
 
 def _steps(cast: Cast, local: Local, numbers: Numbers) -> list[dict[str, Any]]:
-    """The steps of a closed loop: what each planned, and what came of it."""
     recording, (one,) = cast.recording, cast.actors
     values = next(curve for curve in recording.curves if curve.label == "value").value.tolist()
     return [
