@@ -49,7 +49,7 @@ def head_of(plan: Plan, until: float) -> Plan:
         if k and left <= NOTHING:
             break
         if k:
-            maneuver = _between(plan, k)
+            maneuver = plan.maneuvers[k - 1] if plan.maneuvers else None
             if maneuver is not None:
                 lasting = maneuver.duration
                 cut = left < lasting - NOTHING
@@ -77,7 +77,7 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
     word, times, between, passed = list[Trim](), list[float](), list[Maneuver | None](), after
     for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if k:
-            maneuver = _between(plan, k)
+            maneuver = plan.maneuvers[k - 1] if plan.maneuvers else None
             if word:
                 between.append(maneuver)
             elif maneuver is not None and passed < maneuver.duration - NOTHING:
@@ -166,7 +166,11 @@ def joined(first: Plan, second: Plan) -> Plan:
     if same:
         lasting[0] += times[-1]
     link: tuple[Maneuver | None, ...] = () if same else (None,)
-    between = (*_all_between(first), *link, *_all_between(second))
+    between = (
+        *(first.maneuvers or (None,) * (len(first.trims) - 1)),
+        *link,
+        *(second.maneuvers or (None,) * (len(second.trims) - 1)),
+    )
     return _plan(
         first,
         first.start,
@@ -175,15 +179,6 @@ def joined(first: Plan, second: Plan) -> Plan:
         list(between),
         first.start_time,
     )
-
-
-def _all_between(plan: Plan) -> tuple[Maneuver | None, ...]:
-    return plan.maneuvers or (None,) * (len(plan.trims) - 1)
-
-
-def _between(plan: Plan, k: int) -> Maneuver | None:
-    """The maneuver before trim `k`; None for a switch."""
-    return plan.maneuvers[k - 1] if plan.maneuvers else None
 
 
 def _plan(

@@ -82,7 +82,7 @@ def packed(plan: Plan, library: Automaton) -> Any:
     Primitives are numbers of the library, so that a plan takes some 200 bytes where `words_of` says
     it in names.
     """
-    numbers = {id(one): n for n, one in enumerate(_numbered(library))}
+    numbers = {id(one): n for n, one in enumerate((*library.trims, *library.maneuvers, None))}
     rows = [numbers.get(id(one), -1) for one in (*plan.trims, *plan.maneuvers)]
     if -1 in rows:
         return plan
@@ -95,7 +95,7 @@ def unpacked(sent: Any, library: Automaton) -> Plan:
     if isinstance(sent, Plan):
         return sent
     begin, count, start, rows, durations = sent
-    known = _numbered(library)
+    known = (*library.trims, *library.maneuvers, None)
     word = tuple(known[n] for n in np.frombuffer(rows, dtype=np.uint32).tolist())
     return Plan(
         np.frombuffer(start),
@@ -104,11 +104,6 @@ def unpacked(sent: Any, library: Automaton) -> Plan:
         maneuvers=word[count:],
         start_time=begin,
     )
-
-
-def _numbered(library: Automaton) -> tuple[Any, ...]:
-    """Trims and maneuvers by number, and None for a switch."""
-    return (*library.trims, *library.maneuvers, None)
 
 
 def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:

@@ -169,11 +169,6 @@ def map_paths(cells: OccupancyMap) -> list[Path]:
     return [Path(part.reshape(-1, 2), np.tile(codes, len(part))) for part in parts]
 
 
-def moved_path(path: Path, pose: Array) -> Path:
-    """The path moved by a pose (3,)."""
-    return Path(SE2(pose).act(np.asarray(path.vertices)), path.codes)
-
-
 def turning(ring: Array, *, left: bool) -> Array:
     """The ring (n, 2) in the direction asked for."""
     to = ring - ring[0]
@@ -216,7 +211,7 @@ class MovingShape:
 
     def at(self, time: float) -> Path:
         """Where it is at `time` [s]."""
-        return moved_path(self.path, self.motion.at(time))
+        return Path(SE2(self.motion.at(time)).act(np.asarray(self.path.vertices)), self.path.codes)
 
     def track(self, begin: float, end: float) -> Array:
         """Places (n, 2) of its middle between two times [m]."""

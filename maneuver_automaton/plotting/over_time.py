@@ -158,7 +158,7 @@ def panels_of(cast: Cast) -> list[Panel]:
     panels: list[Panel] = []
     if len(cast.actors) > 1 and not cast.recording.alternatives and not cast.on_roads:
         panels.append(_bars(cast))
-        if cast.end > cast.begin:
+        if cast.end > cast.recording.begin:
             panels.append(_distances(cast))
     values = [one for one in cast.recording.curves if one.label == "value"]
     if any(one.time.size > 1 for one in values):
@@ -334,9 +334,10 @@ def draw_bars(ax: Axes, cast: Cast) -> PolyCollection:
             shaded(one.color, RESTS) if rests else one.color for _, one, (_, _, rests) in spans
         ],
     )  # fmt: skip
-    none = [k for k, one in enumerate(cast.actors) if not one.drives]
+    none = [k for k, one in enumerate(cast.actors) if not one.mover.has_plan]
+    begin = cast.recording.begin
     missing = PolyCollection(
-        [_bar(k, cast.begin, cast.begin + _span(cast)) for k in none], facecolors="white",
+        [_bar(k, begin, begin + _span(cast)) for k in none], facecolors="white",
         edgecolors=[cast.actors[k].color for k in none], linewidths=0.7, hatch=HATCH, zorder=2.0,
     )  # fmt: skip
     for part in (bars, missing):
@@ -394,7 +395,7 @@ def _distances(cast: Cast) -> Panel:
     ]
 
     def draw(ax: Axes) -> None:
-        times = distance_times(cast.begin, cast.end)
+        times = distance_times(cast.recording.begin, cast.end)
         draw_distances(ax, cast, times, nearest_others(cast.actors, times).min(axis=1))
 
     return Panel(draw, 1.0, entries)
@@ -421,9 +422,9 @@ def draw_distances(ax: Axes, cast: Cast, times: Array, least: Array) -> None:
 def _limits(cast: Cast) -> tuple[float, float]:
     """What axes over time show of a cast [s]."""
     span = _span(cast)
-    return cast.begin - 0.01 * span, cast.begin + 1.02 * span
+    return cast.recording.begin - 0.01 * span, cast.recording.begin + 1.02 * span
 
 
 def _span(cast: Cast) -> float:
     """How long all takes [s]; not nothing."""
-    return cast.end - cast.begin or 1.0
+    return cast.end - cast.recording.begin or 1.0

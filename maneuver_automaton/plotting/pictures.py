@@ -84,7 +84,7 @@ def draw_plane(ax: Axes, result: Any, *, legend: bool = True) -> dict[str, Any]:
 
 def draw_cast(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, Any]:
     """Draw a cast in the plane; see `draw_plane`; bodies may have numbers of their times."""
-    artists = draw_world(ax, cast, cast.scene.times)
+    artists = draw_world(ax, cast, cast.times)
     if cast.is_alone:
         artists |= draw_path(ax, cast)
     else:
@@ -103,9 +103,9 @@ def see(ax: Axes, cast: Cast) -> None:
 
 def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
     """Draw lanes, obstacles, those that move at `times` [s], zones and bounds."""
-    scene = cast.scene
+    world = cast.recording.world
     lanes = PolyCollection(
-        list(cast.recording.world.lanes), facecolors=[LANE], edgecolors=["white"], linewidths=0.8,
+        list(world.lanes), facecolors=[LANE], edgecolors=["white"], linewidths=0.8,
         zorder=0.5,
     )  # fmt: skip
     regions = [(shape_path(place), one) for one in cast.actors for place in one.mover.regions]
@@ -116,10 +116,9 @@ def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
     )  # fmt: skip
     for part in (lanes, goals):
         ax.add_collection(part, autolim=False)
-    fleeting = cast.recording.world.fleeting
-    around = draw_obstacles(ax, scene.obstacles, time=times, fleeting=fleeting)
-    limits = draw_limits(ax, scene.zones, scene.bounds)
-    ground = draw_ground(ax, cast.recording.world.ground)
+    around = draw_obstacles(ax, world.obstacles, time=times, fleeting=world.fleeting)
+    limits = draw_limits(ax, world.zones, world.bounds)
+    ground = draw_ground(ax, world.ground)
     parts: dict[str, Any] = {
         "lanes": lanes, "obstacles": around.static, "traffic": around.moving,
         "tracks": around.tracks, "bounds": limits.bounds,
@@ -131,9 +130,10 @@ def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
 
 def plane_entries(cast: Cast, *, moving: bool = False) -> Entries:
     """Legend entries of all that is in the plane, or in a film of it: `moving`."""
-    scene, world, search = cast.scene, cast.recording.world, cast.recording.search
+    world, search = cast.recording.world, cast.recording.search
     if cast.is_alone:
-        driven, ends = path_entries(cast, moving=moving), end_entries(scene.goals, scene.via)
+        (one,) = cast.actors
+        driven, ends = path_entries(cast, moving=moving), end_entries(one.goals, one.mover.via)
     else:
         driven, ends = vehicle_entries(cast, moving=moving), []
     reached = not moving and search is not None and search.reached is not None
@@ -141,9 +141,9 @@ def plane_entries(cast: Cast, *, moving: bool = False) -> Entries:
         *driven,
         *ends,
         *([(Patch(facecolor=LANE), "lane")] if world.lanes else []),
-        *obstacle_entries(scene.obstacles, scene.times[:1] if moving else scene.times),
+        *obstacle_entries(world.obstacles, cast.times[:1] if moving else cast.times),
         *ground_entries(world.ground),
-        *limit_entries(scene.zones, scene.bounds),
+        *limit_entries(world.zones, world.bounds),
         *([(Patch(color=REACHED), "may be reached")] if reached else []),
     ]
 

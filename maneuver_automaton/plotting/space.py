@@ -242,7 +242,7 @@ def _height(obstacle: Any) -> tuple[float, float] | None:
 
 
 def _standing(cast: Cast) -> list[Obstacle]:
-    return [one for one in cast.scene.obstacles if isinstance(one, Obstacle)]
+    return [one for one in cast.recording.world.obstacles if isinstance(one, Obstacle)]
 
 
 def _entries(cast: Cast) -> Entries:

@@ -114,8 +114,8 @@ def test_what_is_carried_is_swept_as_well():
     turn = max(trims, key=lambda trim: trim.body_velocity[0] * abs(trim.body_velocity[2]))
     plan = Plan(problem.start, (turn,), durations=[3.0])
     result = PlanResult(problem=problem, status=PlanStatus.FOUND, reason="", plan=plan)
-    scene = cast_of(recording_of(result)).scene
-    (path,) = swept_area(track_of_plan(plan), scene).get_paths()
+    (actor,) = cast_of(recording_of(result)).actors
+    (path,) = swept_area(actor).get_paths()
     rings = [shapely.Polygon(ring) for ring in path.to_polygons(closed_only=False)]
     region = shapely.union_all(rings)
     trailer = carried(plan, problem.automaton.model, "trailer")

@@ -158,6 +158,7 @@ def content_of(recording: Recording) -> dict[str, Any]:
     """Title, facts, motions, and what is around them; of several vehicles one may be picked."""
     cast, world = cast_of(recording), recording.world
     first, local = cast.actors[0], Local(cast.actors[0].track.start[:2])
+    goals = first.goals if cast.is_alone else ()
     others = {one: joined_track(one.start, one.pieces) for one in recording.alternatives}
     trims, numbers = _trims(cast, list(others.values()))
     motions = [
@@ -174,7 +175,7 @@ def content_of(recording: Recording) -> dict[str, Any]:
         "origin": local.origin.tolist(),
         "box": local.places(_box(cast, [first.track, *others.values()])),
         "mark": rounded([_mark(cast)])[0],
-        "goals": goal_entries(cast.scene.goals, local, cast.scene.reached),
+        "goals": goal_entries(goals, local, first.reached),
         "obstacles": obstacle_entries(world.obstacles, local, leave=world.fleeting),
         **limit_entries(world.zones, world.bounds, local),
         "ending": recording.ending,
@@ -268,7 +269,7 @@ def _curve(curve: Curve) -> dict[str, list[float]]:
 
 def _box(cast: Cast, tracks: Iterable[Track]) -> Array:
     """The box (2, 2) of the picture, and all that the body sweeps along tracks in it."""
-    body = cast.scene.body
+    body = cast.actors[0].body if cast.is_alone else []
     bodies = [ring for track in tracks for ring in placed(body, track.pose)]
     places = [*cast.box, *np.concatenate([np.zeros((0, 2)), *bodies])]
     return np.array([np.min(places, axis=0), np.max(places, axis=0)])
@@ -289,7 +290,7 @@ def _add_vehicles(
     content: dict[str, Any], cast: Cast, local: Local, numbers: Sequence[Numbers]
 ) -> None:
     """What tells several vehicles apart, and what all of them do together."""
-    times = distance_times(cast.begin, cast.end)
+    times = distance_times(cast.recording.begin, cast.end)
     nearest = nearest_others(cast.actors, times)
     for k, one in enumerate(cast.actors):
         mover = one.mover
@@ -300,7 +301,7 @@ def _add_vehicles(
             "bodies": body_entries(mover.bodies),
             "goals": goal_entries(mover.goals, local, mover.goal_index),
             "leaves": bool(np.isfinite(mover.there[1])),
-            "joins": bool(np.isfinite(mover.there[0])) and mover.there[0] > cast.begin,
+            "joins": bool(np.isfinite(mover.there[0])) and mover.there[0] > cast.recording.begin,
             "reason": mover.reason,
             "others": distance_curve(times, nearest[:, k]),
             "held": [
@@ -310,7 +311,7 @@ def _add_vehicles(
         }
     recording = cast.recording
     fleet: dict[str, Any] = {
-        "begin": cast.begin,
+        "begin": cast.recording.begin,
         "end": cast.end,
         "margin": recording.world.margin,
         "distance": distance_curve(times, nearest.min(axis=1)),
