@@ -29,6 +29,7 @@ from maneuver_automaton.formats.commonroad_rules import (
     SIGN,
     limits_of,
     not_obeyed,
+    point_of,
     refs,
     signs_of,
     stop_lines,
@@ -153,14 +154,10 @@ def _runs(neighbour: Element, direction: str) -> bool:
 
 
 def _points(element: Element) -> Array:
-    points = [_point(one) for one in element.all("point")]
+    points = [point_of(one) for one in element.all("point")]
     if len(points) < 2:
         raise element.error(f"got {len(points)} points, need at least 2")
     return np.array(points)
-
-
-def _point(element: Element) -> tuple[float, float]:
-    return element.need("x").number(), element.need("y").number()
 
 
 def _traffic(
@@ -228,7 +225,7 @@ def _exact_pose(state: Element, shapes: Sequence[Shape]) -> tuple[float, float, 
     """The pose of a state at one time; None if it is uncertain."""
     (begin, end), (low, high) = _interval(state.need("time")), _headings(state, shapes)
     point = state.need("position").get("point")
-    return None if point is None or begin != end or low != high else (*_point(point), low)
+    return None if point is None or begin != end or low != high else (*point_of(point), low)
 
 
 def _headings(state: Element, shapes: Sequence[Shape]) -> tuple[float, float]:
@@ -261,7 +258,7 @@ def _shapes_at(
     position = state.need("position")
     point = position.get("point")
     places = (
-        np.array([_point(point)])
+        np.array([point_of(point)])
         if point is not None
         else np.concatenate([_corners(one) for one in _places(position, lanelets)])
     )
@@ -313,7 +310,7 @@ def _shapes(element: Element) -> Iterator[Shape]:
             continue
         found = True
         middle = part.get("center")
-        center = (0.0, 0.0) if middle is None else _point(middle)
+        center = (0.0, 0.0) if middle is None else point_of(middle)
         turn = part.get("orientation")
         try:
             if part.tag == "rectangle":
@@ -322,7 +319,7 @@ def _shapes(element: Element) -> Iterator[Shape]:
             elif part.tag == "circle":
                 yield Disc(part.need("radius").number(), center)
             else:
-                yield simple_polygon([_point(one) for one in part.all("point")])
+                yield simple_polygon([point_of(one) for one in part.all("point")])
         except ValueError as error:
             raise _at(part, error) from error
     if not found:
@@ -342,7 +339,7 @@ def _start(state: Element, step: float) -> RoadStart:
         speed = math.hypot(speed, 0.0 if aside is None else aside.number())
     turn_rate = state.get("yawRate", "exact")
     return RoadStart(
-        middle=np.array([*_point(state.need("position", "point")), heading]),
+        middle=np.array([*point_of(state.need("position", "point")), heading]),
         speed=speed,
         turn_rate=0.0 if turn_rate is None else turn_rate.number(),
         time=step * state.need("time", "exact").number(),

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray, freeze
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.words.closing import closed_at
-from maneuver_automaton.words.library import Library
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH, Library
 
 SAME_TIME = 1e-9  # [s] coasting times that differ by less are the same
 
