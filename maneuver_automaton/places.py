@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, as_array, check_size, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import check_size
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import (
     AnyObstacle,

@@ -11,18 +11,10 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import (
-    MOST_TURNS,
-    Array,
-    as_array,
-    as_number,
-    check_heading,
-    check_size,
-    freeze,
-    plain_numbers,
-)
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import kept_by_first, kept_with
+from maneuver_automaton._limits import MOST_TURNS, check_heading, check_size
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.automaton.headings import motion_of, posed
 from maneuver_automaton.collision import (

@@ -10,15 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import (
-    Array,
-    as_array,
-    check_heading,
-    check_size,
-    freeze,
-    plain_numbers,
-)
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import check_heading, check_size
 from maneuver_automaton.groups import LieGroup
 
 MET = 1e-9  # [m, rad] from a pose on the way, beyond its tolerance, as of goals

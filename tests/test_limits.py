@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton import Automaton, Problem, Unicycle
-from maneuver_automaton._arrays import FARTHEST, FASTEST
+from maneuver_automaton._limits import FARTHEST, FASTEST
 from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygon
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import SecondOrderCar

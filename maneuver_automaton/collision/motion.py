@@ -10,16 +10,9 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import (
-    FASTEST,
-    FASTEST_TURN,
-    Array,
-    IntArray,
-    check_size,
-    freeze,
-    wrapped,
-)
+from maneuver_automaton._arrays import Array, IntArray, freeze, wrapped
 from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import FASTEST, FASTEST_TURN, check_size
 from maneuver_automaton.groups import SE2, LieGroup
 
 GAP = 1e-8  # of the size of a motion: how far beside its next pose a twist may lead

@@ -13,15 +13,9 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import (
-    LARGEST_BODY,
-    Array,
-    as_array,
-    check_size,
-    freeze,
-    plain_numbers,
-)
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import LARGEST_BODY, check_size
 from maneuver_automaton.collision.geometry import (
     Geometry,
     are_points,

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from maneuver_automaton._arrays import check_size, plain_numbers
+from maneuver_automaton._arrays import plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import check_size
 from maneuver_automaton.collision.motion import planar
 from maneuver_automaton.groups import LieGroup, SE2xR
 from maneuver_automaton.problem import Problem

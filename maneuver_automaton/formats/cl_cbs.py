@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from maneuver_automaton._arrays import MOST_HEADING, Array
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.yaml_source import (

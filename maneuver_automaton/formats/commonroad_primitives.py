@@ -23,8 +23,9 @@ from pathlib import Path
 
 import numpy as np
 
-from maneuver_automaton._arrays import FASTEST, STEEPEST_STEERING, Array, freeze
+from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._files import write_text_atomically
+from maneuver_automaton._limits import FASTEST, STEEPEST_STEERING
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level

@@ -21,7 +21,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from maneuver_automaton._arrays import MOST_HEADING, Array, wrapped
+from maneuver_automaton._arrays import Array, wrapped
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.formats.statement import StatedVehicle, Statement

@@ -21,8 +21,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import MOST_HEADING, Array, IntArray
+from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._files import write_bytes_atomically, write_text_atomically
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import OccupancyMap, Polygon
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.collision.surroundings import runs_of

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from maneuver_automaton._arrays import FARTHEST as FARTHEST
 from maneuver_automaton._files import open_input
+from maneuver_automaton._limits import FARTHEST as FARTHEST
 from maneuver_automaton.errors import InvalidScenario
 
 MAX_BYTES = 5_000_000  # of a file that people write

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from maneuver_automaton._arrays import MOST_HEADING, Array
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import open_input
+from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.statement import Statement, simple_polygon

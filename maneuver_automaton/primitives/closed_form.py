@@ -10,7 +10,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import LONGEST_STROKE, Array, IntArray
+from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._limits import LONGEST_STROKE
 from maneuver_automaton.errors import NotATrim
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import (

@@ -9,8 +9,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import FASTEST, FASTEST_SPIN, Array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
+from maneuver_automaton._limits import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup, group_of
 from maneuver_automaton.models import Model
 

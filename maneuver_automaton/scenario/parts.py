@@ -29,7 +29,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from maneuver_automaton._arrays import FARTHEST
+from maneuver_automaton._limits import FARTHEST
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.yaml_source import Document, Where, shown
 
