@@ -380,16 +380,13 @@ def _road_box(recording: Recording, points: Array) -> Array:
     for one in (one for one in recording.world.obstacles if isinstance(one, Obstacle)):
         for time in np.linspace(recording.begin, recording.end, STEPS_OF_MANY):
             if recording.world.is_there(one, float(time)):
-                corners = _corners_at(one, float(time))
+                corners = np.asarray(shape_path(one.shape).vertices)
+                if one.motion is not None:
+                    corners = np.asarray(SE2(one.motion.at(float(time))).act(corners))
                 if (corners > low).all() and (corners < high).all():
                     every.append(corners)
     whole = np.concatenate(every)
     return np.array([whole.min(axis=0) - ROADSIDE_M, whole.max(axis=0) + ROADSIDE_M])
-
-
-def _corners_at(one: Obstacle, time: float) -> Array:
-    corners = np.asarray(shape_path(one.shape).vertices)
-    return corners if one.motion is None else np.asarray(SE2(one.motion.at(time)).act(corners))
 
 
 def rings_with_radius(shapes: Sequence[Shape]) -> list[tuple[Array, float]]:

@@ -136,15 +136,10 @@ def _video(film: Film) -> bytes:
 
     writer = FFMpegWriter(fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
     pause = [film.times[-1]] * round(PAUSE_S * FRAMES_PER_SECOND)
-    return _grabbed(film, writer, [*film.times, *pause], name="film.mp4")
-
-
-def _grabbed(film: Film, writer: Any, times: Sequence[float] | Array, *, name: str) -> bytes:
-    """What a Matplotlib `writer` makes of the pictures at `times` [s]."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / name
+        file = Path(folder) / "film.mp4"
         with writer.saving(film.figure, str(file), DPI):
-            for time in times:
+            for time in [*film.times, *pause]:
                 film.show(float(time))
                 writer.grab_frame()
         return file.read_bytes()
