@@ -19,7 +19,7 @@ from pathlib import Path
 
 import maneuver_automaton
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.journal import journal_path, read_journal
+from maneuver_automaton.automaton.building import journal_path, read_journal
 from maneuver_automaton.automaton.library import load_library, stock_libraries
 from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.scenario.build_file import load_build_file

@@ -37,11 +37,6 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
     ------
     ValueError
         If `value` holds no numbers, is not finite, or has another last axis.
-
-    Examples
-    --------
-    >>> as_array("pose", [0, 1, 2], last=3)
-    array([0., 1., 2.])
     """
     try:
         array = np.asarray(value, dtype=np.float64, order="C")
@@ -144,13 +139,7 @@ def wrapped(angle: ArrayLike) -> Array:
 
 
 def vector_text(vector: Array) -> str:
-    """Numbers in a row, with 4 significant digits.
-
-    Examples
-    --------
-    >>> vector_text(np.array([1.23456, -2e-9]))
-    '(1.235, -2e-09)'
-    """
+    """Numbers in a row, with 4 significant digits."""
     if vector.ndim > 1:
         return ", then ".join(vector_text(row) for row in vector)
     return f"({', '.join(f'{value:.4g}' for value in vector)})"

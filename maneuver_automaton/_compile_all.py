@@ -148,8 +148,8 @@ def ship(package: Path) -> list[str]:
         print(f"{begin}  {text}", flush=True)  # noqa: T201
 
     def report(done: Sequence[str], names: Sequence[str]) -> None:
-        left = {_room(name) for name in set(names).difference(done)}
-        for room in sorted({_room(name) for name in names} - left - said):
+        left = {name.split(".")[1] for name in set(names).difference(done)}
+        for room in sorted({name.split(".")[1] for name in names} - left - said):
             said.add(room)
             say(f"compiled {room} ({len(done)} of {len(names)} kernels)")
 
@@ -213,11 +213,6 @@ def _left_in(group: Path) -> float:
             stated = (group / "memory.stat").read_text().split("inactive_file ")
             return left + (int(stated[1].split()[0]) if len(stated) > 1 else 0)
     return math.inf
-
-
-def _room(name: str) -> str:
-    """The folder of the package that a kernel is from."""
-    return name.split(".")[1]
 
 
 def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:

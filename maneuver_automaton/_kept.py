@@ -42,17 +42,7 @@ def _kept_by(owner: Any, kind: Hashable, make: Callable[..., _T]) -> Callable[..
 
 
 def kept_with(owner: Any, key: Hashable, make: Callable[[], _T]) -> _T:
-    """What is kept under a key with a value, made when it is first asked for.
-
-    Examples
-    --------
-    >>> class Library:
-    ...     pass
-    >>> one = Library()
-    >>> kept_with(one, "spare", list).append(3)
-    >>> kept_with(one, "spare", list), kept_with(Library(), "spare", list)
-    ([3], [])
-    """
+    """What is kept under a key with a value, made when it is first asked for."""
     kept: dict[Hashable, Any] = owner.__dict__.setdefault("_kept", _Kept())
     kind = getattr(make, "__code__", make)  # a function within another is made anew at every call
     results: dict[Hashable, _T] = kept.setdefault(("with", kind), {})
@@ -89,14 +79,6 @@ class Prepared:
 
     Each planner holds one of its own. What it lacks is taken from `RECENT`, which serves whoever
     holds none.
-
-    Examples
-    --------
-    >>> def square(number: int) -> list[int]:
-    ...     return [number * number]
-    >>> prepared = Prepared()
-    >>> prepared.once(square, 3) is prepared.once(square, 3)
-    True
     """
 
     _blocks: list[_Block] = field(default_factory=list, init=False)  # that nobody uses now

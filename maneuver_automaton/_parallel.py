@@ -140,12 +140,6 @@ def gathered(*, jobs: int = 1, scheduler: str | None = None) -> Iterator[Gathere
 
     The block is handed a function of a function and its pieces, which returns all results in
     the order of the pieces. After a signal, functions are to come to an end by themselves.
-
-    Examples
-    --------
-    >>> with gathered() as run:
-    ...     list(run(abs, [-1, 2])), list(run(abs, [3]))
-    ([1, 2], [3])
     """
     if scheduler is None:
         yield functools.partial(in_parallel, jobs=jobs, ends_early=True)

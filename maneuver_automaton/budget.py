@@ -18,16 +18,7 @@ MOMENT, SHARE = 4e-3, 0.25  # [s], and of the time left, between two looks at th
 
 @dataclass(slots=True, eq=False)
 class Watch:
-    """What a search and a proof beside it tell each other, and anybody who looks on.
-
-    Examples
-    --------
-    >>> watch = Watch(gap=0.05)
-    >>> watch.note(10.0)
-    >>> watch.bound = 9.6
-    >>> watch.is_closed
-    True
-    """
+    """What a search and a proof beside it tell each other, and anybody who looks on."""
 
     gap: float  # share of the cost that is small enough
     problem: object = None  # of which the plans must be, for their cost to count
@@ -52,16 +43,6 @@ class Budget:
 
     It is the one value that says when to stop: whatever loops is handed a budget and asks it.
     Kernels cannot ask; they are called for a number of steps that takes some milliseconds.
-
-    Examples
-    --------
-    >>> budget = Budget.from_now(10.0, expansions=500)
-    >>> budget.is_over, budget.less(400).expansions, budget.less(600).expansions
-    (False, 100, 0)
-    >>> budget.part(0.5).deadline < budget.stage(0.5).deadline < budget.deadline
-    True
-    >>> round(budget.deadline - budget.before(2.0).deadline, 6)
-    2.0
     """
 
     began: float  # as the clock counts [s]
@@ -168,12 +149,6 @@ class Pace:
 
     For work that is the same however it is parted. Where time gets short portions get smaller, so
     that a costly step among cheap ones delays little.
-
-    Examples
-    --------
-    >>> pace = Pace(UNLIMITED, steps=2)
-    >>> pace.take(9), pace.take(7) >= 1, Pace(Budget.from_now(0.0), steps=2).take(9)
-    (2, True, 0)
     """
 
     budget: Budget
@@ -205,14 +180,6 @@ class EvenPace:
 
     Portions are smaller than that, and a step that does not fit is not begun, only where time gets
     short: for work that depends on how it is parted.
-
-    Examples
-    --------
-    >>> EvenPace(UNLIMITED, most=8, each=1e-3).take(9)
-    8
-    >>> pace = EvenPace(Budget(began=0.0, deadline=1.0, clock=lambda: 0.5), most=8, each=0.2)
-    >>> pace.take(9)
-    2
     """
 
     budget: Budget

@@ -109,28 +109,13 @@ class Cost:
 
 
 def terms_of(cost: StageCost) -> Cost | None:
-    """The weights that a cost is the sum of; None if it does not say that it is one.
-
-    Examples
-    --------
-    >>> class Hurry:
-    ...     def terms(self):
-    ...         return Cost(time=2.0)
-    >>> terms_of(Hurry()).time
-    2.0
-    """
+    """The weights that a cost is the sum of; None if it does not say that it is one."""
     terms: Callable[[], Cost] | None = getattr(cost, "terms", None)
     return None if terms is None else terms()
 
 
 def prices_switches(cost: StageCost) -> bool:
-    """Whether a switch of trims costs something by itself, or may: a user's own cost may.
-
-    Examples
-    --------
-    >>> prices_switches(Cost(time=1.0)), prices_switches(Cost(time=1.0, switch=0.1))
-    (False, True)
-    """
+    """Whether a switch of trims costs something by itself, or may: a user's own cost may."""
     terms = terms_of(cost)
     return terms is None or terms.switch > 0.0 or terms.direction_change > 0.0
 

@@ -63,15 +63,6 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
     Simpson's rule over stretches not longer than the finest feature; those whose halves say
     something else are halved again, until what they differ by in all is small enough. Where a rate
     jumps, at the border of an area, that finds the border.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Box, Ground, Unicycle
-    >>> ahead = Trim(name="ahead", body_velocity=[1.0, 0.0, 0.0], control=[1.0, 0.0])
-    >>> plan = Plan([0.0, 0.0, 0.0], (ahead,), durations=[9.0])
-    >>> lawn = Ground(Box([2.0, 2.0], center=[4.0, 0.0]), price=3.0)
-    >>> round(price_along(lawn, plan, Unicycle(), beside=9.0).price, 2)
-    6.0
     """
     motion = _Motion(cost, plan, model)
     todo, done, doubt, refused = _first_stretches(plan, scale_of(cost)), 0.0, 0.0, None

@@ -389,7 +389,6 @@ class Ground:
         return replace(self, areas=tuple(one.moved(by) for one in self.areas), raster=raster)
 
     def _inside(self, places: Array) -> NDArray[np.bool_]:
-        """Whether places (..., 2) are in an area."""
         import shapely
 
         inside = np.zeros(places.shape[:-1], dtype=np.bool_)
@@ -406,14 +405,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Raster:
-    """Values at the middles of square cells, row 0 lowest, and linear between.
-
-    Examples
-    --------
-    >>> raster = Raster(np.array([[0.0, 4.0]]), resolution=1.0)
-    >>> raster.at(raster.values, np.array([[0.5, 0.5], [1.0, 0.5], [7.0, 0.5]])).tolist()
-    [0.0, 2.0, 0.0]
-    """
+    """Values at the middles of square cells, row 0 lowest, and linear between."""
 
     values: Array  # (rows, columns)
     resolution: float = field(kw_only=True)  # [m]
@@ -521,13 +513,7 @@ class _Moved:
 
 
 def check_place_costs(value: Any) -> tuple[PlaceCost, ...]:
-    """Costs of places from one or several.
-
-    Examples
-    --------
-    >>> len(check_place_costs(Clearance(1.0, 0.5)))
-    1
-    """
+    """Costs of places from one or several."""
     costs = tuple(value) if isinstance(value, Sequence) else (value,)
     for k, cost in enumerate(costs):
         if not callable(getattr(cost, "rates", None)):

@@ -818,15 +818,7 @@ _FIELDS = tuple(one.name for one in fields(Problem))
 def settled_state(
     automaton: Automaton, state: Any, what: str, *, trim: str | None = None
 ) -> tuple[Array | None, str | None]:
-    """A reduced state at an end, or else the name of the trim that has it, rather one at rest.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import load_stock_library
-    >>> car = load_stock_library("second_order_car")
-    >>> settled_state(car, {"speed": 1.0}, "start")[1], settled_state(car, [1.1, 0.2], "start")[1]
-    ('speed 1, steering 0', None)
-    """
+    """A reduced state at an end, or else the name of the trim that has it, rather one at rest."""
     if trim is not None:
         raise ValueError(f"{what}: both the trim {trim!r} and a state are given, need one of them")
     if automaton.translated is not None or automaton.lattice is not None:
@@ -857,7 +849,6 @@ def moves(obstacle: AnyObstacle) -> bool:
 
 @kept_by_first
 def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim, float]]:
-    """Every trim of a library with its cost per second, by name."""
     rates = cost.rates(automaton.controls, automaton.body_velocities)
     return {
         trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
@@ -867,7 +858,6 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
 def _as_parts(
     model: Model, parts: Mapping[str, AnyShape | Sequence[AnyShape]]
 ) -> dict[str, tuple[Shape, ...]]:
-    """Shapes of what the vehicle carries, by name; each in the frame of its part."""
     known: tuple[str, ...] = getattr(model, "part_names", ())
     for name in parts:
         if name not in known:

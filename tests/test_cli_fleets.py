@@ -142,9 +142,8 @@ class TestPlan:
     def test_interrupted_before_there_was_a_plan(self, folder, capsys, monkeypatch):
         from maneuver_automaton import _interrupts
         from maneuver_automaton.cli import fleets
-        from maneuver_automaton.cli.inputs import Parts
+        from maneuver_automaton.cli.inputs import Options, Parts
         from maneuver_automaton.cli.jobs import Job
-        from maneuver_automaton.cli.options import Options
 
         def at_once(*_, **__):
             raise KeyboardInterrupt

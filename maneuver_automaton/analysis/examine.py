@@ -42,26 +42,14 @@ class SymmetryReport:
 
 
 def motion_of(coordinate: str) -> str:
-    """Name of the motion that moves one coordinate.
-
-    Examples
-    --------
-    >>> [motion_of(name) for name in ("x", "heading", "z")]
-    ['translation in x', 'rotation', 'climb']
-    """
+    """Name of the motion that moves one coordinate."""
     name, _, number = coordinate.partition("_")
     kind = {"heading": "rotation", "z": "climb"}.get(name, f"translation in {name}")
     return f"{kind} of part {number}" if number else kind
 
 
 def unit_of(coordinate: str) -> str:
-    """Say the unit of a coordinate of a pose, with a space in front.
-
-    Examples
-    --------
-    >>> unit_of("heading"), unit_of("y")
-    (' rad', ' m')
-    """
+    """Say the unit of a coordinate of a pose, with a space in front."""
     return " rad" if coordinate.startswith("heading") else " m"
 
 

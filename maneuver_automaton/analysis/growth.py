@@ -283,12 +283,7 @@ def _segments(pose: Array) -> tuple[Array, Array, Array]:
     starts = [(*here, zero + heading), (*here, first), (*there, first), (*there, zero)]
     turn = (zero, zero, zero + 1.0)
     directions = [turn, (np.cos(first), np.sin(first), zero), turn, (zero + 1.0, zero, zero)]
-    return _stacked(starts), _stacked(directions), lengths
-
-
-def _stacked(rows: Sequence[Sequence[Array]]) -> Array:
-    """Rows of components (f,) as (f, rows, components)."""
-    return np.moveaxis(np.array(rows), -1, 0)
+    return np.moveaxis(np.array(starts), -1, 0), np.moveaxis(np.array(directions), -1, 0), lengths
 
 
 def unit_cost(

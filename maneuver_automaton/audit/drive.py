@@ -44,17 +44,7 @@ NUDGE = 1e-6  # [model's units] for a derivative
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DrivenPlan:
-    """A plan driven again, and how far what it states is from that.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.primitives import Trim
-    >>> turn = Trim(name="turn", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])
-    >>> one = driven(Plan([0, 0, 0], (turn,), durations=[np.pi]), Unicycle())
-    >>> one.end.round(9).tolist(), one.off < 1e-14
-    ([0.0, 2.0, 3.141592654], True)
-    """
+    """A plan driven again, and how far what it states is from that."""
 
     plan: Plan
     model: Model

@@ -169,14 +169,7 @@ _POWERS: Array = np.array([np.pad(leg2poly(row), (0, N - k)) for k, row in enume
 
 
 def values_at(series: Array, shares: Array) -> Array:
-    """Values (m, d) of series (m, n, d) at shares (m,) of their elements.
-
-    Examples
-    --------
-    >>> line = np.array([[[1.0], [2.0]]])  # 1 + 2 (2 s - 1)
-    >>> values_at(line, np.array([0.75])).tolist()
-    [[2.0]]
-    """
+    """Values (m, d) of series (m, n, d) at shares (m,) of their elements."""
     n = series.shape[1]
     powers = np.empty((n, shares.size))
     powers[0], powers[1:] = 1.0, 2.0 * shares - 1.0

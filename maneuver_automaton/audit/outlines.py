@@ -90,14 +90,7 @@ def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)
 
 @functools.lru_cache(maxsize=32)
 def body_outline(shapes: tuple[Shape, ...]) -> BodyOutline:
-    """The outline of a body; those of the last bodies are kept.
-
-    Examples
-    --------
-    >>> car = body_outline((Box([4.0, 2.0], center=[1.0, 0.0]),))
-    >>> car.middle, round(car.size, 3), round(car.most_reach, 3)
-    ((1+0j), 2.236, 3.162)
-    """
+    """The outline of a body; those of the last bodies are kept."""
     edges = outline_of(shapes)
     corners, reach = edges.begins, np.abs(edges.begins)
     x, y = corners.real, corners.imag
@@ -268,13 +261,7 @@ def points_of(places: Array) -> Points:
 
 
 def directions(angles: Array) -> Points:
-    """Unit vectors at angles [rad]: what turns by these when multiplied.
-
-    Examples
-    --------
-    >>> directions(np.array([0.0, np.pi / 2])).round(9).tolist()
-    [(1+0j), 1j]
-    """
+    """Unit vectors at angles [rad]: what turns by these when multiplied."""
     units = np.empty(np.shape(angles), dtype=np.complex128)
     np.cos(angles, out=units.real)
     np.sin(angles, out=units.imag)
@@ -287,13 +274,7 @@ def squared(vectors: Points) -> Array:
 
 
 def point_apart(points: Any, a: Any, b: Any) -> Array:
-    """Squared distances of points to segments from a to b.
-
-    Examples
-    --------
-    >>> point_apart(np.array([0.5 + 2.0j]), np.array([0j]), np.array([1.0 + 0j])).tolist()
-    [4.0]
-    """
+    """Squared distances of points to segments from a to b."""
     along, to = b - a, points - a
     back = along.conj()
     share = (to * back).real / np.maximum((along * back).real, LEAST)
@@ -303,13 +284,7 @@ def point_apart(points: Any, a: Any, b: Any) -> Array:
 
 
 def crossed(p: Any, q: Any, a: Any, b: Any) -> NDArray[np.bool_]:
-    """Whether segments from p to q and from a to b cross.
-
-    Examples
-    --------
-    >>> bool(crossed(0j, 2.0 + 2.0j, 2.0j, 2.0 + 0j))
-    True
-    """
+    """Whether segments from p to q and from a to b cross."""
     first = _side(p, q, a) * _side(p, q, b)
     second = _side(a, b, p) * _side(a, b, q)
     return np.asarray((first < 0.0) & (second < 0.0))

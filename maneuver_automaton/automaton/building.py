@@ -1,29 +1,30 @@
-"""Libraries built by optimal control: in parallel, and going on where a killed build stopped."""
+"""Libraries built by optimal control: in parallel, and going on where a killed build stopped.
+
+Every finished maneuver stands on a line of its own in a journal, so that none is lost.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import itertools
+import json
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton._brief import brief
-from maneuver_automaton._files import journal
+from maneuver_automaton._files import journal, journal_lines
 from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.automaton.automaton import Automaton
-from maneuver_automaton.automaton.journal import (
-    Entry,
-    build_key,
-    journal_path,
-    pair_key,
-    read_journal,
-)
 from maneuver_automaton.automaton.library import save_library
 from maneuver_automaton.models import Model
 from maneuver_automaton.optimal_control.maneuvers import (
@@ -41,6 +42,101 @@ from maneuver_automaton.primitives.connecting import (
     maneuver_defect,
 )
 from maneuver_automaton.primitives.symmetry import mirror_of
+
+VERSION = 1  # of what a line says and of how maneuvers are made
+SAMPLES = 3  # states at which a model is asked for its rates, to know it again
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Entry:
+    """One line: the inputs of a maneuver, from which it can be driven again, or why it failed."""
+
+    key: str
+    interval: float  # [s]
+    control: Array  # (n, n_u), each for the interval; no row if it failed
+    reason: str = ""
+    defect: float = math.inf
+
+    def __post_init__(self) -> None:
+        freeze(self, "control")
+
+    def line(self) -> str:
+        """The entry as JSON; numbers read back to the last bit."""
+        numbers = {"interval": self.interval, "defect": self.defect}
+        finite = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
+        content = {"key": self.key, "reason": self.reason, **finite}
+        return json.dumps({**content, "control": self.control.tolist()}, allow_nan=False)
+
+
+def journal_path(library: Path) -> Path:
+    """Where the journal of a library file lies: beside it."""
+    return library.with_name(library.name + ".journal")
+
+
+def build_key(model: Model, objective: ManeuverObjective, settings: TransferSettings) -> str:
+    """Hash of all that maneuvers are made from, trims apart.
+
+    A model is known by its names, its limits and its rates at a few states, so that a change of
+    a user's formulas is noticed as well.
+    """
+    rng = np.random.default_rng(0)
+    state = rng.uniform(0.1, 0.9, size=(SAMPLES, len(model.reduced_names)))
+    control = rng.uniform(0.1, 0.9, size=(SAMPLES, len(model.control_names)))
+    state = _within(model.reduced_limits, state)
+    control = _within(model.control_limits, control)
+    return _hash(
+        {
+            "version": VERSION,
+            "group": model.group.__name__,
+            "names": [model.name, *model.control_names, *model.reduced_names],
+            "limits": [repr(model.control_limits.tolist()), repr(model.reduced_limits.tolist())],
+            "velocity": model.body_velocity(state, control).tolist(),
+            "dynamics": model.reduced_dynamics(state, control).tolist(),
+            "objective": asdict(objective),
+            "settings": asdict(settings),
+        }
+    )
+
+
+def pair_key(build: str, source: Trim, target: Trim, *, keep_sign: Sequence[str] = ()) -> str:
+    """Hash of all that one maneuver is made from; the names of the trims do not count."""
+    ends = [[trim.reduced_state.tolist(), trim.control.tolist()] for trim in (source, target)]
+    return _hash([build, *ends, *sorted(keep_sign)])
+
+
+def read_journal(path: Path) -> dict[str, Entry]:
+    """Entries by key; a line that a killed build left unfinished does not count."""
+    entries: dict[str, Entry] = {}
+    for line in journal_lines(path):
+        with contextlib.suppress(ValueError, TypeError, KeyError):
+            entry = _entry(json.loads(line))
+            entries[entry.key] = entry
+    return entries
+
+
+def _entry(content: Mapping[str, Any]) -> Entry:
+    defect = content["defect"]
+    interval = content["interval"]
+    return Entry(
+        key=str(content["key"]),
+        reason=str(content["reason"]),
+        interval=math.inf if interval is None else float(interval),
+        defect=math.inf if defect is None else float(defect),
+        control=np.array(content["control"], dtype=np.float64),
+    )
+
+
+def _hash(content: Any) -> str:
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _within(limits: Array, shares: Array) -> Array:
+    low = np.where(np.isfinite(limits[:, 0]), limits[:, 0], 0.0)
+    high = np.where(np.isfinite(limits[:, 1]), limits[:, 1], low + 1.0)
+    within: Array = low + shares * (high - low)
+    return within
+
 
 SIDEWAYS = 1  # place of the lateral speed in a twist
 Pair = tuple[str, str]  # names of the trims a maneuver leaves and reaches
@@ -253,14 +349,12 @@ class _Recipe:
 
 @functools.lru_cache(maxsize=1)
 def _program(recipe: _Recipe) -> TransferProgram:
-    """One program for all pairs that a process solves."""
     return transfer_program(
         recipe.nodes.model, objective=recipe.objective, settings=recipe.settings
     )
 
 
 def _solved(recipe: _Recipe, pair: Pair) -> Entry:
-    """One maneuver, as a line of the journal."""
     nodes, key = recipe.nodes, recipe.key_of(pair)
     source, target = nodes[pair[0]], nodes[pair[1]]
     limits = nodes.model.control_limits.copy()
@@ -333,7 +427,6 @@ def _assembled(
 
 
 def _maneuver_of(nodes: Automaton, pair: Pair, entry: Entry) -> Maneuver:
-    """The maneuver of a line of the journal."""
     inputs = Inputs(control=entry.control, interval=entry.interval)
     course = inputs.drive(nodes.model, nodes[pair[0]].reduced_state)
     return Maneuver.along(

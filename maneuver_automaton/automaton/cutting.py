@@ -49,7 +49,7 @@ def head_of(plan: Plan, until: float) -> Plan:
         if k and left <= NOTHING:
             break
         if k:
-            maneuver = _between(plan, k)
+            maneuver = plan.maneuvers[k - 1] if plan.maneuvers else None
             if maneuver is not None:
                 lasting = maneuver.duration
                 cut = left < lasting - NOTHING
@@ -77,7 +77,7 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
     word, times, between, passed = list[Trim](), list[float](), list[Maneuver | None](), after
     for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if k:
-            maneuver = _between(plan, k)
+            maneuver = plan.maneuvers[k - 1] if plan.maneuvers else None
             if word:
                 between.append(maneuver)
             elif maneuver is not None and passed < maneuver.duration - NOTHING:
@@ -97,13 +97,7 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
 
 
 def first_times(durations: Sequence[float], until: float) -> list[float]:
-    """How long the first trims of a word last in its first `until` seconds; one at least.
-
-    Examples
-    --------
-    >>> first_times([1.0, 2.0, 3.0], 1.5)
-    [1.0, 0.5]
-    """
+    """How long the first trims of a word last in its first `until` seconds; one at least."""
     times, left = list[float](), until
     for duration in durations:
         if times and left <= NOTHING:
@@ -114,13 +108,7 @@ def first_times(durations: Sequence[float], until: float) -> list[float]:
 
 
 def last_times(durations: Sequence[float], after: float) -> list[float]:
-    """How long the last trims of a word last after `after` seconds; the last one stays in any case.
-
-    Examples
-    --------
-    >>> last_times([1.0, 2.0, 3.0], 1.5)
-    [1.5, 3.0]
-    """
+    """How long the last trims of a word last after `after` [s]; the last one stays in any case."""
     passed = after
     for k, duration in enumerate(durations):
         if duration - passed > NOTHING or k == len(durations) - 1:
@@ -133,18 +121,6 @@ def committed(plan: Plan, after: float) -> float:
     """Seconds until the maneuver ends that is under way `after` seconds; 0 in a trim.
 
     What is left of a plan may start within a maneuver: then that is under way from its start on.
-
-    Examples
-    --------
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0], reduced_state=[0])
-    >>> ahead = Trim(name="ahead", body_velocity=[1, 0, 0], control=[0], reduced_state=[1])
-    >>> go = Maneuver(name="go", source="rest", target="ahead", displacement=[1, 0, 0], duration=2,
-    ...     course=Trajectory(time=np.array([0.0, 1.0, 2.0]), control=np.ones((3, 1)),
-    ...                       pose=np.array([[0, 0, 0], [0.25, 0, 0], [1.0, 0, 0]]),
-    ...                       reduced_state=np.array([[0.0], [0.5], [1.0]])))
-    >>> plan = Plan([0, 0, 0], (rest, ahead), durations=[0.0, 3.0], maneuvers=(go,))
-    >>> [committed(plan, time) for time in (0.0, 0.5, 2.0)], committed(tail_of(plan, 1.0), 0.0)
-    ([0.0, 1.5, 0.0], 1.0)
     """
     if not any(plan.maneuvers):
         return 0.0
@@ -190,7 +166,11 @@ def joined(first: Plan, second: Plan) -> Plan:
     if same:
         lasting[0] += times[-1]
     link: tuple[Maneuver | None, ...] = () if same else (None,)
-    between = (*_all_between(first), *link, *_all_between(second))
+    between = (
+        *(first.maneuvers or (None,) * (len(first.trims) - 1)),
+        *link,
+        *(second.maneuvers or (None,) * (len(second.trims) - 1)),
+    )
     return _plan(
         first,
         first.start,
@@ -199,15 +179,6 @@ def joined(first: Plan, second: Plan) -> Plan:
         list(between),
         first.start_time,
     )
-
-
-def _all_between(plan: Plan) -> tuple[Maneuver | None, ...]:
-    return plan.maneuvers or (None,) * (len(plan.trims) - 1)
-
-
-def _between(plan: Plan, k: int) -> Maneuver | None:
-    """The maneuver before trim `k`; None for a switch."""
-    return plan.maneuvers[k - 1] if plan.maneuvers else None
 
 
 def _plan(
@@ -262,7 +233,6 @@ def _end_of(maneuver: Maneuver, after: float) -> Maneuver:
 
 
 def _part(maneuver: Maneuver, course: Trajectory) -> Maneuver:
-    """A piece of a maneuver under its name."""
     duration = float(course.time[-1])
     return replace(maneuver, displacement=course.pose[-1], duration=duration, course=course)
 
@@ -324,20 +294,6 @@ def carried(plan: Plan, model: Model, part: str) -> Plan:
         the vehicle.
     part : str
         Name of the part.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import UserModel
-    >>> from maneuver_automaton.groups import SE2
-    >>> from maneuver_automaton.primitives import Trim
-    >>> class Cart:
-    ...     part_names = ("cart",)
-    ...     def part_poses(self, z):  # one metre behind, whatever z is
-    ...         return np.broadcast_to([[-1.0, 0.0, 0.0]], (*np.shape(z)[:-1], 1, 3))
-    >>> turn = Trim(name="turn", body_velocity=[0.0, 0.0, 1.0], control=[0.0, 1.0])
-    >>> behind = carried(Plan([0, 0, 0], (turn,), durations=[np.pi / 2]), Cart(), "cart")
-    >>> behind.start.tolist(), behind.end.round(9).tolist()
-    ([-1.0, 0.0, 0.0], [-0.0, -1.0, 1.570796327])
     """
     which = model.part_names.index(part)
     group = group_of(plan.start.size)

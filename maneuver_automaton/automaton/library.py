@@ -220,7 +220,6 @@ def _automaton_of(document: Any, own: Model | None) -> Automaton:
 
 
 def _check_limits(automaton: Automaton) -> None:
-    """Every control and reduced state is within the limits of the model."""
     model = automaton.model
     names = (*model.control_names, *model.reduced_names)
     low, high = np.concatenate([model.control_limits, model.reduced_limits]).T
@@ -237,7 +236,6 @@ def _check_limits(automaton: Automaton) -> None:
 
 
 def _check_trims(automaton: Automaton) -> None:
-    """Every trim is steady, and its stored twist is what the model says of it."""
     states = np.array([trim.reduced_state for trim in automaton.trims])
     expected = automaton.model.body_velocity(states, automaton.controls)
     scale = np.maximum(1.0, np.abs(expected).max(axis=1))

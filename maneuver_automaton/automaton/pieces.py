@@ -81,16 +81,8 @@ def packed(plan: Plan, library: Automaton) -> Any:
 
     Primitives are numbers of the library, so that a plan takes some 200 bytes where `words_of` says
     it in names.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1.0, 0.0), "left": (0.0, 1.0)})
-    >>> plan = Plan([0, 0, 0], [robot["on"], robot["left"]], durations=[2.0, 1.0])
-    >>> unpacked(packed(plan, robot), robot).end.tolist()
-    [2.0, 0.0, 1.0]
     """
-    numbers = {id(one): n for n, one in enumerate(_numbered(library))}
+    numbers = {id(one): n for n, one in enumerate((*library.trims, *library.maneuvers, None))}
     rows = [numbers.get(id(one), -1) for one in (*plan.trims, *plan.maneuvers)]
     if -1 in rows:
         return plan
@@ -103,7 +95,7 @@ def unpacked(sent: Any, library: Automaton) -> Plan:
     if isinstance(sent, Plan):
         return sent
     begin, count, start, rows, durations = sent
-    known = _numbered(library)
+    known = (*library.trims, *library.maneuvers, None)
     word = tuple(known[n] for n in np.frombuffer(rows, dtype=np.uint32).tolist())
     return Plan(
         np.frombuffer(start),
@@ -112,11 +104,6 @@ def unpacked(sent: Any, library: Automaton) -> Plan:
         maneuvers=word[count:],
         start_time=begin,
     )
-
-
-def _numbered(library: Automaton) -> tuple[Any, ...]:
-    """Trims and maneuvers by number, and None for a switch."""
-    return (*library.trims, *library.maneuvers, None)
 
 
 def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
@@ -185,7 +172,6 @@ def _coasted(entry: Piece, library: Automaton) -> Trim:
 
 
 def _in_library(entry: Piece, library: Automaton) -> Maneuver | None:
-    """The maneuver of the library that has the name and the ends of an entry."""
     sought = (entry["name"], entry["source"], entry["target"])
     return next(
         (one for one in library.maneuvers if (one.name, one.source, one.target) == sought), None

@@ -481,7 +481,6 @@ def _course(maneuver: Maneuver) -> Trajectory:
 def _trim_samples(
     trim: Trim, duration: float, max_step_m: float, max_step_rad: float
 ) -> Trajectory:
-    """Samples of a trim from the identity."""
     twist = trim.body_velocity
     speed = float(np.linalg.norm(twist[[0, 1, *range(3, twist.size)]]))
     steps = max(speed * duration / max_step_m, abs(twist[2]) * duration / max_step_rad)

@@ -22,38 +22,23 @@ COLUMNS = ("time", "pose", "twist", "reduced_state", "control")  # arrays with a
 ROUNDING = 1e-9  # steps, by which a duration may miss a whole number of them
 
 
-class Sampled(Protocol):
+class _Sampled(Protocol):
     """A `Plan`, as far as its rows are made of it."""
 
     @property
-    def start(self) -> Array:
-        """Pose at its beginning."""
-
+    def start(self) -> Array: ...
     @property
-    def start_time(self) -> float:
-        """Time at its beginning [s]."""
-
+    def start_time(self) -> float: ...
     @property
-    def duration(self) -> float:
-        """From its beginning to its end [s]."""
-
+    def duration(self) -> float: ...
     @property
-    def switching_times(self) -> Array:
-        """When each primitive begins, and when the last one ends [s]."""
-
+    def switching_times(self) -> Array: ...
     @property
-    def primitives(self) -> Sequence[Trim | Maneuver]:
-        """Its trims and maneuvers, in their order."""
-
+    def primitives(self) -> Sequence[Trim | Maneuver]: ...
     @property
-    def word(self) -> tuple[str, ...]:
-        """Their names."""
-
-    def sample(self) -> Trajectory:
-        """Its poses, states and controls at enough times."""
-
-    def pose_at(self, time: ArrayLike, /) -> Array:
-        """Its poses at times [s]."""
+    def word(self) -> tuple[str, ...]: ...
+    def sample(self) -> Trajectory: ...
+    def pose_at(self, time: ArrayLike, /) -> Array: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -96,7 +81,7 @@ class PlanArrays:
         return {"time_s": self.time, **named, "primitive": self.primitive}
 
 
-def plan_arrays(plan: Sampled, *, step: float | None, model: Model | None) -> PlanArrays:
+def plan_arrays(plan: _Sampled, *, step: float | None, model: Model | None) -> PlanArrays:
     """The arrays of `Plan.as_arrays`."""
     samples = plan.sample()
     if step is not None:
@@ -105,7 +90,7 @@ def plan_arrays(plan: Sampled, *, step: float | None, model: Model | None) -> Pl
     return _arrays(plan, samples, model)
 
 
-def arrays_at(plan: Sampled, times: Array, *, model: Model | None) -> PlanArrays:
+def arrays_at(plan: _Sampled, times: Array, *, model: Model | None) -> PlanArrays:
     """As `Plan.as_arrays`, at times (n,) that rise [s]."""
     return _arrays(plan, _at_times(plan, plan.sample(), times, model), model)
 
@@ -129,7 +114,7 @@ def joined(parts: Sequence[PlanArrays]) -> PlanArrays:
     )
 
 
-def _arrays(plan: Sampled, samples: Trajectory, model: Model | None) -> PlanArrays:
+def _arrays(plan: _Sampled, samples: Trajectory, model: Model | None) -> PlanArrays:
     after = np.searchsorted(plan.switching_times[1:-1], samples.time, side="right")
     index = after if plan.primitives else np.full(samples.time.shape, -1)
     n_states, n_controls = samples.reduced_state.shape[1], samples.control.shape[1]
@@ -155,7 +140,7 @@ def step_times(start: float, duration: float, step: float) -> Array:
     return np.append(start + step * np.arange(count), start + duration)
 
 
-def _at_times(plan: Sampled, samples: Trajectory, times: Array, model: Model | None) -> Trajectory:
+def _at_times(plan: _Sampled, samples: Trajectory, times: Array, model: Model | None) -> Trajectory:
     """The plan at other times: poses exact, reduced states cubic between samples."""
     last = samples.time.size - 1
     k = np.clip(np.searchsorted(samples.time, times, side="right") - 1, 0, max(last - 1, 0))
@@ -176,7 +161,7 @@ def _at_times(plan: Sampled, samples: Trajectory, times: Array, model: Model | N
     return Trajectory(time=times, pose=plan.pose_at(times), reduced_state=state, control=control)
 
 
-def _twists(plan: Sampled, samples: Trajectory, index: IntArray, model: Model | None) -> Array:
+def _twists(plan: _Sampled, samples: Trajectory, index: IntArray, model: Model | None) -> Array:
     """Twists (n, dof): a trim's own; of a maneuver what its model says, or else the mean."""
     twists = np.zeros_like(samples.pose)
     for k, primitive in enumerate(plan.primitives):

@@ -88,6 +88,5 @@ def _apart(one: Plan, other: Plan, times: Array) -> tuple[float, float, Array, A
 
 
 def _path_length(poses: Array) -> float:
-    """Length of the path through poses (n, dof) [m]."""
     places = [0, 1, *range(3, poses.shape[-1])]
     return float(np.linalg.norm(np.diff(poses[:, places], axis=0), axis=1).sum())

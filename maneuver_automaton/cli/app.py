@@ -240,7 +240,7 @@ def _parts(given: Given) -> Any:
 
 
 def _look(given: Given) -> Any:
-    from maneuver_automaton.cli.options import LookOptions
+    from maneuver_automaton.cli.inputs import LookOptions
 
     return LookOptions(title=given.title, size=given.size, style=given.style)
 
@@ -248,25 +248,25 @@ def _look(given: Given) -> Any:
 @command("cache show")
 def cache_show(_: Given) -> int:
     """List what is kept on disk to be quicker the next time: compiled kernels, tables."""
-    from maneuver_automaton.cli import cache_command
+    from maneuver_automaton.cli import file_commands
 
-    return cache_command.show()
+    return file_commands.show_cache()
 
 
 @command("cache clear")
 def cache_clear(_: Given) -> int:
     """Remove it; it is made again when it is needed."""
-    from maneuver_automaton.cli import cache_command
+    from maneuver_automaton.cli import file_commands
 
-    return cache_command.clear()
+    return file_commands.clear_cache()
 
 
 @command("compile", "jobs:processes")
 def compile_all(given: Given) -> int:
     """Compile all kernels now; an installation that is not editable brings them."""
-    from maneuver_automaton.cli import cache_command
+    from maneuver_automaton.cli import file_commands
 
-    return cache_command.compile_all(jobs=given.jobs)
+    return file_commands.compile_all(jobs=given.jobs)
 
 
 @contextlib.contextmanager
@@ -285,9 +285,8 @@ def _document(written: Path, given: Given) -> Iterator[None]:
 
 
 def _run_jobs(name: str, document: str, given: Given) -> int:
-    """Plan or drive a file, or all of a folder."""
+    from maneuver_automaton.cli.inputs import Budgets, Options
     from maneuver_automaton.cli.jobs import run_jobs
-    from maneuver_automaton.cli.options import Budgets, Options
 
     def stated(*names: str) -> dict[str, Any]:
         return {name: getattr(given, name) for name in names if hasattr(given, name)}
@@ -423,19 +422,19 @@ def convert(given: Given) -> int:
     (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or a folder or
     .zip exported by AROC.
     """
-    from maneuver_automaton.cli import convert_command
+    from maneuver_automaton.cli import file_commands
 
-    return convert_command.convert(given.source, given.target, parts=_parts(given))
+    return file_commands.convert(given.source, given.target, parts=_parts(given))
 
 
 @command("example", "name out:copy")
 def example(given: Given) -> int:
     """Write one of the scenarios that come with the package, with its maps, or list them."""
-    from maneuver_automaton.cli import example_command
+    from maneuver_automaton.cli import file_commands
 
     if given.name is None:
-        return example_command.show()
-    return example_command.write(given.name, given.out)
+        return file_commands.list_scenarios()
+    return file_commands.write_scenario(given.name, given.out)
 
 
 @command("plot", f"file:result out:picture animate {LOOK} html beside:world")
@@ -481,6 +480,6 @@ def export(given: Given) -> int:
 @command("schema", "document")
 def schema(given: Given) -> int:
     """Print the JSON Schema of scenario files, for editors, or of a file that is written."""
-    from maneuver_automaton.cli import convert_command
+    from maneuver_automaton.cli import file_commands
 
-    return convert_command.print_schema(given.document)
+    return file_commands.print_schema(given.document)

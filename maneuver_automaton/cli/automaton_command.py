@@ -14,6 +14,7 @@ from maneuver_automaton.automaton.library import automaton_hash, save_library
 from maneuver_automaton.automaton.validation import AutomatonReport, validate
 from maneuver_automaton.cli.guard import FOUND, NO_PLAN, complain
 from maneuver_automaton.cli.inputs import (
+    LookOptions,
     automaton_of,
     make_folder,
     named_automaton,
@@ -21,7 +22,6 @@ from maneuver_automaton.cli.inputs import (
     target,
     writing,
 )
-from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw
 from maneuver_automaton.cli.terminal import Advance, console, counted, progress_bar, table, waiting
 from maneuver_automaton.design import DesignedLibrary, disperse_library
@@ -293,7 +293,6 @@ def _print_designed(path: Path, designed: DesignedLibrary) -> None:
 
 
 def _proven(designed: DesignedLibrary) -> list[str]:
-    """What is proven, in words."""
     everywhere = f"words of any length: factor {designed.any_length:.6g}, every start and goal"
     if designed.any_length > 1.0:
         everywhere += f"; {designed.hardest} loses most"

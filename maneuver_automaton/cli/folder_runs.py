@@ -119,7 +119,6 @@ def _as_option() -> Iterator[None]:
 
 
 def _key(path: Path, parts: Parts, options: str) -> str:
-    """Hash of what a result is made from."""
     from maneuver_automaton import __version__
 
     digest = hashlib.sha256(repr((__version__, options, parts)).encode())
@@ -170,7 +169,9 @@ def problems_in(folder: Path, parts: Parts) -> list[tuple[Path, Parts]]:
     names, models, outlines of robots, the scenario of --with. A scenario states all of its
     problem, and only formats with several problems need to know which one.
     """
-    documents = {path: _document(path) for path in _files(folder) if _ending(path) in YAML_ENDINGS}
+    documents = {
+        path: _document(path) for path in _files(folder) if path.suffix.lower() in YAML_ENDINGS
+    }
     used = set(_used(folder, documents))
     if parts.beside is not None:
         used.add(parts.beside.resolve())
@@ -202,10 +203,6 @@ def _files(folder: Path) -> list[Path]:
     return [path for path in inside if path.is_file() and not path.name.startswith(".")]
 
 
-def _ending(path: Path) -> str:
-    return path.suffix.lower()
-
-
 def _document(path: Path) -> Document | None:
     """Document of a YAML file; None if it cannot be read, which is told when it is planned."""
     try:
@@ -215,9 +212,8 @@ def _document(path: Path) -> Document | None:
 
 
 def _used(folder: Path, documents: dict[Path, Document | None]) -> Iterator[Path]:
-    """Maps that other files of the folder name."""
     for path in _files(folder):
-        if _ending(path) == ".scen":
+        if path.suffix.lower() == ".scen":
             with contextlib.suppress(InvalidScenario):  # told when the file is planned
                 yield map_beside(path).resolve()
         document = documents.get(path)
@@ -237,7 +233,7 @@ def _obstacles(value: Any) -> Iterator[Any]:
 
 
 def _parts_for(path: Path, document: Document | None, parts: Parts) -> Parts:
-    if _ending(path) in YAML_ENDINGS:
+    if path.suffix.lower() in YAML_ENDINGS:
         if document is None or format_of(path, document) is None:
             return Parts(model=parts.model)
         return replace(parts, case=None)

@@ -15,13 +15,14 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.cli.folder_runs import Row, check_address, problems_in, run_folder
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, NO_PLAN, complain, explained
 from maneuver_automaton.cli.inputs import (
+    Options,
     Parts,
     make_folder,
     problem_of,
+    refuse_unknown,
     states_several,
     writing,
 )
-from maneuver_automaton.cli.options import Options, refuse_unknown
 from maneuver_automaton.cli.pictures import draughtsman, draw
 from maneuver_automaton.cli.terminal import announced, console, print_result
 from maneuver_automaton.errors import InvalidScenario
@@ -125,7 +126,6 @@ class Job:
         return outcome
 
     def _read(self) -> tuple[str, Any]:
-        """The kind of the job, and what the file states."""
         if is_road(self.path):
             return ("roads" if states_several(self.path, self.parts) else "road"), None
         scenario = problem_of(self.path, self.parts)
@@ -153,7 +153,6 @@ def run_jobs(command: str, path: Path, out: Path, options: Options, parts: Parts
 
 
 def _run_file(job: Job, out: Path) -> int:
-    """Do one job into the folder `out`, print what came of it, return the exit code."""
     beside = job.command == "plan" and job.options.plot and not is_road(job.path)
     with draughtsman(wanted=beside) as one:
         outcome = job.done(out)
@@ -175,7 +174,6 @@ def _run_file(job: Job, out: Path) -> int:
 
 
 def _run_folder(command: str, folder: Path, out: Path, options: Options, parts: Parts) -> int:
-    """Do a job of every file of a folder, each into `out`/STEM; a table; the exit code."""
     if options.resume is not None:
         raise InvalidScenario("--resume: goes on with one loop, and a folder has many; need a file")
     check_address(options.scheduler)

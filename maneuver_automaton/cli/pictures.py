@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from maneuver_automaton._interrupts import is_main_program
-from maneuver_automaton.cli.options import Options
+from maneuver_automaton.cli.inputs import Options
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.recording import Recording, recording_of
 

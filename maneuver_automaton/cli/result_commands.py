@@ -10,6 +10,7 @@ from typing import Any
 from maneuver_automaton import exports
 from maneuver_automaton.cli.guard import FOUND, complain
 from maneuver_automaton.cli.inputs import (
+    LookOptions,
     Parts,
     make_folder,
     naming,
@@ -17,7 +18,6 @@ from maneuver_automaton.cli.inputs import (
     user_model,
     writing,
 )
-from maneuver_automaton.cli.options import LookOptions
 from maneuver_automaton.cli.pictures import ready_to_draw, save_film, why_no_film
 from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario

@@ -99,14 +99,12 @@ def driven(job: Job, _: None) -> JobResult:
 
 
 def _scenario(job: Job) -> RoadScenario:
-    """One drive, and who drives."""
     found = load_scenario(job.path, beside=job.parts.beside, case=job.parts.case)
     assert isinstance(found, RoadScenario)  # by its ending
     return found
 
 
 def _plans(job: Job) -> JobResult:
-    """Plan them all."""
     scenes, vehicle, name = _scenes(job)
     limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
     with waiting(f"planning, at most {limit:g} s", quiet=job.options.quiet), naming(job.path):
@@ -128,7 +126,6 @@ def _plans(job: Job) -> JobResult:
 
 
 def _drives(job: Job) -> JobResult:
-    """Close the loop of them all."""
     scenes, vehicle, name = _scenes(job)
     steps, quiet = job.options.budgets.steps, job.options.quiet
     limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)

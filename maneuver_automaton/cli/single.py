@@ -152,7 +152,6 @@ def _driven(loop: ClosedLoop, name: str) -> JobResult:
 
 
 def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
-    """Drive the loop with seed after seed."""
     options, count = job.options, job.options.seeds
     assert count is not None
     first = options.seed or 0

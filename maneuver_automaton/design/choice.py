@@ -43,11 +43,6 @@ def frontier(points: Array) -> IntArray:
     """Which points (m, 2), seen from the origin, no mixture of others reaches or passes beyond.
 
     Of several in one direction the outermost counts.
-
-    Examples
-    --------
-    >>> frontier(np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, -1.0], [0.1, 0.1], [0.9, 0.9]])).tolist()
-    [0, 1, 2, 4]
     """
     angles = np.arctan2(points[:, 1], points[:, 0])
     order = np.lexsort((-np.hypot(*points.T), np.round(angles, 12)))
@@ -123,7 +118,6 @@ def _mirrored(
 
 
 def _angles(points: Array) -> Array:
-    """Angles (n,) from the x axis, in [0, one turn)."""
     angles = np.mod(np.arctan2(points[:, 1], points[:, 0]), 2.0 * np.pi)
     return np.where(angles > 2.0 * np.pi - 1e-12, 0.0, angles)
 

@@ -345,17 +345,7 @@ def design_of_file(
 def design_of_text(
     text: str, *, name: str, instead: Mapping[str, float] | None = None
 ) -> DesignedLibrary:
-    """The library that the text of a design file asks for; see `design_of_file`.
-
-    Examples
-    --------
-    >>> designed = design_of_text(
-    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, "
-    ...     "trims: {speed: [-1, 1], turn_rate: [-1, -0.5, 0, 0.5, 1]}, design: {within: 1.2}}",
-    ...     name="robots.yaml")
-    >>> len(designed.automaton), designed.factor
-    (6, 1.0)
-    """
+    """The library that the text of a design file asks for; see `design_of_file`."""
     asked = build_file_of_text(text, name=name)
     document = parse(text, name=name, what="a design file")
     if asked.design is None:

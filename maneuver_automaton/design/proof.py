@@ -132,14 +132,7 @@ class _Met:
 
 
 def factors_at(goals: Array, *, turning_radius: float, max_trims: int, least: float) -> Array:
-    """Length (n,) of short words to goals (n, 3) over that of shortest paths, NaN below `least`.
-
-    Examples
-    --------
-    >>> goals = np.array([[3.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.1, 0.0, 0.0]])
-    >>> factors_at(goals, turning_radius=1.0, max_trims=3, least=0.5).round(3).tolist()
-    [1.0, 1.383, nan]
-    """
+    """Length (n,) of short words to goals (n, 3) over that of shortest paths, NaN below `least`."""
     scaled = goals / np.array([turning_radius, turning_radius, 1.0])
     short, long = _least(families(scaled, scaled), max_trims)
     shortest = np.minimum(short, long)

@@ -100,7 +100,6 @@ def _text(movers: Sequence[Mover], cost_function: str) -> str:
 
 
 def _answer(mover: Mover, solution: Any, cost_function: str) -> Any:
-    """The solution of one planning problem."""
     from commonroad.scenario.state import KSState
     from commonroad.scenario.trajectory import Trajectory
 

@@ -23,7 +23,7 @@ from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import Obstacle, Polygon
 from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.exports.surroundings import Shown, shown_of, solid, solids_of
-from maneuver_automaton.plotting.footprint import placed
+from maneuver_automaton.plotting.track import placed
 from maneuver_automaton.recording import Recording, recording_to_write
 
 PLACES = (0, 1, 3)  # x, y and altitude of a pose

@@ -27,6 +27,7 @@ from maneuver_automaton.formats.plan_json import (
 )
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, Recording, recording_of
+from maneuver_automaton.recording.plans import stated
 from maneuver_automaton.recording.values import mover_of, world_of
 from maneuver_automaton.roads import RoadFleetResult, RoadPlanResult, road_planner
 from maneuver_automaton.roads.plans import plan_of_controls
@@ -202,7 +203,6 @@ def load_recording(
 
 
 def _driven_on_roads(file: ResultFile) -> RoadFleetResult:
-    """What a file holds of drives on roads."""
     path, document = file.path, file.document
     roads = {
         str(k if one.scene.benchmark is None else one.scene.benchmark.problem): one
@@ -267,10 +267,7 @@ def _alone(file: ResultFile) -> Recording:
         plans = load_plans(file.path)
         movers = tuple(Mover(name=name, pieces=(plan,)) for name, plan in plans.items())
         return Recording(kind="fleet", title="", movers=movers)
-    names = (_names(file.document, "reduced_state"), _names(file.document, "control"))
-    plan, cost = load_plan(file.path), file.document.get("cost")
-    mover = Mover(pieces=(plan,), cost=cost, names=names)
-    return Recording(kind="plan", title="", movers=(mover,))
+    return replace(stated(file.document, load_plan(file.path)), title="")
 
 
 def _planned(file: ResultFile) -> Recording:
@@ -287,13 +284,6 @@ def _planned(file: ResultFile) -> Recording:
     mover = mover_of(scenario.problem, plan, cost=file.document.get("cost"))
     world = world_of(scenario.problem)
     return Recording(kind="plan", title=scenario.name, movers=(mover,), world=world)
-
-
-def _names(document: Mapping[str, Any], of: str) -> tuple[str, ...]:
-    """What a plan.json says that its reduced states or its controls are; nothing if it does not."""
-    vehicle = document.get("vehicle")
-    names = vehicle.get(of) if isinstance(vehicle, Mapping) else None
-    return tuple(map(str, names)) if isinstance(names, list) else ()
 
 
 def _on_road(file: ResultFile) -> Recording:

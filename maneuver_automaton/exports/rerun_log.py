@@ -178,7 +178,6 @@ def _log_goals(log: _Log, mover: Mover, names: tuple[str, ...]) -> None:
 
 
 def _log_surroundings(log: _Log, recording: Recording) -> None:
-    """Lanelets and obstacles."""
     world = recording.world
     if world.lanes:
         lanes = [_raised(ring, 0.0) for ring in world.lanes]
@@ -242,7 +241,6 @@ def _raised(ring: Array, z: float) -> Array:
 
 
 def _places(poses: Array) -> Array:
-    """Places (n, 3) of poses (n, dof) [m]."""
     altitude = poses[:, 3] if poses.shape[1] > 3 else np.zeros(len(poses))
     return np.column_stack([poses[:, :2], altitude])
 

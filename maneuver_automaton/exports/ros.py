@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import PART
 from maneuver_automaton.automaton.plan_arrays import PlanArrays
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.exports.kinematics import accelerations, component, twist_rates
+from maneuver_automaton.exports.table import accelerations, component, twist_rates
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, recording_to_write
@@ -261,7 +261,6 @@ def _ackermann(
 
 
 def _carried(mover: Mover, rows: PlanArrays) -> list[tuple[str, Array]]:
-    """Names and poses (n, dof) of the parts that the vehicle carries."""
     model = mover.model
     if model is None or not model.part_names:
         return []
@@ -283,7 +282,6 @@ def _in_world(pose: Array, twist: Array) -> Array:
 
 
 def _rates(time: Array, pose: Array) -> Array:
-    """Rates (n, dof) of poses, by differences."""
     if len(time) < 2:
         return np.zeros_like(pose)
     return np.asarray(np.gradient(pose, time, axis=0))

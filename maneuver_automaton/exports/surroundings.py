@@ -10,9 +10,14 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import Disc, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import blocked_rectangles, outlines, united
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.plotting.footprint import footprint_polygons, merged, swept_region
 from maneuver_automaton.plotting.obstacles import round_times
-from maneuver_automaton.plotting.track import Track, joined_track
+from maneuver_automaton.plotting.track import (
+    Track,
+    footprint_polygons,
+    joined_track,
+    merged,
+    swept_region,
+)
 from maneuver_automaton.recording import Mover, Recording
 
 
@@ -54,14 +59,7 @@ def shown_of(mover: Mover) -> Shown:
 
 
 def solid(shape: Shape) -> Any:
-    """A valid geometry of shapely that a shape fills; a disc has 48 corners.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Box
-    >>> solid(Box([4.0, 2.0])).area
-    8.0
-    """
+    """A valid geometry of shapely that a shape fills; a disc has 48 corners."""
     import shapely
 
     if isinstance(shape, Disc):
@@ -70,15 +68,7 @@ def solid(shape: Shape) -> Any:
 
 
 def solid_map(cells: OccupancyMap) -> Any:
-    """The geometry of shapely that the blocked cells of a map fill.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> corner = OccupancyMap(np.array([[1, 1], [1, 0]], dtype=bool), resolution=0.5)
-    >>> solid_map(corner).area
-    0.75
-    """
+    """The geometry of shapely that the blocked cells of a map fill."""
     import shapely
 
     low_x, low_y, high_x, high_y = (cells.resolution * blocked_rectangles(cells.blocked)).T

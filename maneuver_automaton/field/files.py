@@ -17,7 +17,7 @@ from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.earth import metres_of
 from maneuver_automaton.exports.geojson import save_features
 from maneuver_automaton.field.covering import FieldProblem, FieldResult
-from maneuver_automaton.formats.polygons import simple_polygon
+from maneuver_automaton.formats.statement import simple_polygon
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, parse
 from maneuver_automaton.models import Model

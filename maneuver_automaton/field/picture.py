@@ -12,7 +12,7 @@ from maneuver_automaton.collision import Polygon
 from maneuver_automaton.field.covering import FieldResult
 from maneuver_automaton.plotting import Look, draw_obstacles
 from maneuver_automaton.plotting.colors import SEQUENCE
-from maneuver_automaton.plotting.limits import shape_path
+from maneuver_automaton.plotting.obstacles import shape_path
 from maneuver_automaton.plotting.pages import page_of, write_figure
 from maneuver_automaton.plotting.style import line_handle, mark_handle
 

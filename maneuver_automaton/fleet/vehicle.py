@@ -41,7 +41,7 @@ from maneuver_automaton.search.lattice_pass import plan_of_word
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import outside
 from maneuver_automaton.search.waiting import with_waits
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word, word_of_plan, word_of_steps
 
 SAMPLES = 4000  # places that are looked at

@@ -2,8 +2,8 @@
 
 Every child of `automaton.xml` names a file of one primitive: numbers of those that may follow, from
 1; states and inputs; and the set that the vehicle occupies while a controller keeps it near the
-motion. The states are (x, y, speed, heading) of a car that accelerates, its steering is an input;
-the wheelbase is not stated, and is fitted to the changes of the heading.
+motion, which is not read. The states are (x, y, speed, heading) of a car that accelerates, its
+steering is an input; the wheelbase is not stated, and is fitted to the changes of the heading.
 
 As an automaton: a speed is a trim, a primitive is a maneuver, driven anew with the inputs of the
 file. An automaton lets everything follow that begins at the speed where a primitive ends; AROC lets
@@ -26,7 +26,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level
-from maneuver_automaton.formats.xml_source import Element, read_xml
+from maneuver_automaton.formats.text_source import Element, read_xml
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import AcceleratingCar
 from maneuver_automaton.primitives import Maneuver, Trim
@@ -41,18 +41,6 @@ LEAST = 1e-3  # of a limit that no primitive shows [m/s, m/s^2, rad]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Occupancy:
-    """What the vehicle occupies during an interval of time, seen from where it starts."""
-
-    begin: float  # [s]
-    end: float  # [s]
-    corners: Array  # (n, 2) [m]
-
-    def __post_init__(self) -> None:
-        freeze(self, "corners", last=2)
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ArocPrimitive:
     """One primitive, as it stands in its file."""
 
@@ -61,7 +49,6 @@ class ArocPrimitive:
     time: Array  # (n,) [s]
     states: Array  # (n, 4) x, y, orientation, velocity
     inputs: Array  # (m, 2) acceleration, steering angle, each for an equal number of steps
-    occupancy: tuple[Occupancy, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, "time")
@@ -239,36 +226,16 @@ def _primitive(folder: Path | zipfile.Path, listed: Element, n: int) -> ArocPrim
             f"got {len(inputs.children)} inputs for {len(rows)} states, need one for every step "
             f"or every few of the {steps}"
         )
-    occupied = root.get("occupancySet")
     return ArocPrimitive(
         name=name,
         successors=tuple(successors),
         time=time,
         states=np.array([[row.need(what).number() for what in STATES] for row in rows]),
         inputs=np.array(given),
-        occupancy=tuple(_occupancy(row) for row in (occupied.children if occupied else ())),
     )
 
 
-def _occupancy(row: Element) -> Occupancy:
-    points = row.need("set").children
-    corners = np.full((len(points), 2), np.nan)
-    for corner, point in zip(corners, points, strict=True):
-        for value in point.children:
-            axis = value.whole("dimension", least=1)
-            if axis > 2:
-                raise value.error(f"dimension: got {axis}, need 1 or 2")
-            corner[axis - 1] = value.number()
-        if np.isnan(corner).any():
-            raise point.error("misses a coordinate, need the dimensions 1 and 2")
-    if len(points) < 3:
-        raise row.need("set").error(f"got {len(points)} points, need at least 3")
-    begin, end = (row.need("time", what).number() for what in ("intervalStart", "intervalEnd"))
-    return Occupancy(begin=begin, end=end, corners=corners)
-
-
 def _controls(one: ArocPrimitive) -> Array:
-    """Inputs (n - 1, 2) from state to state."""
     return np.repeat(one.inputs, (len(one.states) - 1) // len(one.inputs), axis=0)
 
 

@@ -81,7 +81,6 @@ def _obstacles(document: Document) -> tuple[Obstacle, ...]:
 
 
 def _pose(document: Document, where: Where) -> Array:
-    """A pose, its heading counted anticlockwise."""
     x, y, yaw = numbers_at(document, where, 3, "[x, y, yaw]")
     if abs(yaw) > MOST_HEADING:
         raise document.error((*where, 2), f"got the yaw {yaw:g}, need at most {MOST_HEADING:g} rad")

@@ -180,18 +180,7 @@ class LoopDocument(DocumentHead):
 
 
 def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
-    """The content of closed_loop.json, as plain values; `name` is that of the scenario.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Cost, Horizon, Problem, Unicycle
-    >>> from maneuver_automaton.receding_horizon import simulate
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
-    >>> loop = simulate(Problem(robot, [-1, 0, 0], [0, 0, 0]), step=0.5)
-    >>> document = closed_loop_to_dict(loop)
-    >>> document["reached"], document["cost"], [step["value"] for step in document["steps"]]
-    (True, 1.0, [1.0, 0.5, 0.0])
-    """
+    """The content of closed_loop.json, as plain values; `name` is that of the scenario."""
     automaton, poses = loop.problem.automaton, loop.poses.tolist()
     document = document_of(
         LoopDocument,
@@ -356,11 +345,6 @@ def driven_document(document: Mapping[str, Any]) -> dict[str, Any]:
     The vehicle is known where each step began; between, it is taken to move at a constant twist. A
     step is named after the primitives that were to be driven in it, and steps of one name in a row
     are one maneuver, as disturbances may have it turn otherwise in each.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        If a key is missing, or holds no numbers.
     """
     steps = document["steps"]
     time = as_array("steps: time_s", [step["time_s"] for step in steps])

@@ -29,13 +29,13 @@ from maneuver_automaton.formats.commonroad_rules import (
     SIGN,
     limits_of,
     not_obeyed,
+    point_of,
     refs,
     signs_of,
     stop_lines,
 )
-from maneuver_automaton.formats.polygons import simple_polygon
-from maneuver_automaton.formats.statement import Statement
-from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag, tags_below_root
+from maneuver_automaton.formats.statement import Statement, simple_polygon
+from maneuver_automaton.formats.text_source import Element, read_xml, root_tag, tags_below_root
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import GoalRegion, Lanelet, RoadBenchmark, RoadScene, RoadStart
 from maneuver_automaton.roads.scene import outlines_of, unwrapped
@@ -73,14 +73,7 @@ def n_problems(path: Path) -> int:
 
 
 def read_commonroad(path: Path) -> tuple[Statement, ...]:
-    """One problem of driving on roads for every planning problem of a file.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file is no scenario of CommonRoad, holds no planning problem, or an element is
-        missing or holds what it may not.
-    """
+    """One problem of driving on roads for every planning problem of a file."""
     root = read_xml(path, what="a scenario of CommonRoad", most=MOST_BYTES)
     if root.tag != ROOT:
         raise root.error(f"is no scenario of CommonRoad, need the element {ROOT}")
@@ -161,14 +154,10 @@ def _runs(neighbour: Element, direction: str) -> bool:
 
 
 def _points(element: Element) -> Array:
-    points = [_point(one) for one in element.all("point")]
+    points = [point_of(one) for one in element.all("point")]
     if len(points) < 2:
         raise element.error(f"got {len(points)} points, need at least 2")
     return np.array(points)
-
-
-def _point(element: Element) -> tuple[float, float]:
-    return element.need("x").number(), element.need("y").number()
 
 
 def _traffic(
@@ -236,7 +225,7 @@ def _exact_pose(state: Element, shapes: Sequence[Shape]) -> tuple[float, float, 
     """The pose of a state at one time; None if it is uncertain."""
     (begin, end), (low, high) = _interval(state.need("time")), _headings(state, shapes)
     point = state.need("position").get("point")
-    return None if point is None or begin != end or low != high else (*_point(point), low)
+    return None if point is None or begin != end or low != high else (*point_of(point), low)
 
 
 def _headings(state: Element, shapes: Sequence[Shape]) -> tuple[float, float]:
@@ -269,7 +258,7 @@ def _shapes_at(
     position = state.need("position")
     point = position.get("point")
     places = (
-        np.array([_point(point)])
+        np.array([point_of(point)])
         if point is not None
         else np.concatenate([_corners(one) for one in _places(position, lanelets)])
     )
@@ -315,14 +304,13 @@ def _text(element: Element | None, otherwise: str) -> str:
 
 
 def _shapes(element: Element) -> Iterator[Shape]:
-    """Rectangles, circles and polygons."""
     found = False
     for part in element.children:
         if part.tag not in ("rectangle", "circle", "polygon"):
             continue
         found = True
         middle = part.get("center")
-        center = (0.0, 0.0) if middle is None else _point(middle)
+        center = (0.0, 0.0) if middle is None else point_of(middle)
         turn = part.get("orientation")
         try:
             if part.tag == "rectangle":
@@ -331,7 +319,7 @@ def _shapes(element: Element) -> Iterator[Shape]:
             elif part.tag == "circle":
                 yield Disc(part.need("radius").number(), center)
             else:
-                yield simple_polygon([_point(one) for one in part.all("point")])
+                yield simple_polygon([point_of(one) for one in part.all("point")])
         except ValueError as error:
             raise _at(part, error) from error
     if not found:
@@ -351,7 +339,7 @@ def _start(state: Element, step: float) -> RoadStart:
         speed = math.hypot(speed, 0.0 if aside is None else aside.number())
     turn_rate = state.get("yawRate", "exact")
     return RoadStart(
-        middle=np.array([*_point(state.need("position", "point")), heading]),
+        middle=np.array([*point_of(state.need("position", "point")), heading]),
         speed=speed,
         turn_rate=0.0 if turn_rate is None else turn_rate.number(),
         time=step * state.need("time", "exact").number(),
@@ -359,7 +347,6 @@ def _start(state: Element, step: float) -> RoadStart:
 
 
 def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> Iterator[GoalRegion]:
-    """The goals of a problem, one of which is to be reached."""
     states = [
         one
         for element in problem.all("goalRegion")

@@ -29,7 +29,7 @@ from maneuver_automaton._limits import FASTEST, STEEPEST_STEERING
 from maneuver_automaton.automaton import Automaton, Trajectory
 from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.formats.lattice import ending_at, levels_of, nearest_level
-from maneuver_automaton.formats.xml_source import Element, read_xml, root_tag
+from maneuver_automaton.formats.text_source import Element, read_xml, root_tag
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive, drive_all

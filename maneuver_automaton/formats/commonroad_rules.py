@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from maneuver_automaton.formats.xml_source import Element
+from maneuver_automaton.formats.text_source import Element
 from maneuver_automaton.roads import Lanelet
 from maneuver_automaton.roads.lanelets import StopLine
 
@@ -82,7 +82,7 @@ def stop_lines(
     at = {one.whole("id"): one for one in root.all("lanelet")}
     for number, element in at.items():
         here, lanelet = _refs_of(element), lanelets[number]
-        ends = [_place(one) for line in element.all("stopLine") for one in line.all("point")]
+        ends = [point_of(one) for line in element.all("stopLine") for one in line.all("point")]
         if not ends:
             ends = _end_of(lanelet)
             # Of lanelets in a row that refer to one light, the last one has it at its end.
@@ -126,8 +126,9 @@ def _refs_of(lanelet: Element) -> set[tuple[str, int]]:
     return {(tag, ref) for one in places for tag in (LIGHT, SIGN) for ref in refs(one, tag)}
 
 
-def _place(point: Element) -> tuple[float, float]:
-    return point.need("x").number(), point.need("y").number()
+def point_of(element: Element) -> tuple[float, float]:
+    """The place that an element states [m]."""
+    return element.need("x").number(), element.need("y").number()
 
 
 def _phases(light: Element, step: float) -> tuple[tuple[tuple[float, bool], ...], float]:

@@ -160,13 +160,7 @@ def _refuse_constant(word: str) -> float:
 
 
 def kind_of(value: Any) -> str:
-    """The kind of document that the value of a file states; empty if it states none.
-
-    Examples
-    --------
-    >>> kind_of({"kind": "fleet", "steps": []}), kind_of({"loops": []}), kind_of(None)
-    ('fleet-loop', 'statistics', '')
-    """
+    """The kind of document that the value of a file states; empty if it states none."""
     keys = value.keys() if isinstance(value, dict) else set()
     if "loops" in keys:
         return "statistics"
@@ -197,24 +191,12 @@ def adapter_of(kind: str) -> TypeAdapter[Any]:
 
 
 def schema_of(kind: str) -> dict[str, Any]:
-    """The JSON Schema of a kind of document, by its name in `KINDS`.
-
-    Examples
-    --------
-    >>> schema_of("plan")["required"]
-    ['schema', 'status', 'primitives', 'trajectory']
-    """
+    """The JSON Schema of a kind of document, by its name in `KINDS`."""
     return adapter_of(kind).json_schema()
 
 
 def checked(kind: str, value: Any, path: Path | str) -> dict[str, Any]:
-    """The value of a file if it is a document of this kind; `path` is its place, for messages.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is none, or a key is missing, or holds what it may not: the first one.
-    """
+    """The value of a file if it is a document of this kind; `path` is its place, for messages."""
     needed = ("schema", *KINDS[kind][1])
     if not isinstance(value, dict) or any(key not in value for key in needed):
         raise InvalidScenario(

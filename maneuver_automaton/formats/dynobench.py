@@ -140,14 +140,7 @@ def dynobench_model(path: Path, document: Document, *, robot: int = 0) -> Stated
 
 
 def pose_and_state(dynamics: str, numbers: tuple[float, ...]) -> tuple[Array, Array]:
-    """The pose (3,) and the reduced state (n_z,) of a start or goal.
-
-    Examples
-    --------
-    >>> pose, hitch = pose_and_state("car_with_trailers", (1.0, 2.0, 0.5, 0.25))
-    >>> pose.tolist(), hitch.tolist()
-    ([1.0, 2.0, 0.5], [0.25])
-    """
+    """The pose (3,) and the reduced state (n_z,) of a start or goal."""
     pose, rest = np.array(numbers[:3]), np.array(numbers[3:])
     if dynamics == "car_with_trailers":
         rest = wrapped(pose[2] - rest)
@@ -305,7 +298,6 @@ Ends: TypeAlias = dict[str, tuple[Array, Array]]
 
 
 def _with_robot(world: Statement, vehicle: StatedVehicle, ends: Ends) -> Statement:
-    """The problem of one robot alone."""
     (start, start_state), (goal, goal_state) = ends.values()
     return replace(
         world,
@@ -332,7 +324,6 @@ def _vehicles(models: Sequence[StatedModel], ends: Sequence[Ends]) -> list[State
 
 
 def _end(document: Document, robot: int, what: str, model: StatedModel) -> tuple[Array, Array]:
-    """Pose and reduced state of the start or the goal."""
     need, where = STATES[model.dynamics], ("robots", robot, what)
     numbers = numbers_at(document, where, need.count(",") + 1, need)
     if abs(numbers[2]) > MOST_HEADING:
@@ -345,7 +336,6 @@ def _end(document: Document, robot: int, what: str, model: StatedModel) -> tuple
 def _check_state(
     document: Document, robot: int, what: str, state: Array, vehicle: StatedVehicle
 ) -> None:
-    """The reduced state of the start or the goal is within the limits."""
     model = vehicle.automaton.model
     rows = zip(model.reduced_names, state.tolist(), model.reduced_limits.tolist(), strict=True)
     for name, value, (low, high) in rows:

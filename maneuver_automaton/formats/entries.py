@@ -162,7 +162,6 @@ def _bare(hint: Any) -> Any:
 
 
 def _stated(value: Any, hint: Any) -> Any:
-    """A value as a file has it."""
     if value is None:
         return None
     bare = _bare(hint)

@@ -160,21 +160,7 @@ class FleetLoopDocument(DocumentHead):
 def fleet_loop_to_dict(
     log: FleetLog, driven: DrivenVerdict, *, name: str = ""
 ) -> FleetLoopDocument:
-    """The content of closed_loop.json for several vehicles, as plain values.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Disc, Problem, Unicycle
-    >>> from maneuver_automaton.fleet import FleetProblem, simulate_fleet, verify_driven
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
-    >>> rows = [Problem(robot, [0, y, 0], [2, y, 0], footprint=Disc(0.3)) for y in (0.0, 1.0)]
-    >>> log = simulate_fleet(FleetProblem(rows, names=["a", "b"]), step=0.5, first_time_limit=1.0)
-    >>> document = fleet_loop_to_dict(log, verify_driven(log))
-    >>> document["kind"], document["status"], document["cost"], len(document["steps"])
-    ('fleet', 'reached', 4.0, 6)
-    >>> [step["value"] for step in document["vehicles"]["a"]["steps"]]
-    [2.0, 1.5, 1.0, 0.5, 0.0, 0.0]
-    """
+    """The content of closed_loop.json for several vehicles, as plain values."""
     fleet, times = log.problem, log.times
     vehicles = {
         one: _vehicle(log, one, problem)
@@ -376,7 +362,6 @@ def _pose(numbers: Any, automaton: Automaton) -> Array:
 
 
 def _piece(step: FleetStep, name: str, row: Row, step_s: float, automaton: Automaton) -> Plan:
-    """What a vehicle drove in a step."""
     pose = _pose(row["vehicle_pose"], automaton)
     undisturbed = step.piece_of(name, pose, step.time + step_s, automaton.model)
     if row["driven"] is None:
@@ -387,7 +372,6 @@ def _piece(step: FleetStep, name: str, row: Row, step_s: float, automaton: Autom
 def _step_of(
     number: int, row: Row, did: Mapping[str, Mapping[int, tuple[Row, Plan, Plan]]]
 ) -> FleetStep:
-    """A step of all."""
     if row["number"] != number:
         raise ValueError(f"steps: number: got {row['number']}, need {number}")
     here = {name: its[number] for name, its in did.items() if number in its}

@@ -70,16 +70,6 @@ def automaton_of_lattice(
         Headings and primitives.
     speed, turn_rate : float
         At which one pose follows another [m/s, rad/s]: a stretch takes the longer of the two times.
-
-    Examples
-    --------
-    >>> quarter = Move(start=0, end=1, poses=[[0, 0, 0], [1, 1, np.pi / 2]])
-    >>> grid = Lattice(resolution=1.0, headings=[0, np.pi / 2], moves=(quarter,))
-    >>> automaton = automaton_of_lattice(grid)
-    >>> automaton.trim_names, automaton.maneuvers[0].displacement.round(3).tolist()
-    (('heading 0', 'heading 1'), [1.0, 1.0, 1.571])
-    >>> round(automaton.maneuvers[0].duration, 3)
-    1.571
     """
     if not (speed > 0.0 and turn_rate > 0.0):
         raise ValueError(
@@ -140,13 +130,7 @@ def lattice_of_automaton(automaton: Automaton, *, kind: str) -> Lattice:
 
 
 def continuous(poses: ArrayLike, *, last_heading: float) -> Array:
-    """Poses (n, 3) whose headings do not jump, the last one equal to `last_heading` up to turns.
-
-    Examples
-    --------
-    >>> continuous([[0, 0, 0.1], [1, 0, 6.2]], last_heading=6.2).round(3)[:, 2].tolist()
-    [0.1, -0.083]
-    """
+    """Poses (n, 3) whose headings do not jump, the last one equal to `last_heading` up to turns."""
     array = np.array(as_array("poses", poses, last=3))
     array[:, 2] = np.unwrap(array[:, 2])
     array[-1, 2] += float(wrapped(last_heading - array[-1, 2]))
@@ -158,11 +142,6 @@ def arcs(poses: Array) -> tuple[float, float, float]:
 
     The radius is speed over turn rate, so positive ahead to the left; 0 without an arc. It is that
     of the stretches that turn most, since one may be an arc in part only.
-
-    Examples
-    --------
-    >>> tuple(np.round(arcs(np.array([[0, 0, 0], [1, 0, 0], [3, 2, np.pi / 2]])), 3).tolist())
-    (2.0, 3.142, 1.0)
     """
     ahead, aside, turns = _twists(poses).T
     length = float(np.hypot(ahead, aside).sum())
@@ -259,17 +238,6 @@ def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = F
         Least radius [m].
     spins : bool
         Whether it turns on the spot too, to the headings beside its own.
-
-    Raises
-    ------
-    ValueError
-        If a number is not positive, or the radius is more than 200 cells.
-
-    Examples
-    --------
-    >>> lattice = lattice_of_arcs(resolution=0.05, turning_radius=0.5)
-    >>> [(move.end, move.poses[-1, :2].round(3).tolist()) for move in lattice.moves[:3]]
-    [(0, [0.2, 0.0]), (1, [0.35, 0.1]), (2, [0.4, 0.15])]
     """
     if not (resolution > 0.0 and turning_radius > 0.0):
         raise ValueError(
@@ -359,14 +327,12 @@ def _is_chain(turns: dict[tuple[int, int], _LatticeTurn], a: int, k: int, n: int
 
 
 def _straight(heading: float, to: Array) -> Array:
-    """Poses (n, 3) [cells, cells, rad], at most a cell apart."""
     count = math.ceil(float(np.hypot(*to)) - ALIKE)
     places = np.linspace(0.0, 1.0, count + 1)[:, None] * to
     return np.column_stack([places, np.full(count + 1, heading)])
 
 
 def _along(first: float, last: float, turn: _LatticeTurn) -> Array:
-    """Poses (n, 3) [cells, cells, rad] of a straight, an arc and a straight."""
     angle = float(wrapped(last - first))
     side = math.copysign(turn.radius, angle)
     poses = [np.array([[0.0, 0.0, first]])]
@@ -391,7 +357,6 @@ def _along(first: float, last: float, turn: _LatticeTurn) -> Array:
 
 
 def _spin(first: float, last: float) -> Array:
-    """Poses (n, 3) of a turn on the spot."""
     angle = float(wrapped(last - first))
     count = math.ceil(abs(angle) / SPIN_STEP)
     return np.column_stack([np.zeros((count + 1, 2)), np.linspace(first, first + angle, count + 1)])
@@ -404,11 +369,6 @@ def levels_of(begins: Array, ends: Array, *, apart: float) -> Array:
     """The levels (k,) of values, rising: those closer than `apart` are one.
 
     A level is the median of what begins there, and of what ends there where nothing begins.
-
-    Examples
-    --------
-    >>> levels_of(np.array([0.0, 4.0]), np.array([3.999, 4.8]), apart=0.01).tolist()
-    [0.0, 4.0, 4.8]
     """
     values = np.unique(np.concatenate([begins, ends]))
     levels = []

@@ -21,8 +21,13 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, check_size, drawn_headings, world_of
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import (
+    Statement,
+    bounds_around,
+    check_size,
+    drawn_headings,
+    world_of,
+)
 from maneuver_automaton.formats.text_source import (
     MAX_MAP_BYTES,
     check_columns,
@@ -132,7 +137,6 @@ def map_beside(path: Path) -> Path:
 
 
 def _queries(path: Path) -> Iterator[tuple[str, list[str]]]:
-    """Place and columns of each query."""
     lines = lines_of(read_text(path, most=MAX_MAP_BYTES, what="a list of queries"))
     for k, line in enumerate(lines[1:]):
         if columns := line.strip().split("\t") if "\t" in line.strip() else line.split():
@@ -146,7 +150,6 @@ def _name(stated: str) -> str:
 
 
 def _ends(columns: list[str], at: str, cells: OccupancyMap, beside: Path) -> Array:
-    """Middles (2, 2) of the cells of start and goal [m]."""
     if _name(columns[1]) != beside.name:
         raise InvalidScenario(f"{at}: map: got {columns[1]!r}, need {beside.name!r} in every line")
     rows, width = cells.blocked.shape

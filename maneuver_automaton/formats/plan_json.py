@@ -447,13 +447,7 @@ def _error(stated: TerminalErrorEntry | None) -> TerminalError | None:
 
 
 def plan_of_document(document: Mapping[str, Any], model: Model | None = None) -> Plan:
-    """The plan of a plan.json that is read already; `model` is as in `load_plan`.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError, IndexError
-        If a key is missing, or holds no numbers.
-    """
+    """The plan of a plan.json that is read already; `model` is as in `load_plan`."""
     trajectory, primitives = document["trajectory"], document["primitives"]
     time = as_array("trajectory.time_s", trajectory["time_s"])
     pose = as_array("trajectory.pose", trajectory["pose"], last=(3, 4))

@@ -20,8 +20,13 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import OccupancyMap
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.cells import bounds_around, check_cell, check_size, drawn_headings
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import (
+    Statement,
+    bounds_around,
+    check_cell,
+    check_size,
+    drawn_headings,
+)
 from maneuver_automaton.formats.text_source import (
     MAX_MAP_BYTES,
     finite,
@@ -50,8 +55,6 @@ KEYS: Mapping[str, int] = {  # and how many numbers follow each
 
 @dataclass(frozen=True, slots=True)
 class _CfgWord:
-    """A word of the header and its line."""
-
     text: str
     line: int
 
@@ -155,7 +158,6 @@ def _end(
     what: str,
     cells: OccupancyMap,
 ) -> Array:
-    """Pose (3,) of start or end."""
     if CELL in numbers:
         return np.array(numbers[f"{what}{METRES}"])
     key = f"{what}{CELLS}"

@@ -21,8 +21,7 @@ from maneuver_automaton._files import open_input
 from maneuver_automaton._limits import MOST_HEADING
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.polygons import simple_polygon
-from maneuver_automaton.formats.statement import Statement
+from maneuver_automaton.formats.statement import Statement, simple_polygon
 from maneuver_automaton.formats.text_source import finite, lines_of, read_text, whole
 
 FORMAT = "TPCAP"
@@ -32,8 +31,6 @@ _FIRST = re.compile(r"\s*[-+]?[.0-9]")
 
 @dataclass(frozen=True, slots=True)
 class _Value:
-    """A number of the file, as it is written, and its place."""
-
     token: str
     at: str
 

@@ -72,26 +72,14 @@ class Document:
 
 
 def spelled(where: Where) -> str:
-    """How a message spells a place.
-
-    Examples
-    --------
-    >>> spelled(("automaton", "trims", 2, "control"))
-    'automaton.trims[2].control'
-    """
+    """How a message spells a place."""
     return "".join(
         f"[{step}]" if isinstance(step, int) else f".{step}" for step in where
     ).removeprefix(".")
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it, in the words of YAML.
-
-    Examples
-    --------
-    >>> shown("abc"), shown(True), shown(None), shown([1, "a"])
-    ("'abc'", 'true', 'nothing', "[1, 'a']")
-    """
+    """A value as a message shows it, in the words of YAML."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None:
@@ -114,17 +102,6 @@ def parse(text: str, *, name: str, what: str = "a scenario") -> Document:
     r"""Values and lines of a YAML text; `name` is what messages call the file.
 
     `what` is what it should hold, for the message if it is empty or too long.
-
-    Raises
-    ------
-    InvalidScenario
-        If it is empty, not YAML, or uses what is not admitted.
-
-    Examples
-    --------
-    >>> document = parse("cost:\n  effort: 1e-6", name="x.yaml")
-    >>> document.value, document.line_of(("cost", "effort"))
-    ({'cost': {'effort': 1e-06}}, 2)
     """
     if len(text) > MAX_BYTES:
         raise too_long(name, MAX_BYTES, what=what)

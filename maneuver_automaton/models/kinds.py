@@ -49,11 +49,5 @@ KINDS: Mapping[str, Any] = {
 
 
 def is_of_a_kind(model: Model) -> bool:
-    """Whether a model is one of `KINDS`: not a user's own, even by one of their names.
-
-    Examples
-    --------
-    >>> is_of_a_kind(Unicycle(max_speed=2.0))
-    True
-    """
+    """Whether a model is one of `KINDS`: not a user's own, even by one of their names."""
     return model.name in KINDS and isinstance(model, KINDS[model.name])

@@ -36,14 +36,7 @@ def steers_at_rest(model: Model) -> bool:
 
 
 def lateral_limit(model: Model) -> float:
-    """Greatest lateral acceleration of a vehicle [m/s^2]; infinite where it has no limit.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Car
-    >>> lateral_limit(Car(wheelbase=2.5, max_lateral_acceleration=3.0))
-    3.0
-    """
+    """Greatest lateral acceleration of a vehicle [m/s^2]; infinite where it has no limit."""
     most = getattr(model, "max_lateral_acceleration", None)
     return math.inf if most is None else float(most)
 
@@ -62,15 +55,7 @@ def is_too_sharp(model: Model, twists: Array) -> NDArray[np.bool_]:
 
 
 def pace_within(model: Model, twist: Array) -> float:
-    """By how much a body velocity (dof,) may be driven faster within the lateral limit.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Car
-    >>> car = Car(wheelbase=2.5, max_lateral_acceleration=4.0)
-    >>> pace_within(car, np.array([2.0, 0.0, -0.5]))
-    2.0
-    """
+    """By how much a body velocity (dof,) may be driven faster within the lateral limit."""
     most = lateral_limit(model)
     across = 0.0 if math.isinf(most) else float(lateral_acceleration(twist))
     return math.sqrt(most / across) if across > 0.0 else math.inf

@@ -29,7 +29,7 @@ from maneuver_automaton.search.lattice import FirstPlan
 from maneuver_automaton.search.lattice_pass import give_back, pass_of
 from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery
 from maneuver_automaton.search.lattice_task import Resolution, back_off_of
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested

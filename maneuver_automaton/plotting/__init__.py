@@ -17,21 +17,21 @@ if TYPE_CHECKING:
     from maneuver_automaton.plotting.automata import save_automaton_figure as save_automaton_figure
     from maneuver_automaton.plotting.colors import trim_colors as trim_colors
     from maneuver_automaton.plotting.controls import draw_controls as draw_controls
-    from maneuver_automaton.plotting.factors import draw_factor as draw_factor
-    from maneuver_automaton.plotting.factors import save_factor_figure as save_factor_figure
     from maneuver_automaton.plotting.films import film_of as film_of
     from maneuver_automaton.plotting.films import save_film as save_film
     from maneuver_automaton.plotting.look import Look as Look
     from maneuver_automaton.plotting.maneuvers import draw_maneuvers as draw_maneuvers
     from maneuver_automaton.plotting.maneuvers import save_maneuvers_figure as save_maneuvers_figure
     from maneuver_automaton.plotting.obstacles import draw_obstacles as draw_obstacles
+    from maneuver_automaton.plotting.pictures import draw_plane as draw_plane
     from maneuver_automaton.plotting.pictures import figure_of as figure_of
     from maneuver_automaton.plotting.pictures import save_picture as save_picture
-    from maneuver_automaton.plotting.plane import draw_plane as draw_plane
     from maneuver_automaton.plotting.player import Player as Player
     from maneuver_automaton.plotting.player import player_of as player_of
     from maneuver_automaton.plotting.player import player_of_file as player_of_file
+    from maneuver_automaton.plotting.searches import draw_factor as draw_factor
     from maneuver_automaton.plotting.searches import draw_progress as draw_progress
+    from maneuver_automaton.plotting.searches import save_factor_figure as save_factor_figure
     from maneuver_automaton.plotting.searches import save_progress_figure as save_progress_figure
     from maneuver_automaton.plotting.space import flies_among_heights as flies_among_heights
 

@@ -273,13 +273,11 @@ def _make_room(ax: Axes, automaton: Automaton, radius: float) -> None:
 
 
 def _motion(trim: Trim) -> Array:
-    """Poses (n, dof) during the time that is shown."""
     plan = Plan(np.zeros(trim.body_velocity.size), (trim,), durations=np.array([SHOWN_S]))
     return plan.pose_at(np.linspace(0.0, SHOWN_S, ARC_POINTS))
 
 
 def _disc() -> Array:
-    """Corners (48, 2) of a circle of radius 1 about the origin."""
     angle = np.linspace(0.0, 2.0 * np.pi, 48, endpoint=False)
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -12,16 +13,25 @@ from matplotlib.axes import Axes
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc, Obstacle, OccupancyMap, Shape
 from maneuver_automaton.collision.outline import outlines, rings_of
-from maneuver_automaton.collision.zones import Zone
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.colors import SEQUENCE, Color, fleet_colors, track_colors
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
-from maneuver_automaton.plotting.limits import limit_boxes, shape_path
-from maneuver_automaton.plotting.obstacles import moving_shapes, round_times, static_shapes
+from maneuver_automaton.plotting.obstacles import (
+    limit_boxes,
+    moving_shapes,
+    round_times,
+    shape_path,
+    static_shapes,
+)
 from maneuver_automaton.plotting.style import count_from_near, tidy, word_text
-from maneuver_automaton.plotting.track import Track, joined_track, track_of_plan
-from maneuver_automaton.problem import Bounds, Goal, Via
-from maneuver_automaton.recording import Mover, Recording
+from maneuver_automaton.plotting.track import (
+    Track,
+    footprint_polygons,
+    joined_track,
+    placed,
+    track_of_plan,
+)
+from maneuver_automaton.problem import Goal
+from maneuver_automaton.recording import Environment, Mover, Recording
 
 STILL_SIZE_M = 1.0  # size of a path that goes nowhere
 ROOM = 0.16  # around start and goals where the body is not known, of the size
@@ -41,38 +51,13 @@ class Carried:
     track: Track
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Scenery:
-    """Goals, obstacles, limits and a body."""
-
-    goals: tuple[Goal, ...]
-    reached: int | None = None  # which of the goals
-    via: tuple[Via, ...] = ()
-    obstacles: tuple[AnyObstacle, ...] = ()
-    zones: tuple[Zone, ...] = ()
-    bounds: Bounds = field(default_factory=Bounds)
-    body: tuple[Array, ...] = ()  # outlines (n, 2) [m]; none: it is not known
-    carried: tuple[Carried, ...] = ()
-    times: Array  # (n,) at which moving obstacles are shown [s]
-
-    @property
-    def reach(self) -> float:
-        """No point of the body is further from its pose [m]."""
-        return max((float(np.linalg.norm(o, axis=1).max()) for o in self.body), default=0.0)
-
-    @property
-    def moves(self) -> bool:
-        """Whether an obstacle moves."""
-        return any(isinstance(o, Obstacle) and o.motion is not None for o in self.obstacles)
-
-
-def view_box(scene: Scenery, points: Array, *, size: float) -> Array:
+def view_box(world: Environment, times: Array, points: Array, *, size: float) -> Array:
     """Corners (2, 2) of what a picture shows around `points` (n, 2), where something happens.
 
     All obstacles and limits, unless they are much larger than that: then those that are near.
     """
     low, high = points.min(axis=0), points.max(axis=0)
-    around = obstacle_boxes(scene.obstacles, scene.times) + limit_boxes(scene.zones, scene.bounds)
+    around = obstacle_boxes(world.obstacles, times) + limit_boxes(world.zones, world.bounds)
     boxes = np.concatenate([np.zeros((0, 2)), *around])
     if not boxes.size:
         return np.array([low, high])
@@ -84,15 +69,15 @@ def view_box(scene: Scenery, points: Array, *, size: float) -> Array:
     return np.array([all_low, all_high])
 
 
-def mark_size(scene: Scenery, box: Array, *, size: float) -> float:
+def mark_size(one: Actor, world: Environment, box: Array, *, size: float) -> float:
     """Size of a path [m] that the marks of a picture suit.
 
     The path's own, but smaller for a small body on a long path, and larger where obstacles take
     most of the picture.
     """
-    if scene.body:
-        size = min(size, max(BODIES * scene.reach, LEAST_MARK * size))
-    if scene.obstacles:
+    if one.body:
+        size = min(size, max(BODIES * one.reach, LEAST_MARK * size))
+    if world.obstacles:
         size = max(size, IN_VIEW * float((box[1] - box[0]).max()))
     return size
 
@@ -121,7 +106,6 @@ def obstacle_boxes(obstacles: Sequence[AnyObstacle], times: Array) -> list[Array
 
 
 def _map_box(cells: OccupancyMap) -> Array:
-    """Corners (2, 2) of the box around the blocked cells of a map."""
     rows, columns = (np.flatnonzero(cells.blocked.any(axis=axis)) for axis in (1, 0))
     x = cells.resolution * np.array([columns[0], columns[-1] + 1.0])
     y = cells.resolution * np.array([rows[0], rows[-1] + 1.0])
@@ -138,7 +122,7 @@ BESIDE_M = 25.0  # [m] on roads, others are in view so near to those who drive
 ROADSIDE_M = 12.0  # [m] around all that drives on roads
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Actor:
     """A vehicle: what it drove as a track, its body, and how it is told from others."""
 
@@ -147,25 +131,36 @@ class Actor:
     label: str  # where there is little room
     color: Color
     track: Track
-    parts: tuple[Mover, ...]  # the vehicle, then what it carries
     held: tuple[tuple[float, Track], ...]  # the plan held from a time on [s]
 
-    @property
-    def drives(self) -> bool:
-        """Whether it has a plan."""
-        return self.mover.has_plan
+    @cached_property
+    def parts(self) -> tuple[Mover, ...]:
+        """The vehicle, then what it carries."""
+        return self.mover.parts if self.mover.has_plan else (self.mover,)
+
+    @cached_property
+    def carried(self) -> tuple[Carried, ...]:
+        """What it carries."""
+        return tuple(
+            Carried(
+                name=part.name,
+                body=tuple(footprint_polygons(part.bodies[""])),
+                track=joined_track(part.start, part.pieces),
+            )
+            for part in self.parts[1:]
+        )
 
     @property
-    def begin(self) -> float:
-        """When it may leave its start [s]."""
-        return self.mover.start_time
+    def goals(self) -> tuple[Goal, ...]:
+        """Where it was to go; where it ended if that is not known."""
+        return (Goal(self.track.end),) if self.mover.problem is None else self.mover.goals
 
     @property
-    def arrival(self) -> float:
-        """When it arrives, or its course ends [s]; its begin if it has none."""
-        return self.mover.arrival
+    def reached(self) -> int | None:
+        """Which of the goals it ends at; None if at none."""
+        return 0 if self.mover.problem is None else self.mover.goal_index
 
-    @property
+    @cached_property
     def body(self) -> list[Array]:
         """Outlines (n, 2) of its body in its own frame [m]; none if it is not known."""
         return footprint_polygons(self.mover.bodies.get("", ()))
@@ -186,7 +181,7 @@ class Actor:
         """Begin, end [s] and whether it rests, of all that it does in a row."""
         rows: list[tuple[float, float, bool]] = []
         for piece in self.track.pieces:
-            first, last = float(piece.time[0]), min(float(piece.time[-1]), self.arrival)
+            first, last = float(piece.time[0]), min(float(piece.time[-1]), self.mover.arrival)
             if first >= last:
                 break
             rests = float(np.abs(np.diff(piece.pose, axis=0)).max(initial=0.0)) <= REST
@@ -205,7 +200,7 @@ class Actor:
             for one, after in pairwise(pieces)
         ]
         last = np.array([pieces[-1].end[:2], np.asarray(self.mover.end)[:2]])
-        rows.append((self.arrival, last))
+        rows.append((self.mover.arrival, last))
         return [(time, line) for time, line in rows if np.abs(line[1] - line[0]).max() > JUMP_M]
 
     @property
@@ -238,7 +233,7 @@ class Actor:
         ends = np.array([self.track.start, np.asarray(self.mover.end), *goals, *on_the_way])
         room = 0.0 if self.body else ROOM * size
         held = [track.pose[:, :2] for _, track in self.held]
-        times = np.append(self.begin, self.track.switching_times)
+        times = np.append(self.mover.start_time, self.track.switching_times)
         bodies = self.bodies_along(times) + placed(
             self.body, np.concatenate([ends, self.decisions])
         )
@@ -253,20 +248,15 @@ class Cast:
 
     recording: Recording
     actors: tuple[Actor, ...]
-    scene: Scenery
+    times: Array  # (n,) at which bodies and what moves are shown [s]
     colors: Mapping[str, Color]  # of trims, by name
     box: Array
     size: float  # [m] of the marks in the picture
 
     @property
-    def begin(self) -> float:
-        """When the first may leave its start [s]."""
-        return self.recording.begin
-
-    @property
     def end(self) -> float:
         """When the last arrives [s]."""
-        return max(one.arrival for one in self.actors)
+        return max(one.mover.arrival for one in self.actors)
 
     @property
     def is_alone(self) -> bool:
@@ -277,6 +267,12 @@ class Cast:
     def on_roads(self) -> bool:
         """Whether there are lanes."""
         return bool(self.recording.world.lanes)
+
+    @property
+    def obstacles_move(self) -> bool:
+        """Whether an obstacle moves."""
+        obstacles = self.recording.world.obstacles
+        return any(isinstance(one, Obstacle) and one.motion is not None for one in obstacles)
 
     @property
     def is_many(self) -> bool:
@@ -321,7 +317,6 @@ def _actor(mover: Mover, name: str, label: str, color: Color) -> Actor:
         label=label,
         color=color,
         track=joined_track(mover.start, mover.pieces) if mover.has_plan else Track(mover.start, ()),
-        parts=mover.parts if mover.has_plan else (mover,),
         held=tuple((time, track_of_plan(plan)) for time, plan in mover.held),
     )
 
@@ -329,34 +324,17 @@ def _actor(mover: Mover, name: str, label: str, color: Color) -> Actor:
 def _cast(recording: Recording, actors: tuple[Actor, ...]) -> Cast:
     first, world = actors[0], recording.world
     alone = len(actors) == 1 and not world.lanes
-    scene = Scenery(
-        goals=first.mover.goals if alone else (),
-        reached=first.mover.goal_index if alone else None,
-        via=first.mover.via if alone else (),
-        obstacles=world.obstacles,
-        zones=world.zones,
-        bounds=world.bounds,
-        body=tuple(first.body) if alone else (),
-        carried=tuple(_carried(part) for part in first.parts[1:]) if alone else (),
-        times=_times(recording, alone=alone),
-    )
-    if alone and first.mover.problem is None:
-        scene = replace(scene, goals=(Goal(pose=first.track.end),), reached=0)
+    times = _times(recording, alone=alone)
     size = max(_size(one) for one in actors)
     points = np.concatenate([one.points(size) for one in actors])
     if not alone:
         points = np.concatenate([points, *(ring for one in actors for ring in one.goal_outlines)])
         size = float(np.ptp(points, axis=0).max()) or STILL_SIZE_M
-    box = _road_box(recording, points) if world.lanes else view_box(scene, points, size=size)
+    box = _road_box(recording, points) if world.lanes else view_box(world, times, points, size=size)
     return Cast(
-        recording=recording, actors=actors, scene=scene, colors=_trim_colors(actors), box=box,
-        size=mark_size(scene, box, size=size) if alone else size,
+        recording=recording, actors=actors, times=times, colors=_trim_colors(actors), box=box,
+        size=mark_size(first, world, box, size=size) if alone else size,
     )  # fmt: skip
-
-
-def _carried(part: Mover) -> Carried:
-    body = tuple(footprint_polygons(part.bodies[""]))
-    return Carried(name=part.name, body=body, track=joined_track(part.start, part.pieces))
 
 
 def _times(recording: Recording, *, alone: bool) -> Array:
@@ -402,16 +380,13 @@ def _road_box(recording: Recording, points: Array) -> Array:
     for one in (one for one in recording.world.obstacles if isinstance(one, Obstacle)):
         for time in np.linspace(recording.begin, recording.end, STEPS_OF_MANY):
             if recording.world.is_there(one, float(time)):
-                corners = _corners_at(one, float(time))
+                corners = np.asarray(shape_path(one.shape).vertices)
+                if one.motion is not None:
+                    corners = np.asarray(SE2(one.motion.at(float(time))).act(corners))
                 if (corners > low).all() and (corners < high).all():
                     every.append(corners)
     whole = np.concatenate(every)
     return np.array([whole.min(axis=0) - ROADSIDE_M, whole.max(axis=0) + ROADSIDE_M])
-
-
-def _corners_at(one: Obstacle, time: float) -> Array:
-    corners = np.asarray(shape_path(one.shape).vertices)
-    return corners if one.motion is None else np.asarray(SE2(one.motion.at(time)).act(corners))
 
 
 def rings_with_radius(shapes: Sequence[Shape]) -> list[tuple[Array, float]]:

@@ -21,7 +21,6 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_bytes_atomically
 from maneuver_automaton.plotting.cast import Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
-from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.obstacles import (
     MOVING,
@@ -37,8 +36,9 @@ from maneuver_automaton.plotting.paths import (
     JUMP_STYLE,
     draw_ends,
 )
-from maneuver_automaton.plotting.plane import draw_world, plane_entries, see
+from maneuver_automaton.plotting.pictures import draw_world, plane_entries, see
 from maneuver_automaton.plotting.together import DASHES, HATCH, TINY
+from maneuver_automaton.plotting.track import placed
 from maneuver_automaton.recording import Event, recording_of
 
 FRAMES_PER_SECOND = 15
@@ -136,15 +136,10 @@ def _video(film: Film) -> bytes:
 
     writer = FFMpegWriter(fps=FRAMES_PER_SECOND, codec="h264", extra_args=["-pix_fmt", "yuv420p"])
     pause = [film.times[-1]] * round(PAUSE_S * FRAMES_PER_SECOND)
-    return _grabbed(film, writer, [*film.times, *pause], name="film.mp4")
-
-
-def _grabbed(film: Film, writer: Any, times: Sequence[float] | Array, *, name: str) -> bytes:
-    """What a Matplotlib `writer` makes of the pictures at `times` [s]."""
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / name
+        file = Path(folder) / "film.mp4"
         with writer.saving(film.figure, str(file), DPI):
-            for time in times:
+            for time in [*film.times, *pause]:
                 film.show(float(time))
                 writer.grab_frame()
         return file.read_bytes()
@@ -209,7 +204,7 @@ def film_of(result: Any, *, look: Look | None = None) -> Film:
     shape = max(wide, 1e-9) / max(high, 1e-9)
     page = page_of(look, [], plane_entries(cast, moving=True), shape=shape)
     ax, figure = page.plane, page.figure
-    still = draw_world(ax, cast, cast.scene.times[:1])
+    still = draw_world(ax, cast, cast.times[:1])
     still["tracks"].remove()
     _draw_still(ax, cast)
     see(ax, cast)
@@ -226,10 +221,10 @@ def film_of(result: Any, *, look: Look | None = None) -> Film:
     for part in (old, jumps, ahead, trails, bodies):
         ax.add_collection(part, autolim=False)
     extent = float(np.ptp(cast.box, axis=0).max())
-    small = [one for one in cast.actors if one.drives and one.reach < TINY * extent]
+    small = [one for one in cast.actors if one.mover.has_plan and one.reach < TINY * extent]
     dots = ax.scatter([], [], s=18.0, linewidths=0.0, zorder=4.1)
     traffic = still["traffic"]
-    shapes = moving_shapes(cast.scene.obstacles, fleeting=cast.recording.world.fleeting)
+    shapes = moving_shapes(cast.recording.world.obstacles, fleeting=cast.recording.world.fleeting)
     dart = [DART_SIZE * cast.size * DART]
 
     def show(time: float) -> None:
@@ -252,11 +247,11 @@ def film_of(result: Any, *, look: Look | None = None) -> Film:
 
     settled(figure)
     moving: list[Artist] = [traffic, old, jumps, ahead, trails, bodies, dots, clock]
-    samples = np.linspace(cast.end, cast.begin, COLOR_SAMPLES).tolist()
+    samples = np.linspace(cast.end, cast.recording.begin, COLOR_SAMPLES).tolist()
     if cast.is_alone:  # one picture of each trim: its colour is in none of the others
         first = {piece.name: float(piece.time[0]) for piece in cast.actors[0].track.pieces[::-1]}
         samples = [cast.end, *first.values()]
-    times = picture_times(cast.begin, cast.end)
+    times = picture_times(cast.recording.begin, cast.end)
     return Film(figure=figure, moving=moving, show=show, times=times, samples=samples)
 
 
@@ -285,7 +280,7 @@ def _ahead(cast: Cast, time: float) -> Lines:
     rows = []
     for one in cast.actors:
         k = bisect_right([begin for begin, _ in one.held], time) - 1
-        arrived = one.mover.reached and time >= one.arrival
+        arrived = one.mover.reached and time >= one.mover.arrival
         if k < 0 or arrived or not one.mover.is_there(time):
             continue
         for name, places in one.held[k][1].between(time, np.inf):
@@ -297,12 +292,12 @@ def _ahead(cast: Cast, time: float) -> Lines:
 def _trails(cast: Cast, time: float) -> Lines:
     """What one vehicle drove, in the colours of its trims, or each of several of late."""
     if cast.is_alone:
-        driven = cast.actors[0].track.between(cast.begin, time)
+        driven = cast.actors[0].track.between(cast.recording.begin, time)
         return [(places, (*cast.colors[name], 1.0)) for name, places in driven]
     return [
         (places, (*one.color, 0.5))
         for one in cast.actors
-        if one.drives and one.mover.is_there(time)
+        if one.mover.has_plan and one.mover.is_there(time)
         for _, places in one.track.between(time - TRAIL_S, time)
     ]
 
@@ -310,7 +305,7 @@ def _trails(cast: Cast, time: float) -> Lines:
 def _bodies(cast: Cast, time: float, dart: Sequence[Array]) -> list[tuple[Array, Color]]:
     """Outlines of all that drive, and their colours; a dart where there is no body."""
     rows = []
-    for one in cast.actors if cast.is_alone else [one for one in cast.actors if one.drives]:
+    for one in cast.actors if cast.is_alone else [one for one in cast.actors if one.mover.has_plan]:
         rings = one.bodies_at(time) or (placed(dart, one.mover.pose_at(time)[None]) if dart else [])
         color = _trim_color(one, time, cast) if cast.is_alone else one.color
         rows += [(ring, color) for ring in rings]
@@ -354,9 +349,9 @@ def _told(events: Sequence[Event], kind: str) -> list[str]:
 
 def _draw_still(ax: Any, cast: Cast) -> None:
     """Faint paths, starts and goals, and vehicles without a plan, hatched."""
-    driving = [one for one in cast.actors if one.drives]
-    waiting = [] if cast.is_alone else [one for one in cast.actors if not one.drives]
-    hatched = [(ring, one) for one in waiting for ring in one.bodies_at(one.begin)]
+    driving = [one for one in cast.actors if one.mover.has_plan]
+    waiting = [] if cast.is_alone else [one for one in cast.actors if not one.mover.has_plan]
+    hatched = [(ring, one) for one in waiting for ring in one.bodies_at(one.mover.start_time)]
     goals = [] if cast.is_alone else [(r, one) for one in cast.actors for r in one.goal_outlines]
     colors = [GREY if cast.is_alone else one.color for one in driving]
     parts = (
@@ -376,5 +371,7 @@ def _draw_still(ax: Any, cast: Cast) -> None:
     for part in parts:
         ax.add_collection(part, autolim=False)
     if cast.is_alone:
-        start, scene = cast.actors[0].track.start, cast.scene
-        draw_ends(ax, start, scene.goals, size=cast.size, reached=scene.reached, via=scene.via)
+        (one,) = cast.actors
+        draw_ends(
+            ax, one.track.start, one.goals, size=cast.size, reached=one.reached, via=one.mover.via
+        )

@@ -69,13 +69,7 @@ class Look:
 
 
 def size_of(text: str) -> tuple[float, float | None]:
-    """The size that a text such as 7.16 or 7.16x3 states [in].
-
-    Examples
-    --------
-    >>> size_of("3.5"), size_of("7.16x3")
-    ((3.5, None), (7.16, 3.0))
-    """
+    """The size that a text such as 7.16 or 7.16x3 states [in]."""
     width, times, height = text.lower().partition("x")
     try:
         return float(width), float(height) if times else None

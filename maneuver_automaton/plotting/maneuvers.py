@@ -15,11 +15,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.plotting.colors import GREY, INK, SEQUENCE, Color
-from maneuver_automaton.plotting.footprint import placed
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import plain_page, write_figure
 from maneuver_automaton.plotting.paths import DART
 from maneuver_automaton.plotting.style import SMALL_PT, shortened
+from maneuver_automaton.plotting.track import placed
 from maneuver_automaton.primitives import Maneuver
 
 MOST_SINGLE = 48  # maneuvers that have a panel each
@@ -161,7 +161,6 @@ def _count(automaton: Automaton) -> str:
 
 
 def _poses(maneuver: Maneuver) -> Array:
-    """Poses (n, dof) from the origin."""
     if maneuver.course is not None:
         return maneuver.course.pose
     return np.stack([np.zeros_like(maneuver.displacement), maneuver.displacement])

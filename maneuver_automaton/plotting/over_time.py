@@ -1,11 +1,14 @@
-"""Draw what happens over time: controls, values, bars of driving and rest, distances, speeds."""
+"""Draw what happens over time: values, bars of driving and rest, speeds, and distances.
+
+Distances are measured by shapely at samples, to be looked at: what is proven is in the result.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,12 +16,13 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 from matplotlib.ticker import FixedLocator, NullFormatter
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.plotting.cast import Cast
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.plotting.cast import Actor, Cast, rings_with_radius
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
 from maneuver_automaton.plotting.controls import TIME_LABEL, draw_over_time, step_curves, within
-from maneuver_automaton.plotting.distances import distance_times, nearest_others
 from maneuver_automaton.plotting.paths import JUMP
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
@@ -33,6 +37,99 @@ from maneuver_automaton.plotting.style import (
 from maneuver_automaton.plotting.together import HATCH
 from maneuver_automaton.plotting.track import TrackPiece
 from maneuver_automaton.recording import Curve, Mover
+
+STEP_S, MOST_STEPS = 0.05, 20_000  # between samples; no more of them, however long it takes
+AT_ONCE = 2_000_000  # pairs in memory
+Numbers = NDArray[Any]
+
+
+def distance_times(begin: float, end: float) -> Array:
+    """Times (n,) at which distances are measured [s], 0.05 s apart unless it takes long."""
+    steps = min(max(1, int(np.ceil((end - begin) / STEP_S))), MOST_STEPS)
+    return np.linspace(begin, end, steps + 1)
+
+
+def nearest_others(actors: Sequence[Actor], times: Array) -> Array:
+    """Distance of each vehicle from the nearest other at times (n,) [s]: (n, vehicles) [m].
+
+    It is inf where there is no other. Pairs that a circle around each shows to be further apart
+    than another pair are not measured.
+    """
+    rows = [
+        (owner, ring, grown, part.pose_at(times))
+        for owner, one in enumerate(actors)
+        for part in one.parts
+        for ring, grown in rings_with_radius(part.bodies.get("", ()))
+    ]
+    owners = np.array([owner for owner, *_ in rows])
+    seen = [[one.mover.is_there(time) for time in times.tolist()] for one in actors]
+    there = np.array(seen)[owners]  # (parts, n)
+    heights = np.array([_heights(one, times) for one in actors])[owners]  # (parts, n, 2)
+    apart = np.full((len(times), len(actors)), np.inf)
+    chunk = max(1, AT_ONCE // len(rows) ** 2)
+    for first in range(0, len(times), chunk):
+        part = slice(first, first + chunk)
+        moved = [(ring, grown, poses[part, :3]) for _, ring, grown, poses in rows]
+        nearest = _nearest(moved, owners, there[:, part], heights[:, part])
+        for row, owner in enumerate(owners):
+            apart[part, owner] = np.minimum(apart[part, owner], nearest[row])
+    return apart
+
+
+def _heights(one: Actor, times: Array) -> Array:
+    """Lowest and highest point of a vehicle at times (n,) [s]: (n, 2) [m], infinite if any."""
+    low, high = (0.0, 0.0) if one.mover.problem is None else one.mover.problem.body_height
+    altitude = one.mover.pose_at(times)[:, 3:].sum(axis=1)  # 0 in the plane
+    if one.mover.start.size == 3 and not low < high:
+        low, high = -np.inf, np.inf
+    return np.column_stack([altitude + low, altitude + high])
+
+
+def _nearest(
+    rows: Sequence[tuple[Array, float, Array]], owners: Numbers, there: Numbers, heights: Array
+) -> Array:
+    """Distance (parts, n) of each part from the nearest part of another vehicle."""
+    import shapely
+
+    middles, radii, placed = [], [], []
+    for ring, grown, poses in rows:
+        middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))
+        middles.append(SE2(poses).act(middle))
+        radii.append(float(np.linalg.norm(ring - middle, axis=1).max()) + grown)
+        corners = SE2(poses[:, None]).act(ring)
+        one = shapely.points(corners[:, 0]) if len(ring) == 1 else shapely.polygons(corners)
+        placed.append(one)
+    at, solid = np.array(middles), np.array(placed)
+    wide, larger = np.array(radii), np.array([by for _, by, _ in rows])
+    low = np.linalg.norm(at[:, None] - at[None], axis=-1) - (wide[:, None] + wide)[..., None]
+    above = np.maximum(heights[:, None, :, 0] - heights[None, :, :, 1], 0.0)
+    above = np.maximum(above, above.swapaxes(0, 1))
+    low = np.where(above > 0.0, np.hypot(np.maximum(low, 0.0), above), low)
+    low[owners[:, None] == owners] = np.inf
+    low[~(there[:, None] & there[None])] = np.inf
+
+    def measured(one: Numbers, other: Numbers, time: Numbers) -> Array:
+        apart = shapely.distance(solid[one, time], solid[other, time])
+        aside = np.maximum(apart - larger[one] - larger[other], 0.0)
+        return np.asarray(np.hypot(aside, above[one, other, time]))
+
+    parts, steps = np.indices(low.shape[1:])
+    likely = low.argmin(axis=1)
+    least = measured(parts, likely, steps)
+    least[np.isinf(low.min(axis=1))] = np.inf
+    one, other, time = np.nonzero(low < least[:, None])
+    np.minimum.at(least, (one, time), measured(one, other, time))
+    return np.asarray(least)
+
+
+def thinned(times: Array, values: Array, *, most: int) -> tuple[Array, Array]:
+    """At most about so many of the samples, with the least of those between them."""
+    width = -(-len(times) // most)
+    begins = range(0, len(times), width)
+    least = [begin + int(np.argmin(values[begin : begin + width])) for begin in begins]
+    kept = np.unique([0, *least, len(times) - 1])
+    return times[kept], values[kept]
+
 
 MOST_STATES = 4  # panels of reduced state and controls
 RESTS, LEFT_TO_PAY = 0.66, 0.35  # shades of the vehicle's colour, towards white
@@ -61,7 +158,7 @@ def panels_of(cast: Cast) -> list[Panel]:
     panels: list[Panel] = []
     if len(cast.actors) > 1 and not cast.recording.alternatives and not cast.on_roads:
         panels.append(_bars(cast))
-        if cast.end > cast.begin:
+        if cast.end > cast.recording.begin:
             panels.append(_distances(cast))
     values = [one for one in cast.recording.curves if one.label == "value"]
     if any(one.time.size > 1 for one in values):
@@ -126,7 +223,6 @@ def _compared(cast: Cast) -> list[Panel]:
 
 
 def _draw_curves(ax: Axes, *, cast: Cast, label: str) -> None:
-    """Curves of one label, each in the colour of its vehicle."""
     colors = {one.mover.name: one.color for one in cast.actors}
     for one in cast.recording.curves:
         if one.label == label:
@@ -238,9 +334,10 @@ def draw_bars(ax: Axes, cast: Cast) -> PolyCollection:
             shaded(one.color, RESTS) if rests else one.color for _, one, (_, _, rests) in spans
         ],
     )  # fmt: skip
-    none = [k for k, one in enumerate(cast.actors) if not one.drives]
+    none = [k for k, one in enumerate(cast.actors) if not one.mover.has_plan]
+    begin = cast.recording.begin
     missing = PolyCollection(
-        [_bar(k, cast.begin, cast.begin + _span(cast)) for k in none], facecolors="white",
+        [_bar(k, begin, begin + _span(cast)) for k in none], facecolors="white",
         edgecolors=[cast.actors[k].color for k in none], linewidths=0.7, hatch=HATCH, zorder=2.0,
     )  # fmt: skip
     for part in (bars, missing):
@@ -298,7 +395,7 @@ def _distances(cast: Cast) -> Panel:
     ]
 
     def draw(ax: Axes) -> None:
-        times = distance_times(cast.begin, cast.end)
+        times = distance_times(cast.recording.begin, cast.end)
         draw_distances(ax, cast, times, nearest_others(cast.actors, times).min(axis=1))
 
     return Panel(draw, 1.0, entries)
@@ -325,9 +422,9 @@ def draw_distances(ax: Axes, cast: Cast, times: Array, least: Array) -> None:
 def _limits(cast: Cast) -> tuple[float, float]:
     """What axes over time show of a cast [s]."""
     span = _span(cast)
-    return cast.begin - 0.01 * span, cast.begin + 1.02 * span
+    return cast.recording.begin - 0.01 * span, cast.recording.begin + 1.02 * span
 
 
 def _span(cast: Cast) -> float:
     """How long all takes [s]; not nothing."""
-    return cast.end - cast.begin or 1.0
+    return cast.end - cast.recording.begin or 1.0

@@ -46,13 +46,6 @@ TICKS, LABEL, EDGE = 0.2, 0.4, 0.12  # [in] of numbers, of numbers and a label, 
 FIRST = 4.0  # [in] height of a page before it is known
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """A figure of `width` and `height` [in] that belongs to no window."""
-    figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, float, str]]:
     """Lines of (text, size [pt], weight): the title, then `others`, the first bold without one."""
     said = [look.title, *([] if look.is_paper else others)]
@@ -61,13 +54,9 @@ def _title_lines(look: Look, width: float, *others: str) -> list[tuple[str, floa
     for place, (text, k) in enumerate(shown):
         size = TITLE_PT if k == 0 else HEAD_PT if place == 0 else TEXT_PT
         most = max(20, int(width / ((0.0077 if place else 0.0092) * size)))
-        lines.append((fill(text, most), size, "normal" if place else "bold"))
+        filled = "\n".join(textwrap.fill(line, most) for line in text.split("\n"))
+        lines.append((filled, size, "normal" if place else "bold"))
     return lines
-
-
-def fill(text: str, most: int) -> str:
-    """The text in lines of at most so many characters; lines that it has stay lines."""
-    return "\n".join(textwrap.fill(line, most) for line in text.split("\n"))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -192,7 +181,8 @@ def _framed(look: Look, lines: Sequence[str], legend: Entries) -> tuple[Figure, 
 
 def _headed(look: Look, lines: Sequence[str], width: float) -> tuple[Figure, float]:
     """A figure with a heading from the upper left corner down, and the height [in] of that."""
-    figure, top = new_figure(width, FIRST), EDGE
+    figure, top = Figure(figsize=(width, FIRST), dpi=DPI, facecolor="white"), EDGE
+    FigureCanvasAgg(figure)  # it belongs to no window
     for text, size, weight in _title_lines(look, width - 2.0 * EDGE, *lines):
         figure.text(
             EDGE / width, 1.0 - top / FIRST, text, fontsize=size, fontweight=weight, color=INK,

@@ -14,11 +14,9 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.quiver import Quiver
 
 from maneuver_automaton._arrays import Array, wrapped
-from maneuver_automaton.plotting.cast import Actor, Cast, Scenery
+from maneuver_automaton.plotting.cast import Actor, Cast
 from maneuver_automaton.plotting.colors import GREY, INK, MOST_TRIMS, SWEPT, Color, motion_names
-from maneuver_automaton.plotting.footprint import footprint_polygons, merged, placed, swept_region
-from maneuver_automaton.plotting.limits import region_path
-from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors
+from maneuver_automaton.plotting.obstacles import ROBOT, moment_colors, region_path
 from maneuver_automaton.plotting.style import (
     SMALL_PT,
     Entries,
@@ -27,7 +25,14 @@ from maneuver_automaton.plotting.style import (
     mark_handle,
     shown_name,
 )
-from maneuver_automaton.plotting.track import Track, TrackPiece
+from maneuver_automaton.plotting.track import (
+    Track,
+    TrackPiece,
+    footprint_polygons,
+    merged,
+    placed,
+    swept_region,
+)
 from maneuver_automaton.problem import Goal, Via
 
 ARROW_SIZE = 0.13  # of the size of the path
@@ -163,7 +168,7 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
     A plan has its body where trims begin and what it sweeps, a closed loop its body at steps that
     are apart, the plan of each step, pale, and a dotted line for each disturbance.
     """
-    (one,), scene, colors, size = cast.actors, cast.scene, cast.colors, cast.size
+    (one,), colors, size = cast.actors, cast.colors, cast.size
     track = one.track
     driving = [piece for piece in track.pieces if piece.drives]
     lines = [piece.pose[:, :2] for piece in driving]
@@ -180,20 +185,20 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
         "halo": LineCollection(
             lines, colors=["white"], linewidths=4.0, capstyle="butt", joinstyle="round", zorder=2.9
         ),
-        "swept": swept_area(track, scene),
+        "swept": swept_area(one),
         "spins": LineCollection(arcs, colors=spin_colors, linewidths=1.8, zorder=4.0),
         "spin_heads": PolyCollection(heads, facecolors=spin_colors, linewidths=0.0, zorder=4.0),
-        "moments": _moment_bodies(track, scene),
-        "wanted": _goal_bodies(scene),
+        "moments": _moment_bodies(one, cast),
+        "wanted": _goal_bodies(one),
     }  # fmt: skip
     if loop:
         artists |= _steps_of(ax, cast, one)
     else:
         artists |= {
-            "darts": _darts(track, scene, size=size),
-            "bodies": _switch_bodies(track, scene),
+            "darts": _darts(one, size=size),
+            "bodies": _switch_bodies(one),
         }
-        poses = _between_ends(track, scene, apart=1e-6 * size)[: None if scene.body else 0]
+        poses = _between_ends(one, apart=1e-6 * size)[: None if one.body else 0]
         artists["switches"] = ax.scatter(
             poses[:, 0], poses[:, 1], s=8.0, facecolors="white", edgecolors=[INK],
             linewidths=0.7, zorder=3.6,
@@ -209,7 +214,7 @@ def draw_path(ax: Axes, cast: Cast) -> dict[str, Any]:
         if part.axes is None:
             ax.add_collection(part)
     return artists | draw_ends(
-        ax, track.start, scene.goals, size=size, reached=scene.reached, via=scene.via
+        ax, track.start, one.goals, size=size, reached=one.reached, via=one.mover.via
     )
 
 
@@ -243,17 +248,17 @@ def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
 
     In a film the trims alone, if they are few.
     """
-    one, scene = cast.actors[0], cast.scene
+    one = cast.actors[0]
     entries = [*trim_entries(one.track, cast.colors)]
     if moving:
         return entries if len(entries) <= MOST_TRIMS else []
-    swept = bool(scene.body and one.track.pieces)
+    swept = bool(one.body and one.track.pieces)
     if swept:
-        names_of_parts = [part.name.replace("_", " ") for part in scene.carried]
+        names_of_parts = [part.name.replace("_", " ") for part in one.carried]
         by = f" and the {names_of_parts[0]}" if names_of_parts else ""
         by = " and all that it pulls" if len(names_of_parts) > 1 else by
         entries.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), f"swept by the body{by}"))
-    if swept and scene.moves:
+    if swept and cast.obstacles_move:
         said = "body at the same times"
         entries.append((Patch(facecolor=(*ROBOT, 0.85), edgecolor=INK), said))
     if one.held:
@@ -305,10 +310,10 @@ def _spin_symbols(spins: list[TrackPiece], *, size: float) -> tuple[list[Array],
     return arcs, heads
 
 
-def swept_area(track: Track, scene: Scenery) -> PathCollection:
-    """Area that the body covers along a track; empty where the body is not known."""
-    region = swept_region(track, scene.body) if scene.body and track.pieces else []
-    carried = [swept_region(part.track, part.body) for part in scene.carried]
+def swept_area(one: Actor) -> PathCollection:
+    """Area that the body covers along its track; empty where the body is not known."""
+    region = swept_region(one.track, one.body) if one.body and one.track.pieces else []
+    carried = [swept_region(part.track, part.body) for part in one.carried]
     region = merged([*region, *chain.from_iterable(carried)]) if carried else region
     return PathCollection(
         [region_path(region)] if region else [], facecolors=[(*SWEPT, SWEPT_ALPHA)],
@@ -316,13 +321,13 @@ def swept_area(track: Track, scene: Scenery) -> PathCollection:
     )  # fmt: skip
 
 
-def _darts(track: Track, scene: Scenery, *, size: float) -> PolyCollection:
+def _darts(one: Actor, *, size: float) -> PolyCollection:
     """Where the body is not known: darts along a path, and white ones where trims begin."""
-    if scene.body:
+    if one.body:
         return PolyCollection([])
     dart = [DART_SIZE * size * DART]
-    faint = track.spread(FAINT_DARTS, reach=0.0)
-    switches = _between_ends(track, scene, apart=1e-6 * size)
+    faint = one.track.spread(FAINT_DARTS, reach=0.0)
+    switches = _between_ends(one, apart=1e-6 * size)
     clear = switches[_apart(switches, DARTS_APART * DART_SIZE * size)]
     return PolyCollection(
         [*placed(dart, faint), *placed(dart, clear)],
@@ -343,12 +348,13 @@ def _apart(poses: Array, apart: float) -> list[int]:
     return kept
 
 
-def _switch_bodies(track: Track, scene: Scenery) -> PolyCollection:
+def _switch_bodies(one: Actor) -> PolyCollection:
     """Outlines where trims begin and at the end, which is clear; many others are fainter."""
-    times = _shown_times(track, apart=BODIES_APART * scene.reach)
+    track = one.track
+    times = _shown_times(track, apart=BODIES_APART * one.reach)
     poses = track.at(times) if len(times) > len(track.switching_times) else track.switching_poses
-    outlines = placed(scene.body, poses)
-    for part in scene.carried:
+    outlines = placed(one.body, poses)
+    for part in one.carried:
         outlines += placed(part.body, part.track.at(times))
     alpha = max(LEAST_ALPHA, 0.8 * min(1.0, FEW_BODIES / len(poses)))
     inner, bodies = len(poses) - 2, len(outlines) // len(poses)
@@ -400,11 +406,11 @@ def _step_bodies(one: Actor, *, size: float) -> PolyCollection:
     )  # fmt: skip
 
 
-def _moment_bodies(track: Track, scene: Scenery) -> PolyCollection:
+def _moment_bodies(one: Actor, cast: Cast) -> PolyCollection:
     """The body at the times at which moving obstacles are shown, the darker the later."""
-    times = scene.times if scene.moves and track.pieces else scene.times[:0]
-    outlines = placed(scene.body, track.at(times))
-    for part in scene.carried:
+    times = cast.times if cast.obstacles_move and one.track.pieces else cast.times[:0]
+    outlines = placed(one.body, one.track.at(times))
+    for part in one.carried:
         outlines += placed(part.body, part.track.at(times))
     bodies = len(outlines) // max(len(times), 1)
     colors = moment_colors(len(times), color=ROBOT) * bodies
@@ -414,21 +420,20 @@ def _moment_bodies(track: Track, scene: Scenery) -> PolyCollection:
     )  # fmt: skip
 
 
-def _goal_bodies(scene: Scenery) -> PolyCollection:
+def _goal_bodies(one: Actor) -> PolyCollection:
     """Dashed outlines at the goals that are not reached and ask for a heading."""
     poses = [
-        goal.pose
-        for k, goal in enumerate(scene.goals)
-        if k != scene.reached and not goal.free_heading
+        goal.pose for k, goal in enumerate(one.goals) if k != one.reached and not goal.free_heading
     ]
     return PolyCollection(
-        placed(scene.body, np.array(poses)) if poses else [], facecolors="none",
+        placed(one.body, np.array(poses)) if poses else [], facecolors="none",
         edgecolors=[SET], linewidths=1.2, linestyles=[(0, (3, 2))], zorder=2.0,
     )  # fmt: skip
 
 
-def _between_ends(track: Track, scene: Scenery, *, apart: float) -> Array:
+def _between_ends(one: Actor, *, apart: float) -> Array:
     """Poses where trims begin, but none at the start or a goal, where other marks are."""
-    ends = np.array([track.start, *(goal.pose for goal in scene.goals)])
-    gaps = np.linalg.norm(track.switching_poses[:, None, :2] - ends[:, :2], axis=-1)
-    return np.asarray(track.switching_poses[gaps.min(axis=1) > apart])
+    ends = np.array([one.track.start, *(goal.pose for goal in one.goals)])
+    poses = one.track.switching_poses
+    gaps = np.linalg.norm(poses[:, None, :2] - ends[:, :2], axis=-1)
+    return np.asarray(poses[gaps.min(axis=1) > apart])

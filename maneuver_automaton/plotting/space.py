@@ -20,8 +20,8 @@ from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import Cast
 from maneuver_automaton.plotting.colors import GREY, INK, Color, shaded
-from maneuver_automaton.plotting.limits import shape_path, turning
 from maneuver_automaton.plotting.look import Look
+from maneuver_automaton.plotting.obstacles import shape_path, turning
 from maneuver_automaton.plotting.pages import space_page
 from maneuver_automaton.plotting.paths import WAY, trim_entries
 from maneuver_automaton.plotting.style import SMALL_PT, TEXT_PT, Entries, line_handle, tidy
@@ -130,7 +130,6 @@ def draw_space(ax: Axes3D, cast: Cast) -> Poly3DCollection:
 
 
 def _ends(cast: Cast) -> list[tuple[Array, Color, str]]:
-    """Poses of starts and goals, with the colours and forms of their marks."""
     rows = []
     for one in cast.actors:
         colors = (START, GOAL) if cast.is_alone else (one.color, one.color)
@@ -243,7 +242,7 @@ def _height(obstacle: Any) -> tuple[float, float] | None:
 
 
 def _standing(cast: Cast) -> list[Obstacle]:
-    return [one for one in cast.scene.obstacles if isinstance(one, Obstacle)]
+    return [one for one in cast.recording.world.obstacles if isinstance(one, Obstacle)]
 
 
 def _entries(cast: Cast) -> Entries:

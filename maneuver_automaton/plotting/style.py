@@ -172,27 +172,13 @@ def control_labels(names: Sequence[str]) -> list[str]:
 
 
 def shown_name(name: str) -> str:
-    """The name of a trim or maneuver as pictures show it: "polished" alone says little.
-
-    Examples
-    --------
-    >>> shown_name("polished"), shown_name("polished, back"), shown_name("left")
-    ('polished motion', 'polished motion, back', 'left')
-    """
+    """The name of a trim or maneuver as pictures show it: "polished" alone says little."""
     head, comma, rest = name.partition(",")
     return f"{head} motion{comma}{rest}" if head == POLISHED else name
 
 
 def word_text(word: Sequence[str], *, width: int, lines: int) -> str:
-    """A word in at most `lines` of `width` characters, its middle left out if it is longer.
-
-    Examples
-    --------
-    >>> word_text(["spin", "straight", "rest"], width=40, lines=1)
-    'spin → straight → rest'
-    >>> word_text(["left", "right"] * 20, width=40, lines=1)
-    'left → … → left → right (40 trims)'
-    """
+    """A word in at most `lines` of `width` characters, its middle left out if it is longer."""
     if not word:
         return "no motion"
     if list(word) == [POLISHED]:

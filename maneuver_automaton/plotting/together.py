@@ -39,14 +39,16 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
     """
     actors = cast.actors
     extent = float(np.ptp(cast.box, axis=0).max())
-    driving = [one for one in actors if one.drives]
+    driving = [one for one in actors if one.mover.has_plan]
     small = [one for one in actors if one.reach < TINY * extent]
     seen = [one for one in driving if one not in small]
-    missed = [one for one in actors if one not in small and not (one.drives and one.mover.reached)]
-    lost = [one for one in small if not one.drives]
-    dots = [one for one in small if one.drives]
+    missed = [
+        one for one in actors if one not in small and not (one.mover.has_plan and one.mover.reached)
+    ]
+    lost = [one for one in small if not one.mover.has_plan]
+    dots = [one for one in small if one.mover.has_plan]
     width, alpha = next((weights for most, weights in DIM.items() if len(actors) <= most), THIN)
-    along = [(one, time) for one in driving for time in _between(one, cast.scene.times)]
+    along = [(one, time) for one in driving for time in _between(one, cast.times)]
     held = [(track, one) for one in actors for _, track in one.held]
     jumps = [line for one in actors for _, line in one.jumps]
     wanted = [(ring, one) for one in missed for ring in one.goal_outlines]
@@ -56,9 +58,11 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
             linewidths=width, capstyle="round", joinstyle="round", zorder=3.0,
         ),
         "bodies": _bodies([(one, time) for one, time in along], face=0.4 * alpha, edge=2.2 * alpha),
-        "starts": _bodies([(one, one.begin) for one in seen], face=0.0, edge=1.0, width=1.5),
-        "goals": _bodies([(one, one.arrival) for one in seen if one not in missed], face=1.0),
-        "missing": _bodies([(one, one.arrival) for one in missed], hatch=HATCH, width=1.0),
+        "starts": _bodies(
+            [(one, one.mover.start_time) for one in seen], face=0.0, edge=1.0, width=1.5
+        ),
+        "goals": _bodies([(one, one.mover.arrival) for one in seen if one not in missed], face=1.0),
+        "missing": _bodies([(one, one.mover.arrival) for one in missed], hatch=HATCH, width=1.0),
         "fronts": _fronts(seen),
         "wanted": PolyCollection(
             [ring for ring, _ in wanted], facecolors="none", linewidths=1.0, linestyles=[DASHES],
@@ -90,7 +94,7 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
     for one in actors if cast.is_many else ():
         _number(ax, one)
     for one, time in along if numbered else ():
-        _step(ax, one, time, int(np.searchsorted(cast.scene.times, time)))
+        _step(ax, one, time, int(np.searchsorted(cast.times, time)))
     return artists
 
 
@@ -104,15 +108,15 @@ def vehicle_entries(cast: Cast, *, moving: bool = False) -> Entries:
     rows: list[tuple[Artist, str]] = [
         (line_handle(one.color, width=3.4), one.name) for one in named
     ]
-    if not all(one.drives and one.mover.reached for one in actors):
-        said = "not arrived" if all(one.drives for one in actors) else "no plan"
+    if not all(one.mover.has_plan and one.mover.reached for one in actors):
+        said = "not arrived" if all(one.mover.has_plan for one in actors) else "no plan"
         rows.append((Patch(facecolor="white", edgecolor=INK, hatch=HATCH, linewidth=0.8), said))
     if moving and any(one.goal_outlines for one in actors):
         rows.append((Patch(facecolor="none", edgecolor=INK, linestyle=DASHES), "goal"))
     elif not moving:
         square = mark_handle("s", size=6.5)
         rows += [(square, "start"), (mark_handle("s", size=6.5, face=INK), "goal")]
-    times = cast.scene.times
+    times = cast.times
     if not moving and len(times) > 2 and any(one.body for one in actors):
         said = f"body every {float(np.median(np.diff(times))):.3g} s"
         rows.append((Patch(facecolor=(*GREY, 0.15), edgecolor=GREY, linewidth=0.8), said))
@@ -127,7 +131,7 @@ def vehicle_entries(cast: Cast, *, moving: bool = False) -> Entries:
 
 def _between(one: Actor, times: Array) -> list[float]:
     """Those of the times at which it is under way [s]."""
-    under_way = (times > one.begin + SLACK_S) & (times < one.arrival - SLACK_S)
+    under_way = (times > one.mover.start_time + SLACK_S) & (times < one.mover.arrival - SLACK_S)
     found: list[float] = times[under_way].tolist()
     return found
 
@@ -163,7 +167,7 @@ def _fronts(seen: Sequence[Actor]) -> LineCollection:
     lines, colors = [], []
     for one in seen:
         ahead = max(float(ring[:, 0].max()) for ring in one.body)
-        for time in (one.begin, one.arrival):
+        for time in (one.mover.start_time, one.mover.arrival):
             pose = one.mover.pose_at(time)
             lines.append(SE2(pose[:3]).act(np.array([[0.0, 0.0], [FRONT * ahead, 0.0]])))
         colors += [one.color, (1.0, 1.0, 1.0) if one.mover.reached else one.color]

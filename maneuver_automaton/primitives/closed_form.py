@@ -148,18 +148,7 @@ def _maneuvers(
 def quickest_between(
     model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool = False
 ) -> list[Maneuver]:
-    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderUnicycle
-    >>> from maneuver_automaton.primitives.equilibrium import trims_of
-    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=1.0, max_acceleration=0.5,
-    ...                             max_angular_acceleration=1.0)
-    >>> rest, ahead = trims_of(robot, {"speed": [0.0, 1.0], "turn_rate": [0.0]}).trims
-    >>> [one.duration for one in quickest_between(robot, [(rest, ahead), (ahead, rest)])]
-    [2.0, 2.0]
-    """
+    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them."""
     source = np.array([source.reduced_state for source, _ in pairs])
     target = np.array([target.reduced_state for _, target in pairs])
     same = ~(np.abs(target - source) > EQUAL * np.maximum(1.0, np.abs(source))).any(axis=1)
@@ -443,16 +432,6 @@ def quickest_maneuvers(
 
     In narrow places a maneuver between speed trims is longer than the room there is: short
     strokes are what parking is made of.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderCar
-    >>> from maneuver_automaton.primitives.equilibrium import trims_of
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5)
-    >>> trims = trims_of(car, {"speed": [-1.0, 0.0, 2.0], "steering": [-0.7, 0.0, 0.7]}).trims
-    >>> len(quickest_maneuvers(car, trims, strokes=[0.5, -0.5]))
-    46
     """
     early = connect_bang_bang(model, trims, pairs=pairs)
     both = late or not steers_at_rest(model)  # who brakes last has turned the wheels before

@@ -121,7 +121,6 @@ def _check_names(model: Model, axes: Mapping[str, Array]) -> None:
 
 
 def _twist_names(model: Model) -> tuple[str, ...]:
-    """Names of the components of a twist."""
     turns = "heading" in model.group.coordinates
     return (TWIST_NAMES if turns else WORLD_NAMES)[: model.group.dof]
 

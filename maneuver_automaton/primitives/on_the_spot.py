@@ -44,16 +44,7 @@ LEAST = 1e-9  # [units of the reduced state] a difference that takes time
 
 
 def state_of(model: Model, value: Any, what: str) -> Array:
-    """A reduced state (n_z,) of a model, stated in its order or by names; those left out are 0.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderCar
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5)
-    >>> state_of(car, {"speed": 1.37}, "start").tolist()
-    [1.37, 0.0]
-    """
+    """A reduced state (n_z,) of a model, stated in its order or by names; those left out are 0."""
     names = model.reduced_names
     if not names:
         raise ValueError(

@@ -164,7 +164,6 @@ def _candidates(
 
 
 def _matrix(change: _Exchange) -> Array:
-    """The change as a matrix (n, n)."""
     return np.asarray(change.signs[:, None] * np.eye(len(change.order))[list(change.order)] + 0.0)
 
 
@@ -193,21 +192,7 @@ def _pose_signs(dof: int) -> Array:
 
 
 def trim_in_world(model: OnlyTranslated, trim: Trim) -> Trim:
-    """A trim whose velocity is along the world's axes, seen from the body; any other as it is.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.groups import translations
-    >>> from maneuver_automaton.models import UserModel, in_world
-    >>> boat = UserModel(name="boat", group=translations(2), control_names=("turn_rate",),
-    ...                  reduced_names=("heading",), dynamics=lambda z, u: [u[0]],
-    ...                  velocity=lambda z, u: [np.cos(z[0]) + 0.5, np.sin(z[0])])
-    >>> north = Trim(name="north", body_velocity=[0.5, 1.0], control=[0.0],
-    ...              reduced_state=[np.pi / 2])
-    >>> seen = trim_in_world(in_world(boat), north)
-    >>> seen.body_velocity.tolist(), seen.reduced_state.tolist()
-    ([1.0, -0.5, 0.0], [0.0, 1.0])
-    """
+    """A trim whose velocity is along the world's axes, seen from the body; any other as it is."""
     if not _is_stated(model, trim.body_velocity):
         return trim
     reduced = model.seen(trim.reduced_state)

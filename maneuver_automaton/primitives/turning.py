@@ -27,22 +27,6 @@ def turns_between(
 
     A turn begins in a trim, keeps its other controls, and ends in the trim that has these, or
     else in the first one, at the other heading. It takes the shorter side; half a turn, both.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.groups import translations
-    >>> from maneuver_automaton.models import UserModel, in_world
-    >>> from maneuver_automaton.primitives import trims_of
-    >>> from maneuver_automaton.primitives.symmetry import trim_in_world
-    >>> boat = UserModel(name="boat", group=translations(2), control_names=("turn_rate",),
-    ...                  reduced_names=("heading",), dynamics=lambda z, u: [u[0]],
-    ...                  velocity=lambda z, u: [np.cos(z[0]) + 0.5, np.sin(z[0])],
-    ...                  control_limits=[[-0.5, 0.5]])
-    >>> stated = trims_of(boat, {"heading": [0.0, np.pi / 2]}).trims
-    >>> boat = in_world(boat)
-    >>> left, right = turns_between(boat, [trim_in_world(boat, trim) for trim in stated])
-    >>> left.displacement.round(9).tolist()  # radius 2 m, and 0.5 m/s of current for pi seconds
-    [3.570796327, 2.0, 1.570796327]
     """
     rate = _turning_control(model)
     if rate is None:
@@ -131,7 +115,6 @@ def _match(trims: Sequence[Trim], there: NDArray[np.bool_], source: Trim, rate: 
 
 
 def _distinct(headings: Array) -> list[float]:
-    """Headings modulo a full turn, each once, in order."""
     levels: list[float] = []
     for heading in sorted(headings.tolist()):
         if all(abs(wrapped(level - heading)) > HEADING_TOLERANCE for level in levels):
@@ -203,16 +186,7 @@ def connect_hitches(model: CarWithTrailer, trims: Sequence[Trim]) -> tuple[Maneu
 def hitch_maneuvers(
     model: CarWithTrailer, wanted: Sequence[tuple[Trim, Trim, float]]
 ) -> tuple[Maneuver, ...]:
-    """The maneuvers from trim to trim at a speed, those that exist, driven all at once.
-
-    Examples
-    --------
-    >>> truck = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
-    >>> straight, bent = (hitch_trims(truck, [hitch])[0] for hitch in (0.0, 0.2))
-    >>> (one,) = hitch_maneuvers(truck, [(bent, straight, 0.5)])
-    >>> one.name, one.target
-    ('ahead from hitch 0.2 to 0', 'rest, hitch 0')
-    """
+    """The maneuvers from trim to trim at a speed, those that exist, driven all at once."""
     begins = np.array([float(source.reduced_state[0]) for source, _, _ in wanted])
     ends = np.array([float(target.reduced_state[0]) for _, target, _ in wanted])
     speeds = np.array([speed for _, _, speed in wanted])

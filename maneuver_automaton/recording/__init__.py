@@ -42,14 +42,6 @@ RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
     ------
     TypeError
         If it is none of these.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Problem, Unicycle, plan
-    >>> robot = Automaton.of_controls(Unicycle(), {"rest": (0, 0), "on": (1, 0), "spin": (0, 1)})
-    >>> recording = recording_of(plan(Problem(robot, [0, 0, 0], [2, 0, 0])))
-    >>> recording.kind, recording.movers[0].end.tolist(), recording.facts[0].text
-    ('plan', [2.0, 0.0, 0.0], '2 (proven optimal)')
     """
     if isinstance(result, Recording):
         return result
@@ -89,12 +81,6 @@ def recording_to_write(value: Any, *, model: Model | None = None) -> Recording:
         If nobody moves in it.
     ValueError
         If nobody has a plan.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Plan
-    >>> recording_to_write(Plan([1.0, 2.0, 0.5], (), durations=[])).movers[0].end.tolist()
-    [1.0, 2.0, 0.5]
     """
     recording = recording_of(value)
     if not recording.drivers:

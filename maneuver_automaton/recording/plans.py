@@ -199,17 +199,6 @@ def stretches(maneuver: Maneuver, model: Model) -> list[tuple[str, float]]:
     """What a maneuver does one after the other, in words, and for how long [s].
 
     A stretch ends where the direction of travel or the side to which it bends changes.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Car
-    >>> from maneuver_automaton.primitives import Maneuver, Trajectory
-    >>> course = Trajectory(
-    ...     time=np.array([0.0, 1.0, 3.0]), pose=np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0]]),
-    ...     reduced_state=np.zeros((3, 0)), control=np.array([[1.0, 0.0], [-1.0, 0.0], [-1.0, 0]]))
-    >>> hop = Maneuver.along(course, name="hop", source="a", target="b")
-    >>> stretches(hop, Car(wheelbase=2.0))
-    [('ahead', 1.0), ('reverse', 2.0)]
     """
     course = maneuver.course
     if course is None or course.time.size < 2:

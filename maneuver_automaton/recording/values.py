@@ -354,16 +354,7 @@ class Recording:
 
 
 def mover_of(problem: Problem, plan: Plan | None, **more: Any) -> Mover:
-    """Who is to solve a problem, with what it drives; without a plan it stands, and did not arrive.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1, 0)})
-    >>> one = mover_of(Problem(robot, [0, 0, 0], [2, 0, 0]), None, reason="it is late")
-    >>> one.has_plan, one.reached, one.end.tolist(), one.reason
-    (False, False, [0.0, 0.0, 0.0], 'it is late')
-    """
+    """Who solves a problem, with what it drives; without a plan it stands, and did not arrive."""
     if plan is None:
         plan = Plan(problem.start, (), durations=[], start_time=problem.start_time)
         more = {"has_plan": False, "reached": False} | more
@@ -407,13 +398,7 @@ def world_of(*problems: Problem, margin: float = 0.0) -> Environment:
 
 
 def asked_for(distance: float, margin: float) -> str:
-    """What is to be said of a least distance [m]: the margin, or that there is next to none.
-
-    Examples
-    --------
-    >>> asked_for(0.2, 0.1), asked_for(0.2, 0.0), asked_for(2e-5, 0.0)
-    (', 0.1 m asked for', '', ': less than 1 mm, as margin_m is 0')
-    """
+    """What is to be said of a least distance [m]: the margin, or that there is next to none."""
     if margin:
         return f", {margin:g} m asked for"
     return ": less than 1 mm, as margin_m is 0" if distance < TIGHT_M else ""

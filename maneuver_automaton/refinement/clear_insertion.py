@@ -38,8 +38,7 @@ from maneuver_automaton.search.lattice_trims import (
 )
 from maneuver_automaton.search.waiting import is_free
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.library import MovingTrims, four_columns, moving_trims
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH, MovingTrims, four_columns, moving_trims
 from maneuver_automaton.words.word import Word, word_of_steps
 
 SEED = 19_09  # of the random draws

@@ -20,8 +20,7 @@ from maneuver_automaton.refinement.arrays import (
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import TRIES, limits_of
-from maneuver_automaton.words.library import scratch_of
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH, scratch_of
 from maneuver_automaton.words.word import Word, word_of_steps
 
 POINTS = 40  # of the dynamic program, at equal times

@@ -99,7 +99,6 @@ def _joining(part: ManeuversPart | None) -> dict[str, Any]:
 
 
 def _of_controls(document: Document, trims: tuple[NamedTrim, ...], model: Model) -> Automaton:
-    """Trims of a kinematic vehicle, by their controls."""
     controls: dict[str, Any] = {}
     for k, trim in enumerate(trims):
         where = (*WHERE, "trims", k)
@@ -151,7 +150,6 @@ def _steady(document: Document, k: int, part: NamedTrim, model: Model) -> Trim:
 def _grid(
     document: Document, grid: GridPart, model: Model, part: ManeuversPart | None
 ) -> Automaton:
-    """Steady trims of a vehicle with a reduced state."""
     where: Where = (*WHERE, "grid")
     if grid.control is not None:
         raise document.error(
@@ -311,21 +309,6 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     second with turns on the spot; see `lattice_of_arcs`.
 
     Source: the paper, Table 2; LaValle (2006), *Planning Algorithms*, Sec. 15.3.1 and 15.3.2.
-
-    Raises
-    ------
-    ValueError
-        If there is no such preset, or it does not suit the vehicle.
-
-    Examples
-    --------
-    >>> preset_automaton("dubins", Unicycle()).controls.tolist()
-    [[1.0, 1.0], [1.0, 0.0], [1.0, -1.0]]
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5)
-    >>> parking = preset_automaton("parking", car)
-    >>> len(parking), len(parking.maneuvers)
-    (35, 242)
     """
     if name not in PRESETS:
         known = (*PRESETS, *stock_libraries())

@@ -208,16 +208,7 @@ def load_build_file(path: Path | str) -> BuildFile:
 
 
 def build_file_of_text(text: str, *, name: str) -> BuildFile:
-    """What the text of a build file asks for; see `load_build_file`.
-
-    Examples
-    --------
-    >>> asked = build_file_of_text(
-    ...     "{schema: 1, library: robots, vehicle: {model: unicycle}, trims: {speed: [0, 1]}}",
-    ...     name="robots.yaml")
-    >>> [trim.name for trim in asked.trims]
-    ['speed 0', 'speed 1']
-    """
+    """What the text of a build file asks for; see `load_build_file`."""
     document = parse(text, name=name, what="a build file")
     file = checked(document, LibraryFile)
     if file.vehicle is not None:
@@ -269,15 +260,7 @@ def build(
     scheduler: str | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Built:
-    """Build the library of a build file and write it to `path`; see `build_library`.
-
-    Raises
-    ------
-    MissingExtra
-        If optimal control is needed and CasADi not installed.
-    OSError
-        If the file cannot be written.
-    """
+    """Build the library of a build file and write it to `path`; see `build_library`."""
     part = asked.maneuvers
     if asked.at_once or not asked.model.reduced_names:
         automaton = Automaton.of_model(

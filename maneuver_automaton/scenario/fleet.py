@@ -391,12 +391,10 @@ def _check_loop(document: Document, file: FleetFile, fleet: FleetProblem) -> Non
 
 
 def _maps(alone: Sequence[Scenario]) -> tuple[MapFile, ...]:
-    """Files of the maps of all, each once."""
     return tuple({id(file): file for one in alone for file in one.maps}.values())
 
 
 def _between(settings: FleetPart, alone: Sequence[Scenario]) -> float:
-    """Distance of any two vehicles [m]."""
     if settings.between_m is not None:
         return settings.between_m
     return max(one.problem.margin for one in alone)

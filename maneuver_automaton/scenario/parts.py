@@ -186,13 +186,7 @@ def one_or_many(value: Any) -> str:
 
 
 def checked(document: Document, kind: type[File], context: Mapping[str, Any] | None = None) -> File:
-    """The values of a file of this kind; validators are told the `context`.
-
-    Raises
-    ------
-    InvalidScenario
-        If a key is unknown or missing, or holds what it may not: the first one in the file.
-    """
+    """The values of a file of this kind; validators are told the `context`."""
     try:
         return kind.model_validate(document.value, context=dict(context or {}))
     except ValidationError as error:

@@ -33,7 +33,6 @@ from maneuver_automaton.problem import (
 )
 from maneuver_automaton.receding_horizon.simulation import Disturbance
 from maneuver_automaton.scenario.automata import automaton_of
-from maneuver_automaton.scenario.ground import GroundFile, StatedPlaces, places_of
 from maneuver_automaton.scenario.parts import at, checked, made
 from maneuver_automaton.scenario.schema import (
     AutomatonPart,
@@ -45,8 +44,11 @@ from maneuver_automaton.scenario.schema import (
     StartPart,
 )
 from maneuver_automaton.scenario.shapes import (
+    GroundFile,
+    StatedPlaces,
     footprint_of,
     obstacles_of,
+    places_of,
     stated_footprint,
     zones_of,
 )
@@ -296,7 +298,6 @@ def state_keys(names: Sequence[str]) -> dict[str, str]:
 
 
 def _by_name(state: Mapping[str, float] | None, automaton: Automaton) -> dict[str, float] | None:
-    """A state of a file by the names that the model has."""
     if state is None:
         return None
     keys = state_keys(automaton.model.reduced_names)

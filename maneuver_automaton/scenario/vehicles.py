@@ -368,14 +368,7 @@ def is_known(model: Model) -> bool:
 
 
 def described(model: Model) -> dict[str, Any]:
-    """What a scenario file says of a model; limits that it does not have are left out.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Car
-    >>> described(Car(wheelbase=2.5))
-    {'model': 'car', 'wheelbase_m': 2.5}
-    """
+    """What a scenario file says of a model; limits that it does not have are left out."""
     if not is_known(model):
         raise ValueError(f"vehicle: a file cannot state {model.name!r}, only {', '.join(MODELS)}")
     values = stated(PARTS[model.name], model)

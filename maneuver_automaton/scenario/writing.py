@@ -17,7 +17,6 @@ from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.formats.yaml_source import scalar
 from maneuver_automaton.problem import Horizon, Problem, Unstated, Via
 from maneuver_automaton.scenario.fleet import FleetFile, FleetScenario
-from maneuver_automaton.scenario.ground import stated_places
 from maneuver_automaton.scenario.parts import stated
 from maneuver_automaton.scenario.scenario import Scenario, state_keys
 from maneuver_automaton.scenario.schema import (
@@ -32,6 +31,7 @@ from maneuver_automaton.scenario.schema import (
 from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     stated_obstacle,
+    stated_places,
     stated_zone,
 )
 from maneuver_automaton.scenario.vehicles import described
@@ -137,7 +137,6 @@ def _stated(scenario: Scenario, folder: Path) -> dict[str, Any]:
 
 
 def _state(problem: Problem, state: Array | None) -> dict[str, float] | None:
-    """A reduced state by the keys of a file."""
     keys = state_keys(problem.automaton.model.reduced_names).values()
     return None if state is None else dict(zip(keys, state.tolist(), strict=True))
 
@@ -207,7 +206,6 @@ def _several(
 
 
 def _vehicle(scenario: Scenario) -> dict[str, Any]:
-    """The model, the body, and the bodies of what it carries."""
     problem = scenario.problem
     vehicle = described(problem.automaton.model)
     if scenario.footprint:
@@ -304,7 +302,6 @@ def _horizon(horizon: Horizon) -> dict[str, Any]:
 
 
 def _block(key: str, value: Any) -> str:
-    """One key of the file, lists of mappings over several lines."""
     if key == "automaton" and "trims" in value:
         rows = "".join(f"    - {_flow(row)}\n" for row in value["trims"])
         rest = "".join(f"  {k}: {_flow(v)}\n" for k, v in value.items() if k != "trims")
@@ -326,7 +323,6 @@ def _row(entry: Mapping[str, Any]) -> str:
 
 
 def _flow(value: Any) -> str:
-    """A value in one line of YAML."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {_flow(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):

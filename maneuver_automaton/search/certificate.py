@@ -21,8 +21,7 @@ from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_price as kernels
 from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.closing import conjugated, conjugated_turn
-from maneuver_automaton.words.library import FULL_TURN, four_columns
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import FULL_TURN, SWITCH, four_columns
 from maneuver_automaton.words.word import Word, displacements_of
 
 BINDING = 1e-9  # share of a greatest time [s] that may be left where it binds

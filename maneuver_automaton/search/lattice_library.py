@@ -46,8 +46,7 @@ from maneuver_automaton.search.part_motion import (
     pieces_of,
     posed_parts,
 )
-from maneuver_automaton.words.library import Library
-from maneuver_automaton.words.transitions import SWITCH, transitions_of
+from maneuver_automaton.words.library import SWITCH, Library, transitions_of
 
 DURATIONS = (0.17, 0.5)  # of the coasts of edges, in the time a length scale takes
 SPINS = (math.pi / 12.0, math.pi / 4.0)  # [rad] of turns on the spot

@@ -26,8 +26,7 @@ from maneuver_automaton.search.cost_to_go import NO_TABLE
 from maneuver_automaton.search.lattice_library import LatticeLibrary, coasts_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import SAMPLED_HEADINGS, Resolution, task_of
-from maneuver_automaton.words.library import NO_TRIM, LibraryArrays, scratch_of
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import NO_TRIM, SWITCH, LibraryArrays, scratch_of
 from maneuver_automaton.words.word import Word, plan_of, with_price
 
 SMALLEST = 2048  # nodes

@@ -33,8 +33,7 @@ from maneuver_automaton.search.scene import (
     window_of,
     worlds_around,
 )
-from maneuver_automaton.words.library import NO_TRIM
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import NO_TRIM, SWITCH
 from maneuver_automaton.words.word import Word, word_of_steps
 
 MARGIN = 0.005  # proven clearance of every pose looked at, in half widths of the body

@@ -20,11 +20,11 @@ from maneuver_automaton.words.library import (
     Library,
     LibraryArrays,
     four_columns,
+    identities,
     library_arrays,
     library_of,
     moving_trims,
 )
-from maneuver_automaton.words.transitions import identities
 
 MOST_TRIMS = 10  # moving; of a larger library a few stand for all where the lattice is searched
 TURN = 4.0  # length scales that a full turn is taken for, whose radius the speed decides

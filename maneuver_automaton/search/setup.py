@@ -18,8 +18,13 @@ from maneuver_automaton.groups.chain import seen_from
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.words._kernels_times import TimesProblem
 from maneuver_automaton.words.closing import MET, EndConditions, closest_times
-from maneuver_automaton.words.library import FULL_TURN, MovingTrims, moving_trims
-from maneuver_automaton.words.transitions import Transitions, identities
+from maneuver_automaton.words.library import (
+    FULL_TURN,
+    MovingTrims,
+    Transitions,
+    identities,
+    moving_trims,
+)
 
 STILL = 1e-12  # [m, rad] start and goal that are no farther apart are one
 

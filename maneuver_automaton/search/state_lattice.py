@@ -41,7 +41,7 @@ from maneuver_automaton.search.lattice_pass import GROWN_S
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.scene import for_library
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
 CLOSE = 1e-6  # [half widths of the body] by which pieces of courses may be off

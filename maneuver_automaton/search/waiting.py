@@ -12,7 +12,7 @@ from maneuver_automaton.search.arrays import PathArrays, PathSearch
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import limits_of
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
 MOST_PIECES = 60  # joints at which it may wait

@@ -33,8 +33,7 @@ from maneuver_automaton.search._kernels_problem import (
 from maneuver_automaton.search.result import TIE, TimedWord, tied
 from maneuver_automaton.search.setup import Columns, SearchSetup, columns
 from maneuver_automaton.words._kernels_times import TimesProblem
-from maneuver_automaton.words.library import FULL_TURN, MovingTrims
-from maneuver_automaton.words.transitions import Transitions
+from maneuver_automaton.words.library import FULL_TURN, MovingTrims, Transitions
 from maneuver_automaton.words.word import Word
 
 MOST_TRIMS = 4  # trims of one word, the free turn among them: three in closed form, one scanned

@@ -26,13 +26,13 @@ from maneuver_automaton.search.setup import SearchSetup, goal_from_start
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at
 from maneuver_automaton.words.library import (
+    SWITCH,
     Library,
     MovingTrims,
     library_of,
     most_different,
     words_of,
 )
-from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 LATE = 1e-9  # relative, by which a plan may take longer than it is allowed

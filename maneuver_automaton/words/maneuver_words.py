@@ -37,22 +37,6 @@ def maneuver_words(
 
     Shorter sequences come first, and all of a length, as long as there are not too many. Obstacles,
     bounds and the horizon are not looked at.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import AcceleratingCar
-    >>> from maneuver_automaton.primitives import Maneuver, Trim
-    >>> from maneuver_automaton.primitives.driving import drive
-    >>> car = AcceleratingCar(wheelbase=1.0, max_steering=0.5, max_speed=1.0, max_acceleration=1.0)
-    >>> on = Trim(name="on", body_velocity=[1, 0, 0], control=[0, 0], reduced_state=[1])
-    >>> turns = [Maneuver.along(drive(car, [1.0], control=[[0, angle]], durations=[1.0]),
-    ...                         name=name, source="on", target="on")
-    ...          for name, angle in (("left", 0.4), ("right", -0.4))]
-    >>> goal = Goal(pose=[9.0, 2.0, 0.0], trim="on")
-    >>> problem = Problem(Automaton(car, (on,), turns), [0, 0, 0], goal, start_trim="on")
-    >>> best = maneuver_words(problem, goal)[0]
-    >>> best.end.round(6).tolist(), round(best.duration, 3)
-    ([9.0, 2.0, 0.0], 9.308)
     """
     automaton, index = problem.automaton, problem.automaton.index_of
     first, last = index(problem.first_trim.name), index(problem.last_trim(goal).name)

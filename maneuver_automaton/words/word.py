@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, IntArray, freeze
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.words.closing import closed_at
-from maneuver_automaton.words.library import Library
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH, Library
 
 SAME_TIME = 1e-9  # [s] coasting times that differ by less are the same
 
@@ -96,12 +95,6 @@ def normal_form(
     """A word of trims that switch at will without what lasts no longer than `shortest` [s].
 
     A trim that goes on is one trim.
-
-    Examples
-    --------
-    >>> trims, times = normal_form(np.array([0, 2, 0, 1]), np.array([1.0, 0.0, 0.5, 2.0]))
-    >>> trims.tolist(), times.tolist()
-    ([0, 1], [1.5, 2.0])
     """
     used = durations > shortest
     trims, durations = trims[used], durations[used]
@@ -193,16 +186,7 @@ def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:
 
 
 def is_word_of(automaton: Automaton, plan: Plan, word: Word) -> bool:
-    """Whether a word of trims that switch at will is that of a plan, with the same times.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> plan = Plan([0, 0, 0], robot.trims, durations=[2.0, 0.5])
-    >>> is_word_of(robot, plan, Word(trims=[0, 1], durations=[2.0, 0.5]))
-    True
-    """
+    """Whether a word of trims that switch at will is that of a plan, with the same times."""
     if word.trims.size != len(plan.trims) or plan.maneuvers:
         return False
     pairs = zip(plan.trims, word.trims.tolist(), strict=True)

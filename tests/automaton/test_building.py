@@ -15,11 +15,13 @@ import pytest
 
 from maneuver_automaton._files import journal as opened
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.building import all_pairs, build_library, nearest_pairs
-from maneuver_automaton.automaton.journal import (
+from maneuver_automaton.automaton.building import (
     Entry,
+    all_pairs,
     build_key,
+    build_library,
     journal_path,
+    nearest_pairs,
     pair_key,
     read_journal,
 )

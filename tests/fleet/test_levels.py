@@ -34,7 +34,7 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
 from maneuver_automaton.planning.result import PlanResult, PlanStatus
 from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.distances import nearest_others
+from maneuver_automaton.plotting.over_time import nearest_others
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario

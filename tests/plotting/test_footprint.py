@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 
 from maneuver_automaton.collision import Box, Disc, Polygon
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.track import footprint_polygons, placed
 
 SQUARE = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
 

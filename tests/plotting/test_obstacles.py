@@ -11,8 +11,12 @@ from matplotlib.figure import Figure
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import draw_obstacles
-from maneuver_automaton.plotting.limits import map_paths, shape_path
-from maneuver_automaton.plotting.obstacles import obstacle_entries, round_times
+from maneuver_automaton.plotting.obstacles import (
+    map_paths,
+    obstacle_entries,
+    round_times,
+    shape_path,
+)
 
 RING = np.array([[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]])
 AROUND = Motion([0.0, 2.0], [[0.0, 0.0, 0.0], [4.0, 0.0, np.pi / 2]])

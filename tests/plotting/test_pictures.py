@@ -309,7 +309,7 @@ class TestFleets:
             np.testing.assert_allclose(corners, SE2(pose).act(Box([0.6, 0.4]).corners), atol=1e-9)
         assert (artists["starts"].get_facecolor()[:, 3:] == 0.0).all()
         assert (artists["goals"].get_facecolor()[:, 3] == 1.0).all()
-        times = cast_of(recording_of(result)).scene.times
+        times = cast_of(recording_of(result)).times
         middles = [path.vertices[:-1].mean(axis=0) for path in artists["bodies"].get_paths()]
         expected = [there.pose_at(t)[:2] for t in times if 0.0 < t < 4.0]
         expected += [back.pose_at(t)[:2] for t in times if 0.5 < t < 5.5]

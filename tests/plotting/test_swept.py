@@ -14,9 +14,15 @@ from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed, swept_region
 from maneuver_automaton.plotting.paths import swept_area
-from maneuver_automaton.plotting.track import Track, TrackPiece, track_of_plan
+from maneuver_automaton.plotting.track import (
+    Track,
+    TrackPiece,
+    footprint_polygons,
+    placed,
+    swept_region,
+    track_of_plan,
+)
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.plotting.cases import document_of, parking_plan, plan_of
@@ -108,8 +114,8 @@ def test_what_is_carried_is_swept_as_well():
     turn = max(trims, key=lambda trim: trim.body_velocity[0] * abs(trim.body_velocity[2]))
     plan = Plan(problem.start, (turn,), durations=[3.0])
     result = PlanResult(problem=problem, status=PlanStatus.FOUND, reason="", plan=plan)
-    scene = cast_of(recording_of(result)).scene
-    (path,) = swept_area(track_of_plan(plan), scene).get_paths()
+    (actor,) = cast_of(recording_of(result)).actors
+    (path,) = swept_area(actor).get_paths()
     rings = [shapely.Polygon(ring) for ring in path.to_polygons(closed_only=False)]
     region = shapely.union_all(rings)
     trailer = carried(plan, problem.automaton.model, "trailer")

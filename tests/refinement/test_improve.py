@@ -19,7 +19,7 @@ from maneuver_automaton.refinement.improve import Patience, WordSchedule, words_
 from maneuver_automaton.search.lattice import first_plan
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from tests import scenes
 from tests.quickly import quick_are
 from tests.reference import plain_end

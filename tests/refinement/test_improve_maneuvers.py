@@ -14,7 +14,7 @@ from maneuver_automaton.refinement import improve as improvement
 from maneuver_automaton.refinement import work
 from maneuver_automaton.refinement.improve import Patience, WordSchedule, words_of
 from maneuver_automaton.search.lattice_pass import plan_of_word
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import word_of_steps
 from tests.refinement.test_incumbent_words import GOAL, WALLS, least_clearance, off_goal, query
 from tests.search.cases import compiled_only

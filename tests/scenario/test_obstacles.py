@@ -90,7 +90,7 @@ def test_margin_and_search_reach_the_problem():
     ],
 )  # fmt: skip
 def test_a_body_is_where_plotting_draws_it(text, corners):
-    from maneuver_automaton.plotting.footprint import footprint_polygons
+    from maneuver_automaton.plotting.track import footprint_polygons
 
     scenario = read(but("{model: unicycle}", f"{{model: unicycle, footprint: {text}}}"))
     (body,) = scenario.problem.footprint

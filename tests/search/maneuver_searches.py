@@ -14,7 +14,7 @@ from maneuver_automaton.search._kernels_coast import coast_free, coast_inside, c
 from maneuver_automaton.search._kernels_connection import edge_end, edge_free
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.result import SearchStatus
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
 

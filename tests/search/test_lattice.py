@@ -30,7 +30,7 @@ from maneuver_automaton.search.lattice_pass import (
 )
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_task import AT_WILL, Resolution, task_of
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from tests import scenes
 from tests.collision.scenes import random_map
 from tests.quickly import quick_are

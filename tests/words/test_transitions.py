@@ -14,7 +14,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.primitives import Maneuver, Trim
-from maneuver_automaton.words.transitions import SWITCH, transitions_of
+from maneuver_automaton.words.library import SWITCH, transitions_of
 from tests.search.automata import linked, model_of_kinds
 
 

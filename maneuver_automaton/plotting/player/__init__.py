@@ -1,5 +1,5 @@
 """The player: whatever moves as one HTML file that needs nothing else."""
 
+from maneuver_automaton.plotting.player.content import Player as Player
 from maneuver_automaton.plotting.player.content import player_of as player_of
 from maneuver_automaton.plotting.player.content import player_of_file as player_of_file
-from maneuver_automaton.plotting.player.page import Player as Player

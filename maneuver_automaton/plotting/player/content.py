@@ -1,21 +1,26 @@
-"""What a player shows of a recording, as plain values that the browser draws."""
+"""The page that plays a recording: its content as plain values, which the browser draws."""
 
 from __future__ import annotations
 
+import html
+import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import BODIES, LEAST_MARK, Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import Color, track_colors
-from maneuver_automaton.plotting.distances import distance_times, nearest_others
-from maneuver_automaton.plotting.footprint import footprint_polygons, placed
+from maneuver_automaton.plotting.over_time import distance_times, nearest_others
 from maneuver_automaton.plotting.player.numbers import (
     Local,
     body_entries,
@@ -32,11 +37,76 @@ from maneuver_automaton.plotting.player.numbers import (
     rounded,
     sample_times,
 )
-from maneuver_automaton.plotting.player.page import Player
 from maneuver_automaton.plotting.style import shown_name
-from maneuver_automaton.plotting.track import Track, joined_track
+from maneuver_automaton.plotting.track import Track, footprint_polygons, joined_track, placed
 from maneuver_automaton.recording import Curve, Fact, Mover, Recording, Search, recording_of
 from maneuver_automaton.recording.plans import stated
+
+SCRIPTS = ("motion.js", "view.js", "stage.js", "space.js", "charts.js", "panels.js", "player.js")
+FRAME_HEIGHT = 720  # [px] in a notebook
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Player:
+    """A plan to play: one HTML page, drawn by the browser from the numbers in it.
+
+    A content with ``back: {href, text}`` has a link to the page that leads here.
+
+    Examples
+    --------
+    >>> page = Player({"title": "A plan & its <name>"}).html
+    >>> page.startswith("<!doctype html>"), "http" in page
+    (True, False)
+    """
+
+    content: Mapping[str, Any] = field(repr=False)  # what `content_of` makes of a plan, and `back`
+
+    @property
+    def html(self) -> str:
+        """The whole page."""
+        page = _template()
+        # no text in the data can end the element that holds it
+        data = json.dumps(self.content, separators=(",", ":"), allow_nan=False)
+        for mark, text in (
+            ("{{title}}", html.escape(str(self.content["title"]))),
+            ("{{data}}", data.replace("<", "\\u003c")),
+        ):
+            page = page.replace(mark, text)
+        return page
+
+    def save(self, path: str | Path) -> None:
+        """Write the page; the file is replaced in one step.
+
+        Raises
+        ------
+        ValueError
+            If the ending is not .html.
+        OSError
+            If the file cannot be written; an old one stays as it was.
+        """
+        target = Path(path)
+        if target.suffix.lower() != ".html":
+            raise ValueError(f"player: got the file name {target.name}, need one ending in .html")
+        write_text_atomically(target, self.html)
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{html.escape(self.html)}" width="100%" height="{FRAME_HEIGHT}" '
+            'style="border:0" title="player"></iframe>'
+        )
+
+
+@cache
+def _template() -> str:
+    folder = resources.files("maneuver_automaton.plotting.player")
+
+    def text(name: str) -> str:
+        return (folder / name).read_text(encoding="utf-8")
+
+    scripts = "\n".join(f"<script>\n{text(name)}</script>" for name in SCRIPTS)
+    page = text("player.html").replace("{{style}}", text("player.css"))
+    return page.replace("{{scripts}}", scripts)
+
 
 MOST_NODES = 20_000  # shown of a search
 Numbers = Mapping[str, int]  # of the trims on a page, by name
@@ -88,6 +158,7 @@ def content_of(recording: Recording) -> dict[str, Any]:
     """Title, facts, motions, and what is around them; of several vehicles one may be picked."""
     cast, world = cast_of(recording), recording.world
     first, local = cast.actors[0], Local(cast.actors[0].track.start[:2])
+    goals = first.goals if cast.is_alone else ()
     others = {one: joined_track(one.start, one.pieces) for one in recording.alternatives}
     trims, numbers = _trims(cast, list(others.values()))
     motions = [
@@ -104,7 +175,7 @@ def content_of(recording: Recording) -> dict[str, Any]:
         "origin": local.origin.tolist(),
         "box": local.places(_box(cast, [first.track, *others.values()])),
         "mark": rounded([_mark(cast)])[0],
-        "goals": goal_entries(cast.scene.goals, local, cast.scene.reached),
+        "goals": goal_entries(goals, local, first.reached),
         "obstacles": obstacle_entries(world.obstacles, local, leave=world.fleeting),
         **limit_entries(world.zones, world.bounds, local),
         "ending": recording.ending,
@@ -125,7 +196,6 @@ def content_of(recording: Recording) -> dict[str, Any]:
 
 
 def _trims(cast: Cast, others: Sequence[Track]) -> tuple[list[dict[str, str]], list[Numbers]]:
-    """Name and colour of all trims, and for each vehicle their numbers."""
     entries: list[dict[str, str]] = []
     of_kind: dict[int, Numbers] = {}
     movers = [one.mover for one in cast.actors]
@@ -199,7 +269,7 @@ def _curve(curve: Curve) -> dict[str, list[float]]:
 
 def _box(cast: Cast, tracks: Iterable[Track]) -> Array:
     """The box (2, 2) of the picture, and all that the body sweeps along tracks in it."""
-    body = cast.scene.body
+    body = cast.actors[0].body if cast.is_alone else []
     bodies = [ring for track in tracks for ring in placed(body, track.pose)]
     places = [*cast.box, *np.concatenate([np.zeros((0, 2)), *bodies])]
     return np.array([np.min(places, axis=0), np.max(places, axis=0)])
@@ -220,7 +290,7 @@ def _add_vehicles(
     content: dict[str, Any], cast: Cast, local: Local, numbers: Sequence[Numbers]
 ) -> None:
     """What tells several vehicles apart, and what all of them do together."""
-    times = distance_times(cast.begin, cast.end)
+    times = distance_times(cast.recording.begin, cast.end)
     nearest = nearest_others(cast.actors, times)
     for k, one in enumerate(cast.actors):
         mover = one.mover
@@ -231,7 +301,7 @@ def _add_vehicles(
             "bodies": body_entries(mover.bodies),
             "goals": goal_entries(mover.goals, local, mover.goal_index),
             "leaves": bool(np.isfinite(mover.there[1])),
-            "joins": bool(np.isfinite(mover.there[0])) and mover.there[0] > cast.begin,
+            "joins": bool(np.isfinite(mover.there[0])) and mover.there[0] > cast.recording.begin,
             "reason": mover.reason,
             "others": distance_curve(times, nearest[:, k]),
             "held": [
@@ -241,7 +311,7 @@ def _add_vehicles(
         }
     recording = cast.recording
     fleet: dict[str, Any] = {
-        "begin": cast.begin,
+        "begin": cast.recording.begin,
         "end": cast.end,
         "margin": recording.world.margin,
         "distance": distance_curve(times, nearest.min(axis=1)),
@@ -260,7 +330,6 @@ def _add_vehicles(
 
 
 def _steps(cast: Cast, local: Local, numbers: Numbers) -> list[dict[str, Any]]:
-    """The steps of a closed loop: what each planned, and what came of it."""
     recording, (one,) = cast.recording, cast.actors
     values = next(curve for curve in recording.curves if curve.label == "value").value.tolist()
     return [
