@@ -53,6 +53,8 @@ SECTORS = 12  # of headings, in each of which the best arrival is improved
 FINE = 1e-4  # of a heading or place, as a share of where it was looked for, at the last
 NARROWER = 0.3  # of a step in which a heading or place gained nothing
 GAIN = 1e-7  # share of a cost that is a gain
+GUESS_SHARE = 0.2  # of the time for polishing, for a plan with the headings that are stated
+QUITE = 1.0  # [rad] from which on a heading is quite another one
 GOAL = -1  # number of the goal among poses on the way
 
 
@@ -107,7 +109,7 @@ class AlongPoses(PlanningStep):
         best = search.best(budget.before((1.0 - SEARCHED) * budget.left))
         if best is not None and found.wants_more:
             whole = found.for_better.part(POLISHED)
-            if not polish_on_the_way(found, whole):
+            if not polish_on_the_way(found, search.guesses(best, whole), whole):
                 best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
                 search.with_more_time(best)
         if not found.plans:
@@ -465,6 +467,38 @@ class _Search:
             if found is None:
                 return None
         return found
+
+    def guesses(self, best: Chain, budget: Budget) -> Iterator[tuple[Plan, int]]:
+        """Plans to be polished, each with its goal: the best, others where headings are free.
+
+        These pass with the headings that are stated, or each pose in turn with quite another one.
+        """
+        known = self.found.plans[0]
+        yield known.plan, known.goal_index
+        free = [n for n, k in enumerate(best.passed) if self.ways[k].via.free_heading]
+        if not free:
+            return
+        stated = [replace(via, free_heading=False) for via in self.found.problem.via]
+        problem = replace(self.found.problem, via=tuple(stated))
+        ways = [Way(via, arrivals_of(problem, k)[0]) for k, via in enumerate(stated)]
+        if all(way.arrivals for way in ways):
+            chain = _Search(self.found, self.legs, ways).best(budget.part(GUESS_SHARE))
+            if chain is not None:
+                yield chain.plan, chain.goal_index or 0
+        every = self.costs
+        for n in free:
+            k, pose = best.passed[n], best.arrivals[n].pose
+            near = [
+                way == k and abs(math.remainder(to.pose[2] - pose[2], 2.0 * math.pi)) < QUITE
+                for way, to in self.arrivals
+            ]
+            self.costs = np.where([*near, False], np.inf, every)
+            cost, chosen = self._cheapest()
+            self.costs = every
+            if cost < math.inf and not self.legs.is_over(budget):
+                chain = self.driven(chosen, budget)
+                if chain is not None:
+                    yield chain.plan, chain.goal_index or 0
 
     def varied(self, chain: Chain, budget: Budget) -> Chain:
         """The chain with other arrivals, then with headings and places varied continuously."""

@@ -67,6 +67,7 @@ MOST_WORDS = 100  # that switch at will and are looked at for other ways to turn
 OTHER_TURNS = 6  # ways to turn that are tried
 STRAIGHT = 1e-6  # [rad] between two samples
 NEAR_HEADING = 1.0  # [rad] from the heading of a plan, to which its motion is a guess
+WAY_SHARE = 0.5  # of the time left, for each guess past poses on the way
 BY_TIME = Cost(time=1.0)
 
 
@@ -417,17 +418,36 @@ def _plan_of(problem: Problem, goal_index: int, motion: PolishedMotion) -> Plan:
     )
 
 
-def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
-    """Offer the best plan polished as a whole, past all poses on its way; whether that is cheaper.
+def polish_on_the_way(
+    found: Incumbents, guesses: Iterable[tuple[Plan, int]], budget: Budget
+) -> bool:
+    """Offer guesses polished as wholes, past all poses on their way; whether one is cheaper.
 
-    It rests where it has to, and passes each pose as it likes. A place that may be chosen stays.
+    A guess is a plan and its goal. The motion rests where it has to, and passes each pose as it
+    likes. A place that may be chosen stays.
     """
-    problem, horizon = found.problem, found.problem.horizon
-    limited = horizon.time is not None or horizon.max_time is not None
+    problem, before = found.problem, found.cost
     stays = any(via.stay_s for via in problem.via)
-    if limited or stays or problem.moves or budget.is_over or why_not_polished(problem):
+    if stays or budget.is_over or why_not_polished(problem):
         return False
-    known, goal_index = found.plans[0].plan, found.plans[0].goal_index
+    for plan, goal_index in guesses:
+        try:
+            motion = _polished_through(problem, plan, goal_index, budget.part(WAY_SHARE))
+        except RuntimeError:  # the solver gave up on a number; the plan in hand stays
+            found.counts.update(solver_errors=1)
+            continue
+        found.counts.update(polished=1)
+        if motion is not None:
+            found.offer(_plan_of(problem, goal_index, motion), goal_index)
+        if budget.is_over:
+            break
+    return found.cost < before
+
+
+def _polished_through(
+    problem: Problem, known: Plan, goal_index: int, budget: Budget
+) -> PolishedMotion | None:
+    """The motion to which one guess leads, if there is one."""
     price = polished_price(problem)
     task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
@@ -435,7 +455,7 @@ def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
     times = np.array([0.0, *(one.time - known.start_time for one in passed), known.duration])
     nodes = np.round(count * times / known.duration).astype(int)
     if np.diff(nodes).min() < 1:
-        return False
+        return None
     guess = guess_at(course, np.interp(np.arange(count + 1), nodes, times))
     via, dof = list[NodeOnTheWay](), known.start.size
     for one, node in zip(passed, nodes[1:-1].tolist(), strict=True):
@@ -448,18 +468,11 @@ def polish_on_the_way(found: Incumbents, budget: Budget) -> bool:
     settings, work = PolishSettings(), iterations_within(budget)
     if work is not None:
         settings = replace(settings, max_iterations=min(work, settings.max_iterations))
-    stage_cost, before = price.stage_cost(known), found.cost
-    try:
-        motion = polish_through(
-            task, guess, via, stage_cost=stage_cost, settings=settings, budget=budget
-        )
-    except RuntimeError:  # the solver gave up on a number; the plan in hand stays
-        found.counts.update(solver_errors=1)
-        return False
-    found.counts.update(polished=1)
-    if not isinstance(motion, str):
-        found.offer(_plan_of(problem, goal_index, motion), goal_index)
-    return found.cost < before
+    stage_cost = price.stage_cost(known)
+    motion = polish_through(
+        task, guess, via, stage_cost=stage_cost, settings=settings, budget=budget
+    )
+    return None if isinstance(motion, str) else motion
 
 
 def _limit(most: float | None) -> float:
