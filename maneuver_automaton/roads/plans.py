@@ -31,13 +31,20 @@ MOVES = Moves(
 
 
 def plan_of_controls(
-    model: SecondOrderCar, state: Array, controls: Array, *, tick: float, start_time: float = 0.0
+    model: SecondOrderCar,
+    state: Array,
+    controls: Array,
+    *,
+    tick: float,
+    start_time: float = 0.0,
+    max_step: float = 0.05,
 ) -> Plan:
     """The plan that a car drives from a state (5,) under controls (n, 2), a `tick` [s] each.
 
     Every speed and steering angle is a trim of a second-order car, so a plan may begin and end
     between those of the library, and in the midst of a maneuver. Equal controls in a row are one
-    primitive: a trim where nothing changes, else a maneuver, whose course is exact (`drive_all`).
+    primitive: a trim where nothing changes, else a maneuver, whose course is exact (`drive_all`),
+    with samples at most `max_step` [m, rad] apart.
 
     Examples
     --------
@@ -69,7 +76,13 @@ def plan_of_controls(
         word,
         durations=coasting,
         maneuvers=ramps(
-            model, word[:-1], word[1:], control=held[changing], durations=durations[changing]
+            model,
+            word[:-1],
+            word[1:],
+            control=held[changing],
+            durations=durations[changing],
+            max_step_m=max_step,
+            max_step_rad=max_step,
         ),
         start_time=start_time,
     )
@@ -83,10 +96,11 @@ def ramps(
     control: Array,
     durations: Array,
     max_step_m: float = 0.05,
+    max_step_rad: float = 0.05,
 ) -> tuple[Maneuver, ...]:
     """Maneuvers from trim to trim (n,) under controls (n, 2) that are held for durations (n,) [s].
 
-    Samples of their courses are exact, as `drive_all` says, and at most `max_step_m` [m] apart.
+    Samples of their courses are exact, and as far apart as `drive_all` says.
     """
     if not len(sources):
         return ()
@@ -96,6 +110,7 @@ def ramps(
         control=control[:, None],
         durations=durations[:, None],
         max_step_m=max_step_m,
+        max_step_rad=max_step_rad,
     )
     return tuple(
         Maneuver.along(
