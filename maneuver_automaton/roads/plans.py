@@ -22,12 +22,18 @@ AT_REST = 1e-9  # [m/s]
 PATTERNS = ((1.0, -1.0), (0.5, -1.0, 0.5), (1.0, -1.0, -1.0, 1.0), (1 / 3, -1.0, 1.0, -1 / 3))
 SIZES = ((1.0, 0.2), (0.3, 0.06), (0.1, 0.02))  # [m/s^2], [rad/s]
 ROUND = len(PATTERNS) * len(SIZES)  # passes in which every pattern has every size
-ROUNDS = 40  # at most
-MOVES = Moves(
-    pattern=np.array([[*row, *np.zeros(4 - len(row))] for row in PATTERNS]),
-    blocks=np.array([len(row) for row in PATTERNS]),
-    size=np.array(SIZES),
+# A pass begins where its number says, which is the same for one pattern and size in every round:
+# where a round gains nothing, their order is turned, until each has begun everywhere.
+MOVES = tuple(
+    Moves(
+        pattern=np.array([[*row, *np.zeros(4 - len(row))] for row in PATTERNS[k:] + PATTERNS[:k]]),
+        blocks=np.array([len(row) for row in PATTERNS[k:] + PATTERNS[:k]]),
+        size=np.roll(SIZES, n, axis=0),
+    )
+    for n in range(len(SIZES))
+    for k in range(len(PATTERNS))
 )
+ROUNDS = 120  # at most
 
 
 def plan_of_controls(
@@ -215,11 +221,15 @@ def polished_controls(
     It is free, at the goal at the same tick, and followed by the same stop, as it was. Where a
     pass begins depends on the plan's tick, so that step after step of a drive tries other moves.
     """
-    controls, state = np.array(plan.controls), np.array(plan.states[0])
+    controls, state, moved, turn = np.array(plan.controls), np.array(plan.states[0]), 0, 0
     for k in range(rounds):
+        first = plan.tick + k * passes
         made = _kernels_polish.polish(
-            horizon, MOVES, state, controls, plan.lasting, plan.tick, plan.tick + k * passes, passes
+            horizon, MOVES[turn], state, controls, plan.lasting, plan.tick, first, passes
         )
+        moved += made
         if not made:
-            return controls if k else None
-    return controls
+            turn += 1
+            if turn == len(MOVES):
+                break
+    return controls if moved else None
