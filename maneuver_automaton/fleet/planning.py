@@ -26,7 +26,13 @@ from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.result import FleetResult
-from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, courses_of, vehicles_of
+from maneuver_automaton.fleet.vehicle import (
+    FleetMember,
+    OwnPlan,
+    courses_of,
+    prepare_vehicles,
+    vehicles_of,
+)
 from maneuver_automaton.fleet.verdict import verified
 from maneuver_automaton.fleet.workers import How, PoolTask, WorkerPool
 
@@ -115,7 +121,7 @@ def plan_fleet(
     workers = gathered(jobs=jobs, scheduler=scheduler) if apart else nullcontext()
     with workers as run, patient():
         pool = WorkerPool(fleet, vehicles_of(fleet), jobs, run)
-        pool.prepare()
+        pool.load()
         search = _FleetSearch(pool, objective, Budget.from_now(time_limit), seed, on_better)
         return search.run(orders, max_rounds)
 
@@ -151,6 +157,7 @@ class _FleetSearch:
 
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
+        prepare_vehicles(self.vehicles)
         self._plan_alone()
         alone = self.budget.elapsed
         able = [one.number for one in self.vehicles if one.number not in self.reasons]

@@ -29,7 +29,7 @@ from maneuver_automaton.planning.blocked import (
     why_goal_blocked,
 )
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
-from maneuver_automaton.planning.plan import plan_in, prepare
+from maneuver_automaton.planning.plan import load, plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.steps import uses_lattice
 from maneuver_automaton.planning.within_tolerance import aims_within
@@ -515,10 +515,21 @@ def courses_of(
 
 def prepare_vehicles(vehicles: Sequence[FleetMember]) -> None:
     """Have ready what every search of a fleet needs, once for each kind and map."""
-    kinds = {(id(one.problem.automaton), id(one.workspace)): one for one in vehicles}
-    for one in kinds.values():
+    load_vehicles(vehicles)
+    for one in _kinds(vehicles):
         prepare(one.problem, one.workspace)
+
+
+def load_vehicles(vehicles: Sequence[FleetMember]) -> None:
+    """Compile or load what every search of a fleet needs, before its clock runs."""
+    for one in _kinds(vehicles):
+        load(one.problem, one.workspace)
     load_kernels("lattice", "improvement", "meetings")
+
+
+def _kinds(vehicles: Sequence[FleetMember]) -> list[FleetMember]:
+    """One vehicle for each automaton on each map."""
+    return list({(id(one.problem.automaton), id(one.workspace)): one for one in vehicles}.values())
 
 
 def vehicles_of(fleet: FleetProblem, prepared: Prepared | None = None) -> list[FleetMember]:

@@ -22,7 +22,13 @@ from maneuver_automaton.fleet.coordination import HeldPlans, Turns, by_conflicts
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
-from maneuver_automaton.fleet.vehicle import FleetMember, OwnPlan, prepare_vehicles, vehicles_of
+from maneuver_automaton.fleet.vehicle import (
+    FleetMember,
+    OwnPlan,
+    load_vehicles,
+    prepare_vehicles,
+    vehicles_of,
+)
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.words.word import Word
 
@@ -358,9 +364,9 @@ class WorkerPool:
     gathered: Gathered | None = None  # None: all is done here
     _token: str = field(default_factory=lambda: os.urandom(16).hex())
 
-    def prepare(self) -> None:
-        """Have ready what all need, here and in the other processes, before a clock runs."""
-        prepare_vehicles(self.vehicles)
+    def load(self) -> None:
+        """Load what all need, and have the other processes ready, before a clock runs."""
+        load_vehicles(self.vehicles)
         if self.gathered is not None:
             list(self.gathered(_served, [_Parcel(self._token, self.fleet)] * self.jobs))
 

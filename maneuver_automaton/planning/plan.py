@@ -134,7 +134,7 @@ def plan_in(
         raise ValueError(f"alternatives must be at least 0, got {alternatives}")
     if gap is not None and not 0.0 <= gap < 1.0:
         raise ValueError(f"gap must be a share from 0 to below 1, got {gap}")
-    _load(problem, workspace)
+    load(problem, workspace)
     if gap is not None:
         load_kernels("cells")
     if alternatives and uses_lattice(problem):
@@ -172,7 +172,7 @@ def _noted(result: PlanResult) -> PlanResult:
 def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
     """Have ready what every problem on the map of this one needs."""
     workspace = workspace or workspace_of(problem.obstacles)
-    _load(problem, workspace)
+    load(problem, workspace)
     problem = between_trims(problem)
     if uses_lattice(problem):
         goals = tuple(range(len(problem.goals)))
@@ -181,7 +181,7 @@ def prepare(problem: Problem, workspace: Workspace | None = None) -> None:
         load_checks(problem, workspace)
 
 
-def _load(problem: Problem, workspace: Workspace) -> None:
+def load(problem: Problem, workspace: Workspace) -> None:
     """Compile or load what planning needs, before the clock runs: once for all like queries."""
     ready: set[Any] = kept_with(problem.setting, workspace, set)
     if problem.ends not in ready:

@@ -405,7 +405,10 @@ def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
 
 
 def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanResult | None:
-    """A wider search before the start; None if that of one step reaches a goal from there.
+    """A search before the start; None if that of one step finds all that there is to find.
+
+    It is wider where the search of a step reaches no goal. Where that does, and a goal lasts
+    beyond what a step looks ahead, it is one for a cheaper plan that ends later.
 
     Parameters
     ----------
@@ -415,9 +418,18 @@ def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanRe
         No search begins after it [s].
     """
     first = None if planner.hopeless() else planner.search(planner.start_state, tick=0)
-    if first is not None and first.reaches:
+    if first is None or not first.reaches:
+        return _widened(planner, time_limit, loop=False)
+    begin, horizon = time.perf_counter(), planner.last_tick * planner.tick
+    if horizon <= planner.settings.horizon_s or not first.stops:
         return None
-    return _widened(planner, time_limit, loop=False)
+    below = planner.price(planner.polished(first))
+    later = planner.wider(WIDTHS[0], horizon_s=horizon)
+    found = later.search(planner.start_state, tick=0, below=below)
+    result = None if found is None else _judged(later, found)
+    if result is None or result.plan is None:
+        return None
+    return replace(result, search_s=time.perf_counter() - begin)
 
 
 def drive_road(

@@ -205,8 +205,13 @@ class RoadPlanner:
         first, _ = self.decide(self.start_state, tick=0, tail=None)
         self.decide(first.states[1], tick=1, tail=first.tail())
 
-    def plan_of(self, state: Array, controls: Array, *, tick: int = 0) -> Plan:
-        """The plan from a state (5,) at a tick under controls (n, 2), as the scene was given."""
+    def plan_of(
+        self, state: Array, controls: Array, *, tick: int = 0, max_step: float = 0.05
+    ) -> Plan:
+        """The plan from a state (5,) at a tick under controls (n, 2), as the scene was given.
+
+        Its samples are at most `max_step` [m, rad] apart.
+        """
         placed = np.concatenate([self.world(state[:3]), state[3:]])
         return plan_of_controls(
             self.vehicle.model,
@@ -214,6 +219,7 @@ class RoadPlanner:
             controls,
             tick=self.tick,
             start_time=self.time_of(tick),
+            max_step=max_step,
         )
 
     def decide(

@@ -22,22 +22,35 @@ AT_REST = 1e-9  # [m/s]
 PATTERNS = ((1.0, -1.0), (0.5, -1.0, 0.5), (1.0, -1.0, -1.0, 1.0), (1 / 3, -1.0, 1.0, -1 / 3))
 SIZES = ((1.0, 0.2), (0.3, 0.06), (0.1, 0.02))  # [m/s^2], [rad/s]
 ROUND = len(PATTERNS) * len(SIZES)  # passes in which every pattern has every size
-ROUNDS = 40  # at most
-MOVES = Moves(
-    pattern=np.array([[*row, *np.zeros(4 - len(row))] for row in PATTERNS]),
-    blocks=np.array([len(row) for row in PATTERNS]),
-    size=np.array(SIZES),
+# A pass begins where its number says, which is the same for one pattern and size in every round:
+# where a round gains nothing, their order is turned, until each has begun everywhere.
+MOVES = tuple(
+    Moves(
+        pattern=np.array([[*row, *np.zeros(4 - len(row))] for row in PATTERNS[k:] + PATTERNS[:k]]),
+        blocks=np.array([len(row) for row in PATTERNS[k:] + PATTERNS[:k]]),
+        size=np.roll(SIZES, n, axis=0),
+    )
+    for n in range(len(SIZES))
+    for k in range(len(PATTERNS))
 )
+ROUNDS = 120  # at most
 
 
 def plan_of_controls(
-    model: SecondOrderCar, state: Array, controls: Array, *, tick: float, start_time: float = 0.0
+    model: SecondOrderCar,
+    state: Array,
+    controls: Array,
+    *,
+    tick: float,
+    start_time: float = 0.0,
+    max_step: float = 0.05,
 ) -> Plan:
     """The plan that a car drives from a state (5,) under controls (n, 2), a `tick` [s] each.
 
     Every speed and steering angle is a trim of a second-order car, so a plan may begin and end
     between those of the library, and in the midst of a maneuver. Equal controls in a row are one
-    primitive: a trim where nothing changes, else a maneuver, whose course is exact (`drive_all`).
+    primitive: a trim where nothing changes, else a maneuver, whose course is exact (`drive_all`),
+    with samples at most `max_step` [m, rad] apart.
 
     Examples
     --------
@@ -69,7 +82,13 @@ def plan_of_controls(
         word,
         durations=coasting,
         maneuvers=ramps(
-            model, word[:-1], word[1:], control=held[changing], durations=durations[changing]
+            model,
+            word[:-1],
+            word[1:],
+            control=held[changing],
+            durations=durations[changing],
+            max_step_m=max_step,
+            max_step_rad=max_step,
         ),
         start_time=start_time,
     )
@@ -83,10 +102,11 @@ def ramps(
     control: Array,
     durations: Array,
     max_step_m: float = 0.05,
+    max_step_rad: float = 0.05,
 ) -> tuple[Maneuver, ...]:
     """Maneuvers from trim to trim (n,) under controls (n, 2) that are held for durations (n,) [s].
 
-    Samples of their courses are exact, as `drive_all` says, and at most `max_step_m` [m] apart.
+    Samples of their courses are exact, and as far apart as `drive_all` says.
     """
     if not len(sources):
         return ()
@@ -96,6 +116,7 @@ def ramps(
         control=control[:, None],
         durations=durations[:, None],
         max_step_m=max_step_m,
+        max_step_rad=max_step_rad,
     )
     return tuple(
         Maneuver.along(
@@ -200,11 +221,15 @@ def polished_controls(
     It is free, at the goal at the same tick, and followed by the same stop, as it was. Where a
     pass begins depends on the plan's tick, so that step after step of a drive tries other moves.
     """
-    controls, state = np.array(plan.controls), np.array(plan.states[0])
+    controls, state, moved, turn = np.array(plan.controls), np.array(plan.states[0]), 0, 0
     for k in range(rounds):
+        first = plan.tick + k * passes
         made = _kernels_polish.polish(
-            horizon, MOVES, state, controls, plan.lasting, plan.tick, plan.tick + k * passes, passes
+            horizon, MOVES[turn], state, controls, plan.lasting, plan.tick, first, passes
         )
+        moved += made
         if not made:
-            return controls if k else None
-    return controls
+            turn += 1
+            if turn == len(MOVES):
+                break
+    return controls if moved else None

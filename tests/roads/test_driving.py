@@ -15,6 +15,7 @@ from maneuver_automaton.roads import (
     RoadScene,
     RoadSettings,
     RoadStart,
+    drive_road,
     drive_scene,
     judged,
     plan_road,
@@ -281,6 +282,20 @@ def test_a_plan_made_before_is_driven(tmp_path):
     assert drive.verdict.clean
     kept = [step for step in drive.steps if not step.replanned]
     assert kept[0].decision.controls[0].tolist() == result.decision.controls[0].tolist()
+
+
+def test_a_drive_takes_the_time_that_a_goal_leaves():
+    lane = Lanelet(1, [[0, 2], [400, 2]], [[0, -2], [400, -2]])
+    goal = GoalRegion(
+        time=(0.0, 10.0), places=(Box((290.0, 4.0), center=(150.0, 0.0)),), speed=(0, 0)
+    )
+    start = RoadStart(middle=[10.0, 0.0, 0.0], speed=10.0)
+    scene = RoadScene(name="lane", lanelets=(lane,), goals=(goal,), start=start)
+    # Evenly braked for 10 s, it costs 0.05 (10 m/s)^2 / 10 s; within the 6 s of a step 0.83.
+    assert plan_road(scene, settings=QUICK).cost < 0.56
+    drive = drive_road(scene, settings=QUICK)
+    assert drive.reached
+    assert drive.cost < 0.55
 
 
 def test_no_plan_says_why(tmp_path):
