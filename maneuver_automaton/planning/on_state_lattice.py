@@ -18,8 +18,10 @@ from maneuver_automaton.search.lattice_task import WEIGHT
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.state_lattice import Graph, GraphSearch, graph_of
 
+FIRST_CHUNK = 1024  # expansions of the exact search until one from the goals begins beside it
+BACK = 16  # times fewer expansions than the exact search that one has in its turn
 ALONE = 32768  # expansions of the exact search until one that is greedy begins beside it
-GREEDY = 4  # times fewer expansions than the exact search has in its turn
+GREEDY = 4  # times fewer expansions than the exact search that one has in its turn
 MOST_CHUNK = 1 << 20
 RELAXED_SHARE = 0.5  # of the time, where others search on if the cheapest path is refused
 MOST_WIDER = 2  # times that a window is widened where there is no plan
@@ -116,11 +118,6 @@ def _search(
                 return least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked), nodes
             graph = replace(graph, fine=graph.coarse)  # it was refused: keep away from obstacles
         elif exact.cut < min(found.cost, least) * (1.0 - ROUNDING):
-            back = graph.backwards() if graph.lattice.sign > 0 and not found.plans else None
-            if back is not None:  # a search from the goals may come to its end within the window
-                one = _best(found, back, budget, relaxed)
-                if not one.alive and one.cut == one.cost == math.inf:
-                    break
             if not found.plans and wider == MOST_WIDER:
                 why = PlanStatus.NO_PLAN, "none in a window around all that stands, and no proof"
                 least = min(least, exact.cut)
@@ -134,29 +131,57 @@ def _search(
 
 
 def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> GraphSearch:
-    """A search for the cheapest path, with a greedy one beside it if there is no plan for long."""
+    """A search for the cheapest path that has come to its end, or as far as the budget admits.
+
+    One from the goals runs beside it, which ends soon where few nodes lead to them, and a greedy
+    one if there is no plan for long.
+    """
     settings = found.problem.search
     weight = settings.weight or WEIGHT
     exact = GraphSearch.of(graph, weight=1.0 if settings.improve else weight, budget=budget)
-    chunk, turns = ALONE, [exact]
+    closing, chunk, turns = None, FIRST_CHUNK, [(exact, 1)]
     while exact.alive and not (budget.is_over or exact.is_late):
-        for one in turns:
-            spent = found.counts["expansions"]
-            room = 2**62 if budget.expansions is None else budget.expansions - spent
-            if not room:
+        for one, times in turns:
+            if not _run(found, one, chunk // times, relaxed):
                 return exact
-            before, asked = one.expansions, one.queries
-            one.run(min(chunk if one is exact else chunk // GREEDY, room), found.cost)
-            found.counts.update(
-                expansions=one.expansions - before, collision_queries=one.queries - asked
-            )
-            if one.cost < found.cost and not one.alive:
-                word, goal = one.word()
-                if not relaxed:
-                    found.note(one.cost)
-                if found.offer(plan_of(found.problem, word), goal, proven=not relaxed):
-                    found.note(one.cost)
+            if one is closing and _is_decided(one):
+                return one
         chunk = min(2 * chunk, MOST_CHUNK)
-        if len(turns) == 1 and settings.improve and not found.plans:
-            turns.append(GraphSearch.of(graph, weight=weight, budget=budget))
+        if len(turns) == 1 and (back := graph.backwards()):
+            closing = GraphSearch.of(back, weight=1.0, budget=budget, looks_ahead=False)
+            turns.insert(0, (closing, BACK))
+        greedy = settings.improve and not found.plans and exact.expansions >= ALONE
+        if greedy and turns[-1][1] != GREEDY:
+            turns.append((GraphSearch.of(graph, weight=weight, budget=budget), GREEDY))
+    if closing and not (exact.alive or found.plans) and exact.cut < exact.cost:
+        while closing.alive and not (budget.is_over or closing.is_late):
+            if not _run(found, closing, MOST_CHUNK, relaxed):
+                break
+        if _is_decided(closing):
+            return closing
     return exact
+
+
+def _is_decided(search: GraphSearch) -> bool:
+    """Whether a search from the goals has found the cheapest path, or no way into its window."""
+    return not search.alive and (search.cost < math.inf or search.cut == math.inf)
+
+
+def _run(found: Incumbents, search: GraphSearch, n: int, relaxed: bool) -> bool:
+    """Expand up to `n` nodes, and offer the path that is found; False if none are left to expand."""
+    left = found.budget.expansions
+    room = n if left is None else min(n, left - found.counts["expansions"])
+    if not (room and search.alive):
+        return room > 0
+    before, asked = search.expansions, search.queries
+    search.run(room, found.cost)
+    found.counts.update(
+        expansions=search.expansions - before, collision_queries=search.queries - asked
+    )
+    if search.cost < found.cost and not search.alive:
+        word, goal = search.word()
+        if not relaxed:
+            found.note(search.cost)
+        if found.offer(plan_of(found.problem, word), goal, proven=not relaxed):
+            found.note(search.cost)
+    return True
