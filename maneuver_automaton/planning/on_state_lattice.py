@@ -17,6 +17,7 @@ from maneuver_automaton.search.lattice import in_frame_of_problem
 from maneuver_automaton.search.lattice_task import WEIGHT
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.state_lattice import Graph, GraphSearch, graph_of
+from maneuver_automaton.search.timed_lattice import FREELY, TimedSearch, by_time, costs_to_go
 
 FIRST_CHUNK = 1024  # expansions of the exact search until one from the goals begins beside it
 BACK = 16  # times fewer expansions than the exact search that one has in its turn
@@ -25,6 +26,8 @@ GREEDY = 4  # times fewer expansions than the exact search that one has in its t
 MOST_CHUNK = 1 << 20
 RELAXED_SHARE = 0.5  # of the time, where others search on if the cheapest path is refused
 MOST_WIDER = 2  # times that a window is widened where there is no plan
+MORE = 1.25, 2.0, math.inf  # times the cost among what stands, up to which plans are looked for
+LONGER = 1e-9  # share of the longest time by which plans may be longer
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
 
@@ -39,7 +42,7 @@ class OnStateLattice(PlanningStep):
 
     def prepare(self, problem: Problem, workspace: Workspace) -> bool:
         """Load the kernels, and make the graph."""
-        load_kernels("lattice", "state lattice")
+        load_kernels("lattice", "state lattice", "timed lattice")
         if goals_off_lattice(problem) is not None:
             return True  # which is told without a search
         lasting, goals = _lasting(problem), range(len(problem.goals))
@@ -69,18 +72,22 @@ class OnStateLattice(PlanningStep):
         found.likeness = POLISHED
         found.offer_nearly_met()
         found.counts.update(expansions=0, collision_queries=0)
+        lattice = graph
         if problem.search.backwards:
             graph = graph.backwards() or graph
         relaxed = lasting is not problem
         part = budget.stage(RELAXED_SHARE) if relaxed else budget
         least, why, ended.nodes = _search(found, graph, part, relaxed)
-        ended.is_complete = not relaxed or why[0] is PlanStatus.UNREACHABLE
+        if relaxed and why[0] is not PlanStatus.UNREACHABLE and not part.is_over:
+            least, why = _in_time(found, lattice, least, part)
+        ended.is_complete = not relaxed or why[0] is not PlanStatus.OUT_OF_BUDGET
         ended.why = why if ended.is_complete else None
         if not problem.search.improve:  # A* with a weight is off by that factor at most
             least /= problem.search.weight or WEIGHT
         if found.plans and budget.watch is not None and budget.watch.problem is problem:
             budget.watch.bound = max(budget.watch.bound, min(least, found.cost))
         complete = ended.is_complete and why[0] is not PlanStatus.OUT_OF_BUDGET
+        complete = complete and least >= found.cost * (1.0 - ROUNDING)
         ended.bound = LowerBound(value=least, kind="exhaustive" if complete else "open")
 
 
@@ -128,6 +135,54 @@ def _search(
     if found.why_refused:
         why = PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
     return least, why, nodes
+
+
+def _in_time(
+    found: Incumbents, graph: Graph, least: float, budget: Budget
+) -> tuple[float, tuple[PlanStatus, str]]:
+    """Search in time, where the cheapest path among all that stands was refused.
+
+    Least cost of a plan, and why there is none, as in `_search`.
+    """
+    problem, prepared = found.problem, found.workspace.prepared
+    longest, late = problem.horizon.max_time, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
+    soon, beyond = FREELY, math.inf
+    if longest is not None:
+        quickest = GraphSearch.of(by_time(graph), weight=1.0, budget=budget)
+        while quickest.alive and not (budget.is_over or quickest.is_late):
+            quickest.run(MOST_CHUNK, math.inf)
+        if quickest.alive:
+            return least, late
+        takes = min(quickest.cost, quickest.cut)
+        if takes > longest * (1.0 + LONGER):
+            why = f"the quickest way takes {takes:.6g} s, at most {longest:g} s are admitted"
+            return least, (PlanStatus.UNREACHABLE, why)
+        known = costs_to_go(by_time(graph), longest * (1.0 + LONGER), budget)
+        if known is None:
+            return least, late
+        soon = known[0]
+    for times in MORE:
+        most = min(times * least, found.cost)
+        known = costs_to_go(graph, most, budget)
+        if known is None:
+            return least, late
+        free, beyond = known
+        search = TimedSearch.of(graph, problem, free, soon, prepared)
+        search.run(most, budget)
+        found.counts.update(collision_queries=search.queries)
+        if search.alive:
+            return least, late
+        proven = min(search.least_missed, beyond, most)
+        if search.cost < found.cost:
+            word, goal = search.word()
+            if found.offer(plan_of(problem, word), goal, proven=False):
+                found.note(search.cost)
+            else:
+                return min(proven, search.cost), late
+        least = max(least, min(proven, found.cost))
+        if found.cost <= most:
+            return least, (PlanStatus.NO_PLAN, "")
+    return least, (PlanStatus.NO_PLAN, "none, however long it waits for what moves")
 
 
 def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> GraphSearch:
