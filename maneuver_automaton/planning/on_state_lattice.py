@@ -77,8 +77,10 @@ class OnStateLattice(PlanningStep):
             graph = graph.backwards() or graph
         relaxed = lasting is not problem
         part = budget.stage(RELAXED_SHARE) if relaxed else budget
-        least, why, ended.nodes = _search(found, graph, part, relaxed)
+        least, why, ended.nodes, wider = _search(found, graph, part, relaxed)
         if relaxed and why[0] is not PlanStatus.UNREACHABLE and not part.is_over:
+            for _ in range(wider):
+                lattice = lattice.widened()
             least, why = _in_time(found, lattice, least, part)
         ended.is_complete = not relaxed or why[0] is not PlanStatus.OUT_OF_BUDGET
         ended.why = why if ended.is_complete else None
@@ -103,8 +105,10 @@ def _lasting(problem: Problem) -> Problem:
 
 def _search(
     found: Incumbents, graph: Graph, budget: Budget, relaxed: bool
-) -> tuple[float, tuple[PlanStatus, str], Array | None]:
+) -> tuple[float, tuple[PlanStatus, str], Array | None, int]:
     """Search a lattice to the end; least cost of a plan, why there is none, nodes if asked for.
+
+    And how often its window was widened.
 
     A `relaxed` graph leaves out conditions that its cheapest path may not meet.
     """
@@ -116,13 +120,14 @@ def _search(
         if exact.alive:  # the time, or the number of expansions, is over
             spent = f"{found.budget.seconds:.4g} s and {found.counts['expansions']} expansions"
             late = found.why_unchecked or f"no plan within {spent}"
-            return min(least, exact.least_open), (PlanStatus.OUT_OF_BUDGET, late), nodes
+            return min(least, exact.least_open), (PlanStatus.OUT_OF_BUDGET, late), nodes, wider
         least = min(least, exact.cost, found.cost)
         refused = exact.cost < found.cost * (1.0 - ROUNDING)
-        if refused and (relaxed or graph.fine is not graph.coarse):
+        beyond = exact.cut < exact.cost and wider < MOST_WIDER  # a cheaper one may leave the window
+        if refused and (not beyond if relaxed else graph.fine is not graph.coarse):
             if relaxed or budget.is_over:
                 least = min(least, exact.cut)
-                return least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked), nodes
+                return least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked), nodes, wider
             graph = replace(graph, fine=graph.coarse)  # it was refused: keep away from obstacles
         elif exact.cut < min(found.cost, least) * (1.0 - ROUNDING):
             if not found.plans and wider == MOST_WIDER:
@@ -134,7 +139,7 @@ def _search(
             break
     if found.why_refused:
         why = PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
-    return least, why, nodes
+    return least, why, nodes, wider
 
 
 def _in_time(
