@@ -151,7 +151,7 @@ def _in_time(
     """
     problem, prepared = found.problem, found.workspace.prepared
     longest, late = problem.horizon.max_time, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
-    soon, beyond = FREELY, math.inf
+    soon, proven = FREELY, least
     if longest is not None:
         quickest = GraphSearch.of(by_time(graph), weight=1.0, budget=budget)
         while quickest.alive and not (budget.is_over or quickest.is_late):
@@ -177,17 +177,23 @@ def _in_time(
         found.counts.update(collision_queries=search.queries)
         if search.alive:
             return least, late
-        proven = min(search.least_missed, beyond, most)
         if search.cost < found.cost:
             word, goal = search.word()
-            if found.offer(plan_of(problem, word), goal, proven=False):
-                found.note(search.cost)
-            else:
-                return min(proven, search.cost), late
-        least = max(least, min(proven, found.cost))
+            if not found.offer(plan_of(problem, word), goal, proven=False):
+                return least, late
+            found.note(search.cost)
+        bounding = search
+        if search.least_missed < min(most, found.cost):
+            bounding = TimedSearch.of(graph, problem, free, soon, prepared, bounds=True)
+            bounding.run(min(most, found.cost), budget)
+            found.counts.update(collision_queries=bounding.queries)
+        proven = least if bounding.alive else min(bounding.cost, most, beyond, found.cost)
+        least = max(least, proven)
         if found.cost <= most:
             return least, (PlanStatus.NO_PLAN, "")
-    return least, (PlanStatus.NO_PLAN, "none, however long it waits for what moves")
+    if proven == math.inf:
+        return least, (PlanStatus.UNREACHABLE, "what moves is in every way, however long it waits")
+    return least, (PlanStatus.NO_PLAN, "none, however long it waits for what moves, and no proof")
 
 
 def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> GraphSearch:

@@ -311,17 +311,15 @@ def _aims(problem: Problem, goals: Sequence[int], world: SE2, lattice: StateLatt
         ]
         off = np.abs(wrapped(np.subtract.outer(lattice.heading, headings)))
         admits.append((off <= EXACT).any(axis=1))
+    return priced(np.array(place), np.array(within), np.array(admits), lattice)
+
+
+def priced(place: Array, within: Array, admits: NDArray[np.bool_], lattice: StateLattice) -> Aims:
+    """Aims with what the edges of a lattice cost at least on the way there."""
     moved = lattice.cell * np.hypot(*lattice.step.T)
     moves = moved > 0.0
     per_metre = float((lattice.cost[moves] / moved[moves]).min()) if moves.any() else 0.0
-    admitted = np.array(admits)
-    return Aims(
-        place=np.array(place),
-        within=np.array(within),
-        admits=admitted,
-        per_metre=per_metre,
-        surplus=_surplus(lattice, per_metre, admitted),
-    )
+    return Aims(place, within, admits, per_metre, _surplus(lattice, per_metre, admits))
 
 
 def _surplus(lattice: StateLattice, per_metre: float, admits: NDArray[np.bool_]) -> Array:

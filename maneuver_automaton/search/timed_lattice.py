@@ -23,11 +23,12 @@ from maneuver_automaton.search.lattice_library import LatticeLibrary, library_of
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.scene import for_library
-from maneuver_automaton.search.state_lattice import CLOSE, MARGIN, Graph, GraphSearch
+from maneuver_automaton.search.state_lattice import CLOSE, MARGIN, Graph, GraphSearch, priced
 from maneuver_automaton.words.transitions import SWITCH
 from maneuver_automaton.words.word import Word
 
 TICK = 0.02  # [s] between departures that are tried
+FINER = 4  # times shorter ticks for a bound
 CHUNK = 1 << 12  # labels and motions between two looks at the clock
 FIRST_ROOM = 1 << 12  # labels and places, and eight times as many motions
 FREELY = FreeCosts(np.zeros((0, 0, 0)), 0, 0, 0.0)  # no time to go is known, so each is 0
@@ -59,10 +60,8 @@ def costs_to_go(graph: Graph, most: float, budget: Budget) -> tuple[FreeCosts, f
 def by_time(graph: Graph) -> Graph:
     """The same graph, where an edge costs its duration."""
     time = graph.query.library.arrays.edges.time[graph.lattice.edge]
-    aims = graph.aims._replace(
-        per_metre=0.0, surplus=np.where(np.isfinite(graph.aims.surplus), 0.0, np.inf)
-    )
-    lattice = graph.lattice._replace(cost=time)
+    lattice, aims = graph.lattice._replace(cost=time), graph.aims
+    aims = priced(aims.place, aims.within, aims.admits, lattice)
     return replace(graph, lattice=lattice, aims=aims, least=time, tables={}, surcharge=0.0)
 
 
@@ -76,14 +75,23 @@ class TimedSearch:
 
     @classmethod
     def of(
-        cls, graph: Graph, problem: Problem, free: FreeCosts, soon: FreeCosts, prepared: Prepared
+        cls,
+        graph: Graph,
+        problem: Problem,
+        free: FreeCosts,
+        soon: FreeCosts,
+        prepared: Prepared,
+        *,
+        bounds: bool = False,
     ) -> TimedSearch:
-        """A search that is ready to run, of a problem whose goals are those of the graph."""
+        """A search that is ready to run, of a problem whose goals are those of the graph.
+
+        One that `bounds` the cost takes what moves for so much smaller as it moves in a tick: then
+        no plan departs between two ticks at which the way is blocked, and none costs less.
+        """
         cost = terms_of(problem.cost)
         assert cost is not None
-        there = replace(
-            graph.query.problem, obstacles=problem.obstacles, horizon=problem.horizon
-        )
+        there = replace(graph.query.problem, obstacles=problem.obstacles, horizon=problem.horizon)
         query = lattice_query(there, range(len(there.goals)), prepared=prepared)
         fine = prepared.once(_followed, query.library, cost)
         turn = graph.lattice.frame[2] + float(query.start[2] - graph.query.start[2])
@@ -103,6 +111,12 @@ class TimedSearch:
         )
         arrays.state[kernels.AIM] = -1
         quiet = max(last - problem.start_time, 0.0) if query.moves else 0.0
+        tick = TICK / FINER if bounds else max(TICK, float(horizon.min_coast))
+        tick = max(tick, quiet / kernels.MOST_WAITS)
+        scene = for_library(query.scene(min(MARGIN, query.margin)), problem, fine)
+        if bounds:
+            fastest = float(query.world.arrays.moving.speed.max(initial=0.0))
+            scene = scene._replace(keep=scene.keep - fastest * tick)
         return cls(
             graph,
             TimedQuery(
@@ -113,18 +127,15 @@ class TimedSearch:
                 soon=soon,
                 coarse=graph.coarse,
                 fine=graph.fine,
-                moving=Tested(
-                    fine.arrays,
-                    for_library(query.scene(min(MARGIN, query.margin)), problem, fine),
-                ),
+                moving=Tested(fine.arrays, scene),
                 frame=(*query.start[:2].tolist(), turn, math.cos(turn), math.sin(turn)),
                 directed=states // trims.n_trims,
                 clock=float(problem.start_time),
                 quiet=quiet,
                 most_time=math.inf if horizon.max_time is None else query.most_time,
                 stays=horizon.stay,
-                tick=max(TICK, float(horizon.min_coast), quiet / kernels.MOST_WAITS),
-                least_wait=float(horizon.min_coast),
+                tick=tick,
+                least_wait=0.0 if bounds else float(horizon.min_coast),
                 rate=float(trims.rates[: trims.n_trims].max(initial=0.0)),
                 pause=float(cost.switch),
             ),
