@@ -26,7 +26,7 @@ GREEDY = 4  # times fewer expansions than the exact search that one has in its t
 MOST_CHUNK = 1 << 20
 RELAXED_SHARE = 0.5  # of the time, where others search on if the cheapest path is refused
 MOST_WIDER = 2  # times that a window is widened where there is no plan
-MORE = 1.25, 2.0, math.inf  # times the cost among what stands, up to which plans are looked for
+MORE = 1.25, 1.6, 2.5, math.inf  # times the cost among what stands, up to which plans are looked for
 LONGER = 1e-9  # share of the longest time by which plans may be longer
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
@@ -168,10 +168,14 @@ def _in_time(
         soon = known[0]
     for times in MORE:
         most = min(times * least, found.cost)
-        known = costs_to_go(graph, most, budget)
-        if known is None:
-            return least, late
-        free, beyond = known
+        for _ in range(MOST_WIDER + 1):
+            known = costs_to_go(graph, most, budget)
+            if known is None:
+                return least, late
+            free, beyond = known
+            if not beyond < most < math.inf:
+                break
+            graph = graph.widened()
         search = TimedSearch.of(graph, problem, free, soon, prepared)
         search.run(most, budget)
         found.counts.update(collision_queries=search.queries)
@@ -234,7 +238,7 @@ def _is_decided(search: GraphSearch) -> bool:
 
 
 def _run(found: Incumbents, search: GraphSearch, n: int, relaxed: bool) -> bool:
-    """Expand up to `n` nodes, and offer the path that is found; False if none are left to expand."""
+    """Expand up to `n` nodes, and offer the path that is found; False if none may be expanded."""
     left = found.budget.expansions
     room = n if left is None else min(n, left - found.counts["expansions"])
     if not (room and search.alive):
