@@ -39,7 +39,7 @@ from maneuver_automaton.search._kernels_state_lattice import (
     place_in,
     pose_in,
 )
-from maneuver_automaton.search.arrays import FreeCosts, TimedQuery
+from maneuver_automaton.search.arrays import TimedQuery
 
 EDGE_BITS, WAIT_BITS = 16, 20  # of an entry of the open list; above them its label
 MOST_WAITS = (1 << WAIT_BITS) - 1
@@ -58,7 +58,7 @@ def useless_until(
 
     Whatever arrives by then, and costs as much more as it is later, is useless too.
     """
-    search, quiet, ends = query.arrays, query.quiet, query.most_time < math.inf
+    search, quiet, ends = query.arrays, query.timing.quiet, query.timing.most_time < math.inf
     place, _, _ = place_in(search.table, node[0], node[1])
     if place < 0:
         return -1.0
@@ -69,7 +69,11 @@ def useless_until(
         at_rest = min(before, arrival) >= quiet and (later > 0.0 or not ends)
         if cost <= most and (at_rest or abs(later) <= SAME):
             return until
-        if later > 0.0 and arrival <= until and cost + query.rate * later + query.pause <= most:
+        if (
+            later > 0.0
+            and arrival <= until
+            and cost + query.timing.rate * later + query.timing.pause <= most
+        ):
             return until
         label = search.links[label, BEFORE]
     return -1.0
@@ -80,7 +84,7 @@ def is_free_at(query: TimedQuery, label: int, e: int, leave: float) -> bool:
     """Whether an edge from where a label is, begun `leave` [s] after the start, meets nothing."""
     links, lattice, moving = query.arrays.links, query.lattice, query.moving
     column, row, at = links[label, COLUMN], links[label, ROW], links[label, STATE]
-    pose, clock = pose_in(query.frame, lattice, column, row, at), query.clock + leave
+    pose, clock = pose_in(query.frame, lattice, column, row, at), query.timing.clock + leave
     query.arrays.state[QUERIES] += 1
     return bool(edge_proven(moving.scene, moving.lib, lattice.edge[e], pose, clock) >= 0.0)
 
@@ -92,17 +96,20 @@ def list_motion(query: TimedQuery, label: int, e: int, ticks: int, upper_bound: 
     Nothing where it cannot wait so long, comes too late, or leads to no plan below a cost.
     """
     search, lattice = query.arrays, query.lattice
-    links, waited = search.links, query.tick * (ticks - 1) if ticks > 0 else 0.0
+    links, waited = search.links, query.timing.tick * (ticks - 1) if ticks > 0 else 0.0
     leave = search.times[label, ARRIVAL] + waited
-    if ticks > 0 and (leave > search.times[label, UNTIL] or leave > query.quiet):
+    if ticks > 0 and (leave > search.times[label, UNTIL] or leave > query.timing.quiet):
         return
     column, row = links[label, COLUMN] + lattice.step[e, 0], links[label, ROW] + lattice.step[e, 1]
-    target, key = lattice.target[e], search.cost[label] + lattice.cost[e] + query.rate * waited
+    target, key = (
+        lattice.target[e],
+        search.cost[label] + lattice.cost[e] + query.timing.rate * waited,
+    )
     if ticks > 0:
-        key += query.pause
+        key += query.timing.pause
     arrival = leave + query.moving.lib.edges.time[lattice.edge[e]]
     ahead = least_to_go(query.aims, query.soon, lattice.cell, column, row, target)
-    if arrival + ahead > query.most_time:
+    if arrival + ahead > query.timing.most_time:
         return
     key += least_to_go(query.aims, query.free, lattice.cell, column, row, target)
     if key < upper_bound and ticks <= MOST_WAITS:
@@ -123,13 +130,13 @@ def try_motion(query: TimedQuery, item: int, key: float, upper_bound: float) -> 
     takes = query.moving.lib.edges.time[lattice.edge[e]]
     low, leave, paid = begun, begun, search.cost[label] + lattice.cost[e]
     if ticks > 0:
-        low = begun + (ticks - 1) * query.tick
-        leave = min(begun + ticks * query.tick, until)
-        paid += query.pause
-    useless = useless_until(query, node, low + takes, paid + query.rate * (low - begun))
+        low = begun + (ticks - 1) * query.timing.tick
+        leave = min(begun + ticks * query.timing.tick, until)
+        paid += query.timing.pause
+    useless = useless_until(query, node, low + takes, paid + query.timing.rate * (low - begun))
     if useless >= leave + takes:
         if useless < math.inf:
-            after = math.ceil((useless - takes - begun) / query.tick)
+            after = math.ceil((useless - takes - begun) / query.timing.tick)
             list_motion(query, label, e, max(ticks + 1, after), upper_bound)
         return
     if ticks == 0:
@@ -149,17 +156,17 @@ def try_motion(query: TimedQuery, item: int, key: float, upper_bound: float) -> 
                 leave = middle
             else:
                 low = middle
-    if ticks > 0 and leave - begun < query.least_wait:
-        leave = min(begun + query.tick, until)
+    if ticks > 0 and leave - begun < query.timing.least_wait:
+        leave = min(begun + query.timing.tick, until)
     list_motion(query, label, e, ticks + 1, upper_bound)  # the way may be free once more
-    if leave + takes > query.most_time:
+    if leave + takes > query.timing.most_time:
         return
     new = search.state[N_LABELS]
     search.state[N_LABELS] += 1
     links[new, COLUMN], links[new, ROW], links[new, STATE] = node[0], node[1], node[2]
     links[new, PARENT], links[new, EDGE] = label, e
     search.times[new, ARRIVAL], search.times[new, WAITED] = leave + takes, leave - begun
-    search.cost[new] = paid + query.rate * (leave - begun)
+    search.cost[new] = paid + query.timing.rate * (leave - begun)
     ahead = least_to_go(query.aims, query.free, lattice.cell, node[0], node[1], node[2])
     push(search.heap_key, search.heap_item, search.state[HEAP], search.cost[new] + ahead, -1 - new)
     search.state[HEAP] += 1
@@ -209,16 +216,16 @@ def expand_in_time(query: TimedQuery, n: int, upper_bound: float) -> int:
             for k in range(search.latest.shape[1]):
                 search.latest[place, k] = -1
         until = math.inf
-        if arrival < query.quiet:
+        if arrival < query.timing.quiet:
             pose = pose_in(query.frame, lattice, column, row, at)
-            trim, lasting = at // query.directed, query.quiet - arrival + 1.0
-            scene, lib, clock = query.moving.scene, query.moving.lib, query.clock + arrival
+            trim, lasting = at // query.directed, query.timing.quiet - arrival + 1.0
+            scene, lib, clock = query.moving.scene, query.moving.lib, query.timing.clock + arrival
             stands, _ = coast_proven(scene, lib, trim, pose, lasting, clock)
             until = arrival + stands if stands < lasting else math.inf
         times[label, UNTIL] = until
         links[label, BEFORE], search.latest[place, at] = search.latest[place, at], label
         aim = aim_at(query.aims, column * lattice.cell, row * lattice.cell, at)
-        if aim >= 0 and (until == math.inf or not query.stays):
+        if aim >= 0 and (until == math.inf or not query.timing.stays):
             state[FOUND], state[AIM] = label, aim
             return 0
         for e in range(lattice.first[at], lattice.first[at + 1]):

@@ -468,6 +468,19 @@ class TimedArrays(NamedTuple):
     found: Array  # (1,)
 
 
+class Timing(NamedTuple):
+    """When things happen in a search in time, and what it costs to wait."""
+
+    clock: float  # [s] time of the world at the start
+    quiet: float  # [s] since the start, after which nothing moves
+    most_time: float  # [s]
+    stays: bool  # whether a plan ends where nothing comes later
+    tick: float  # [s] between departures that are tried
+    least_wait: float  # [s]
+    rate: float  # cost of a second that is waited
+    pause: float  # cost of waiting at all
+
+
 class TimedQuery(NamedTuple):
     """A search of a state lattice in time: what stands is tested as in `GraphQuery`."""
 
@@ -481,14 +494,7 @@ class TimedQuery(NamedTuple):
     moving: Tested  # all that moves, and what stands, in another frame
     frame: tuple[float, float, float, float, float]  # of the lattice, seen from there
     directed: int  # states of a heading
-    clock: float  # [s] time of the world at the start
-    quiet: float  # [s] since the start, after which nothing moves
-    most_time: float  # [s]
-    stays: bool  # whether a plan ends where nothing comes later
-    tick: float  # [s] between departures that are tried
-    least_wait: float  # [s]
-    rate: float  # cost of a second that is waited
-    pause: float  # cost of waiting at all
+    timing: Timing
 
 
 class CostQueue(NamedTuple):

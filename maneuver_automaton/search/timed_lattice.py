@@ -18,7 +18,7 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_timed_lattice as kernels
 from maneuver_automaton.search._kernels_state_lattice import SEARCH
-from maneuver_automaton.search.arrays import FreeCosts, Tested, TimedArrays, TimedQuery
+from maneuver_automaton.search.arrays import FreeCosts, Tested, TimedArrays, TimedQuery, Timing
 from maneuver_automaton.search.lattice_library import LatticeLibrary, library_of_trims
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
@@ -130,14 +130,16 @@ class TimedSearch:
                 moving=Tested(fine.arrays, scene),
                 frame=(*query.start[:2].tolist(), turn, math.cos(turn), math.sin(turn)),
                 directed=states // trims.n_trims,
-                clock=float(problem.start_time),
-                quiet=quiet,
-                most_time=math.inf if horizon.max_time is None else query.most_time,
-                stays=horizon.stay,
-                tick=tick,
-                least_wait=0.0 if bounds else float(horizon.min_coast),
-                rate=float(trims.rates[: trims.n_trims].max(initial=0.0)),
-                pause=float(cost.switch),
+                timing=Timing(
+                    clock=float(problem.start_time),
+                    quiet=quiet,
+                    most_time=math.inf if horizon.max_time is None else query.most_time,
+                    stays=horizon.stay,
+                    tick=tick,
+                    least_wait=0.0 if bounds else float(horizon.min_coast),
+                    rate=float(trims.rates[: trims.n_trims].max(initial=0.0)),
+                    pause=float(cost.switch),
+                ),
             ),
         )
 
