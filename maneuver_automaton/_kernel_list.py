@@ -46,6 +46,7 @@ USES = {  # modules of kernels, by what calls them
     ),
     "improvement": ("refinement._kernels_improve", "refinement._kernels_points"),
     "state lattice": ("search._kernels_state_lattice", "search._kernels_nodes"),
+    "timed lattice": ("search._kernels_state_lattice", "search._kernels_timed_lattice"),
     "fail-safe": ("receding_horizon._kernels_failsafe",),
     "meetings": ("fleet._kernels_meetings",),
     "separation": ("bounds._kernels_boxes", "bounds._kernels_connectivity"),

@@ -181,11 +181,15 @@ def met_along(
 
 
 @bare_inner_kernel
-def pose_of(
-    lattice: StateLattice, column: int, row: int, state: int
+def pose_in(
+    frame: tuple[float, float, float, float, float],
+    lattice: StateLattice,
+    column: int,
+    row: int,
+    state: int,
 ) -> tuple[float, float, float, float]:
     """Pose of a node: it follows from the numbers alone, so that no error adds up along a plan."""
-    u, v, (x, y, turn, c, s) = column * lattice.cell, row * lattice.cell, lattice.frame
+    u, v, (x, y, turn, c, s) = column * lattice.cell, row * lattice.cell, frame
     return x + c * u - s * v, y + s * u + c * v, turn + lattice.heading[state], 0.0
 
 
@@ -244,7 +248,7 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
             continue  # a cheaper motion led there, or none can
         clearance = 0.0  # that of a root is not asked for: nothing rests on it
         if item >= 0:
-            there = pose_of(lattice, column, row, at)
+            there = pose_in(lattice.frame, lattice, column, row, at)
             clearance = clearance_at(fine, there)
             if clearance <= fine.scene.margin:
                 search.node[place, at] = SOLID
@@ -256,8 +260,12 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
             near = max(0.5 * (first + clearance - reach), max(first, clearance) - reach)
             begin = there
             if lattice.sign > 0:
-                begin = pose_of(
-                    lattice, links[parent, COLUMN], links[parent, ROW], links[parent, STATE]
+                begin = pose_in(
+                    lattice.frame,
+                    lattice,
+                    links[parent, COLUMN],
+                    links[parent, ROW],
+                    links[parent, STATE],
                 )
             state[QUERIES] += 1
             met = met_along(coarse, fine, edge, begin, near, lattice.travel[e])

@@ -454,6 +454,49 @@ class GraphQuery(NamedTuple):
     weight: float  # of the bound of the cost to go
 
 
+class TimedArrays(NamedTuple):
+    """Arrays of a search in time, as in `_kernels_timed_lattice`."""
+
+    table: IntArray  # (4 p, 2)
+    latest: NDArray[np.int32]  # (p, S)
+    links: NDArray[np.int32]  # (n, 6)
+    times: Array  # (n, 3)
+    cost: Array  # (n,)
+    heap_key: Array  # (m,)
+    heap_item: IntArray  # (m,)
+    state: IntArray  # (7,)
+    found: Array  # (1,)
+
+
+class Timing(NamedTuple):
+    """When things happen in a search in time, and what it costs to wait."""
+
+    clock: float  # [s] time of the world at the start
+    quiet: float  # [s] since the start, after which nothing moves
+    most_time: float  # [s]
+    stays: bool  # whether a plan ends where nothing comes later
+    tick: float  # [s] between departures that are tried
+    least_wait: float  # [s]
+    rate: float  # cost of a second that is waited
+    pause: float  # cost of waiting at all
+
+
+class TimedQuery(NamedTuple):
+    """A search of a state lattice in time: what stands is tested as in `GraphQuery`."""
+
+    arrays: TimedArrays
+    lattice: StateLattice
+    aims: Aims
+    free: FreeCosts  # costs to go among all that stands
+    soon: FreeCosts  # times to go [s]
+    coarse: Tested
+    fine: Tested
+    moving: Tested  # all that moves, and what stands, in another frame
+    frame: tuple[float, float, float, float, float]  # of the lattice, seen from there
+    directed: int  # states of a heading
+    timing: Timing
+
+
 class CostQueue(NamedTuple):
     """A binary heap of places in a table of costs."""
 

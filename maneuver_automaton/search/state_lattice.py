@@ -53,8 +53,8 @@ SMALLEST = 2048  # nodes and places, and eight times as many motions
 ALIKE = 1.0001  # times the least cost of edges a quarter turn apart, that each of them may have
 MOST_TABLES = 64  # of costs without obstacles, of one library
 # Expansions after which costs without obstacles are looked up, and of how many nodes at most. To
-# know many takes as long as a search, so that they have to wait until it is long.
-STAGES = (1 << 10, 1 << 14), (1 << 12, 1 << 16), (1 << 14, 1 << 18)
+# know four takes about as long as to expand one: a table never takes longer than what was searched.
+STAGES = (1 << 11, 1 << 13), (1 << 13, 1 << 15), (1 << 15, 1 << 17)
 
 
 _Number = TypeVar("_Number", np.float64, np.int64)
@@ -88,9 +88,12 @@ class Graph:
         return replace(self, coarse=coarse, fine=fine)
 
     def backwards(self) -> Graph | None:
-        """The search from the goals to the start; None if they hold too many nodes to list."""
+        """The search from the goals to the start; None if they hold too many nodes to list.
+
+        None for such a search, too.
+        """
         ahead, aims = self.lattice, self.aims
-        roots = nodes_within(aims, ahead.cell)
+        roots = nodes_within(aims, ahead.cell) if ahead.sign > 0 else None
         if roots is None:
             return None
         at, order = ahead.roots[0], ahead.into_edge
@@ -308,17 +311,15 @@ def _aims(problem: Problem, goals: Sequence[int], world: SE2, lattice: StateLatt
         ]
         off = np.abs(wrapped(np.subtract.outer(lattice.heading, headings)))
         admits.append((off <= EXACT).any(axis=1))
+    return priced(np.array(place), np.array(within), np.array(admits), lattice)
+
+
+def priced(place: Array, within: Array, admits: NDArray[np.bool_], lattice: StateLattice) -> Aims:
+    """Aims with what the edges of a lattice cost at least on the way there."""
     moved = lattice.cell * np.hypot(*lattice.step.T)
     moves = moved > 0.0
     per_metre = float((lattice.cost[moves] / moved[moves]).min()) if moves.any() else 0.0
-    admitted = np.array(admits)
-    return Aims(
-        place=np.array(place),
-        within=np.array(within),
-        admits=admitted,
-        per_metre=per_metre,
-        surplus=_surplus(lattice, per_metre, admitted),
-    )
+    return Aims(place, within, admits, per_metre, _surplus(lattice, per_metre, admits))
 
 
 def _surplus(lattice: StateLattice, per_metre: float, admits: NDArray[np.bool_]) -> Array:
@@ -362,8 +363,10 @@ class GraphSearch:
     is_late: bool = False  # no time is left to make room for more nodes
 
     @classmethod
-    def of(cls, graph: Graph, *, weight: float, budget: Budget) -> GraphSearch:
-        """A search that is ready to run."""
+    def of(
+        cls, graph: Graph, *, weight: float, budget: Budget, looks_ahead: bool = True
+    ) -> GraphSearch:
+        """A search that is ready to run; one that `looks_ahead` knows costs without obstacles."""
         n = SMALLEST
         while n < len(graph.lattice.roots) + graph.lattice.most_links:
             n *= 2
@@ -380,7 +383,8 @@ class GraphSearch:
             state=np.zeros(7, dtype=np.int64),
             found=np.full(1, np.inf),
         )
-        return cls(graph, weight, arrays, Pace(budget, FIRST_CHUNK))
+        stage = 0 if looks_ahead else len(STAGES)
+        return cls(graph, weight, arrays, Pace(budget, FIRST_CHUNK), stage=stage)
 
     @property
     def expansions(self) -> int:

@@ -263,6 +263,38 @@ def test_what_moves_aside_and_limits_of_time_leave_the_optimum_and_its_proof(goa
     result = plan(in_the_way, time_limit=60.0)
     assert result.status is PlanStatus.FOUND, result.reason
     assert least.cost <= result.lower_bound + 1e-9 <= result.cost + 2e-9
+    assert result.gap < 0.01  # it knows what waiting may save to a part of a tick
+
+
+def test_it_waits_as_long_as_a_closed_lane_takes_to_open():
+    """One lane only: what stands in it until 3 s, and leaves at 1 m/s, is waited for."""
+    lane = Bounds(x=(-0.3, 4.3), y=(-0.1, 0.1))
+    leaves = Motion([0.0, 3.0, 13.0], [[2.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 10.0, 0.0]])
+    disc = Obstacle(Disc(0.35), motion=leaves)
+    problem = Problem(
+        library(), [0, 0, 0], [4.0, 0.0, 0.0], footprint=BODY, bounds=lane, obstacles=disc
+    )
+    free = plan(replace(problem, obstacles=[]), time_limit=60.0).cost
+    result = plan(problem, time_limit=60.0)
+    assert result.status is PlanStatus.FOUND, result.reason
+    assert result.gap < 0.01
+    assert result.cost == pytest.approx(result.plan.duration)
+    waited = result.cost - free
+    assert 0.0 < waited < 3.5
+    stays = plan(replace(problem, obstacles=Disc(0.35, center=[2.0, 0.0])), time_limit=60.0)
+    assert stays.status is PlanStatus.UNREACHABLE
+
+
+def test_a_longest_time_shorter_than_the_quickest_way_is_told():
+    problem = Problem(
+        with_reverse(), [0, 0, 0], [3.0, 1.0, 0.0], footprint=BODY, bounds=BOUNDS,
+        obstacles=Box([0.4, 1.0], center=[1.5, 0.0]),
+    )  # fmt: skip
+    least = plan(problem, time_limit=60.0)
+    hurry = replace(problem, horizon=Horizon(max_time=0.9 * least.plan.duration))
+    result = plan(hurry, time_limit=60.0)
+    assert result.status is PlanStatus.UNREACHABLE
+    assert result.reason.startswith(f"the quickest way takes {least.plan.duration:.6g} s, at most")
 
 
 def test_a_table_holds_the_costs_of_plain_dijkstra():
