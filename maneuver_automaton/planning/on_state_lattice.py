@@ -26,12 +26,7 @@ GREEDY = 4  # times fewer expansions than the exact search that one has in its t
 MOST_CHUNK = 1 << 20
 RELAXED_SHARE = 0.5  # of the time, where others search on if the cheapest path is refused
 MOST_WIDER = 2  # times that a window is widened where there is no plan
-MORE = (
-    1.25,
-    1.6,
-    2.5,
-    math.inf,
-)  # times the cost among what stands, up to which plans are looked for
+MORE = 1.25, 1.6, 2.5, math.inf  # times the cost among what stands, up to which plans are sought
 LONGER = 1e-9  # share of the longest time by which plans may be longer
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 

@@ -64,7 +64,7 @@ def useless_until(
         return -1.0
     label, most = search.latest[place, node[2]], paid + SAME * (1.0 + abs(paid))
     while label >= 0:
-        before, until = search.times[label, ARRIVAL], search.times[label, UNTIL]
+        before, until = float(search.times[label, ARRIVAL]), float(search.times[label, UNTIL])
         cost, later = search.cost[label], arrival - before
         at_rest = min(before, arrival) >= quiet and (later > 0.0 or not ends)
         if cost <= most and (at_rest or abs(later) <= SAME):

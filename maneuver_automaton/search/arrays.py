@@ -459,7 +459,7 @@ class TimedArrays(NamedTuple):
 
     table: IntArray  # (4 p, 2)
     latest: NDArray[np.int32]  # (p, S)
-    links: NDArray[np.int32]  # (n, 6)
+    links: IntArray  # (n, 6)
     times: Array  # (n, 3)
     cost: Array  # (n,)
     heap_key: Array  # (m,)

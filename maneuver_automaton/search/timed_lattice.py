@@ -24,7 +24,7 @@ from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.search.state_lattice import CLOSE, MARGIN, Graph, GraphSearch, priced
-from maneuver_automaton.words.transitions import SWITCH
+from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
 TICK = 0.02  # [s] between departures that are tried
@@ -101,7 +101,7 @@ class TimedSearch:
         arrays = TimedArrays(
             table=np.zeros((4 * n, 2), dtype=np.int64),
             latest=np.empty((n, states), dtype=np.int32),
-            links=np.empty((n, 6), dtype=np.int32),
+            links=np.empty((n, 6), dtype=np.int64),
             times=np.empty((n, 3)),
             cost=np.empty(n),
             heap_key=np.empty(8 * n + graph.lattice.most_links),
