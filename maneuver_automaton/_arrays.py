@@ -73,9 +73,9 @@ def plain_numbers(instance: Any) -> None:
     where a float is stated, they would be compiled anew, and round otherwise. Fields that state
     arrays are for `freeze`.
     """
-    for name, (convert, need) in _numbers_of(instance.__class__):
+    for name, may_be_none, (convert, need) in _numbers_of(instance.__class__):
         value = getattr(instance, name)
-        if value is not None:
+        if not (value is None and may_be_none):
             try:
                 object.__setattr__(instance, name, convert(value))
             except (TypeError, ValueError, OverflowError) as error:
@@ -84,10 +84,15 @@ def plain_numbers(instance: Any) -> None:
 
 
 @functools.cache
-def _numbers_of(kind: type) -> tuple[tuple[str, tuple[Callable[[Any], Any], str]], ...]:
-    """The fields of a dataclass that are numbers, what makes them so, and what they have to be."""
-    stated = ((one.name, str(one.type).removesuffix(" | None")) for one in fields(kind))
-    return tuple((name, NUMBERS[kind]) for name, kind in stated if kind in NUMBERS)
+def _numbers_of(kind: type) -> tuple[tuple[str, bool, tuple[Callable[[Any], Any], str]], ...]:
+    """The fields of a dataclass that are numbers, what makes them so, and what they have to be.
+
+    And whether they may be None.
+    """
+    stated = ((one.name, str(one.type).partition(" | None")) for one in fields(kind))
+    return tuple(
+        (name, bool(none), NUMBERS[kind]) for name, (kind, none, _) in stated if kind in NUMBERS
+    )
 
 
 def _float(value: Any) -> float:

@@ -206,6 +206,7 @@ def test_no_kernel_is_compiled_for_numbers_as_people_write_them(name):
         (lambda: ma.Horizon(max_trims=2.5), "Horizon: max_trims: got 2.5, need a whole number"),
         (lambda: ma.Bounds(x=(0, "far")), "Bounds: x: got .*, need two numbers"),
         (lambda: ma.Cost(time=1j), "Cost: time: got 1j, need a number"),
+        (lambda: ma.Clearance(None, 1.0), "Clearance: weight: got None, need a number"),
         (lambda: PLAN.sample(max_step_m=0), "plan: steps must be positive, got 0.0 m and 0.05 rad"),
         (lambda: PLAN.sample(max_step_rad=float("nan")), "plan: steps must be positive, got 0.05"),
     ],

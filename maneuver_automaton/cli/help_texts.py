@@ -67,14 +67,13 @@ EXAMPLES = {
     "example": ("maneuver-automaton example", "maneuver-automaton example warehouse --out hall/"),
     "export": (
         "maneuver-automaton export out/plan.json --to csv --step 0.1",
-        "maneuver-automaton export out/plan.json --to geojson --with scenarios/parking.yaml",
-        "maneuver-automaton export out/closed_loop.json --to ros2 "
-        "--with scenarios/parking_loop.yaml",
+        "maneuver-automaton export out/plan.json --to geojson --with parking.yaml",
+        "maneuver-automaton export out/closed_loop.json --to ros2 --with parking_loop.yaml",
     ),
     "plot": (
         "maneuver-automaton plot out/plan.json --out plan.pdf",
         "maneuver-automaton plot out/plan.json --html --with scenarios/parking.yaml",
-        "maneuver-automaton plot out/closed_loop.json --with scenarios/parking_loop.yaml",
+        "maneuver-automaton plot out/closed_loop.json --with parking_loop.yaml",
     ),
     "schema": (
         "maneuver-automaton schema > scenario.schema.json",
