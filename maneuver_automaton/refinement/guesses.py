@@ -319,24 +319,32 @@ def path_guesses(model: object) -> PathGuesses | None:
 
 @path_guesses.register
 def _of_car(model: SecondOrderCar) -> PathGuesses:
+    pace = pace_of_car(model)
     library = functools.partial(
-        car_library, wheelbase=model.wheelbase, max_steering=model.max_steering
+        car_library,
+        wheelbase=model.wheelbase,
+        max_steering=model.max_steering,
+        reverses=pace.reverse_speed > 0.0,
     )
     return PathGuesses(
         [library(share=share) for share in TURNS],
-        pace_of_car(model),
+        pace,
         lambda plan, first, last, intervals: car_guess(model, plan, intervals=intervals),
     )
 
 
 @path_guesses.register
 def _of_unicycle(model: SecondOrderUnicycle) -> PathGuesses:
+    pace = pace_of_unicycle(model)
     library = functools.partial(
-        unicycle_library, max_speed=model.max_speed, max_turn_rate=model.max_turn_rate
+        unicycle_library,
+        max_speed=model.max_speed,
+        max_turn_rate=model.max_turn_rate,
+        reverses=pace.reverse_speed > 0.0,
     )
     return PathGuesses(
         [library(share=share) for share in TURNS],
-        pace_of_unicycle(model),
+        pace,
         lambda plan, first, last, intervals: unicycle_guess(model, plan, intervals=intervals),
     )
 
@@ -349,13 +357,16 @@ def _of_trailer(model: CarWithTrailer) -> PathGuesses:
     """
     hitch = min(float(model.reduced_limits[0, 1]), ALONG)
     followed = math.sin(hitch) / model.hitch_length * model.wheelbase
-    share = min(followed / math.tan(model.max_steering), 1.0)
+    share, pace = min(followed / math.tan(model.max_steering), 1.0), pace_of_trailer(model)
     library = functools.partial(
-        car_library, wheelbase=model.wheelbase, max_steering=model.max_steering
+        car_library,
+        wheelbase=model.wheelbase,
+        max_steering=model.max_steering,
+        reverses=pace.reverse_speed > 0.0,
     )
     return PathGuesses(
         [library(share=share * turn) for turn in TURNS],
-        pace_of_trailer(model),
+        pace,
         lambda plan, first, last, intervals: trailer_guess(
             model, plan, (float(first[0]), float(last[0])), intervals=intervals
         ),

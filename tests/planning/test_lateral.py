@@ -125,6 +125,19 @@ def test_a_limit_costs_what_optimal_control_says(limited):
 
 
 @compiled_only
+def test_who_cannot_reverse_pays_for_it_where_the_way_back_is_shorter():
+    """A car of one speed both ways drives to this goal in reverse, past a box in the way ahead."""
+    car = replace(CAR, max_lateral_acceleration=MOST)
+    conditions = {"obstacles": [Box([3.0, 3.0], [25.0, 15.0])], "footprint": Box([4.5, 1.9])}
+    either, ahead = (
+        plan(posed(model, **conditions), time_limit=200.0)
+        for model in (car, replace(car, min_speed=0.0))
+    )
+    assert ahead.plan.sample().reduced_state[:, 0].min() >= 0.0
+    assert either.cost < ahead.cost < 1.01 * either.cost
+
+
+@compiled_only
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
