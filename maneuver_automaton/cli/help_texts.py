@@ -68,7 +68,7 @@ EXAMPLES = {
     "export": (
         "maneuver-automaton export out/plan.json --to csv --step 0.1",
         "maneuver-automaton export out/plan.json --to geojson --with parking.yaml",
-        "maneuver-automaton export out/closed_loop.json --to ros2 --with parking_loop.yaml",
+        "maneuver-automaton export out/closed_loop.json --to ros2 --with loop.yaml",
     ),
     "plot": (
         "maneuver-automaton plot out/plan.json --out plan.pdf",
