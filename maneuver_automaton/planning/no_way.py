@@ -33,7 +33,7 @@ from maneuver_automaton.words.library import SWITCH
 
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
-SOON_BOXES = 30_000  # ... while a search goes on: as long as a few thousand expansions take
+SOON_BOXES = 40_000  # ... at first while a search goes on: as a few thousand expansions take
 MOST_AT_GOALS = 100_000  # ... within the tolerance of a goal
 MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
 ROUNDING = 1e-6  # relative
@@ -143,8 +143,11 @@ def along_free_path(query: LatticeQuery, table: CostTable) -> Callable[[Budget],
     return _Following(query, table)
 
 
-def proven_apart(problem: Problem, budget: Budget) -> bool:
-    """Whether a little work proves that no path leads to a goal, for any vehicle with this body."""
+def proven_apart(problem: Problem, budget: Budget, times: int = 1) -> bool:
+    """Whether some work proves that no path leads to a goal, for any vehicle with this body.
+
+    It is `times` that of a short look.
+    """
     if not problem.obstacles:
         return False
     from maneuver_automaton.bounds import are_apart
@@ -152,7 +155,9 @@ def proven_apart(problem: Problem, budget: Budget) -> bool:
     left = SHARE * budget.left
     load_kernels("separation")  # the compiler's time is not the budget's
     deadline = budget.clock() + left
-    return left > 0.0 and are_apart(problem, most_boxes=SOON_BOXES, deadline=deadline)
+    return left > 0.0 and are_apart(
+        problem, most_boxes=min(times * SOON_BOXES, MOST_BOXES), deadline=deadline
+    )
 
 
 @dataclass(slots=True, eq=False)

@@ -42,7 +42,7 @@ from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import library_of
 from maneuver_automaton.words.word import Word
 
-PROOF = 8_000  # expansions until it is asked once whether it is proven that there is no word
+PROOFS = 8_000, 32_000  # expansions until it is asked whether it is proven that there is no word
 ASIDE = 50_000  # expansions until something else is tried, whose words are longer
 ASIDE_SHARE = 0.5  # of the time left, for that
 
@@ -69,7 +69,7 @@ def first_plan(
     table: CostTable = NO_TABLE,
     begun: Begun | None = None,
     aside: Callable[[Budget], FirstPlan] | None = None,
-    is_proven: Callable[[Budget], bool] | None = None,
+    is_proven: Callable[[Budget, int], bool] | None = None,
 ) -> FirstPlan:
     """The first connection from start to a goal, at the first resolution that has one.
 
@@ -77,7 +77,7 @@ def first_plan(
     are those of all searches together. `begun` is the first search of the schedule, if it is known.
     What finds words otherwise is asked `aside` where this takes long, for a share of the time, and
     again where it ends without one; if that is exhausted, so is all. Whether it `is_proven` that
-    there is none is asked once, before that.
+    there is none is asked before that, the second time for so many times the work.
     """
     schedule = schedule_of(query.library)
     guides = _Guides(query, table)
@@ -89,6 +89,7 @@ def first_plan(
         if not begun.is_found:
             guides.coarse_grids[turns[0].sign] = turns[0].begun.search.grid
     word, proof, total, queries, left_out, other, none = None, "", 0, 0, False, None, False
+    proofs = list(PROOFS if is_proven else ())
     while word is None:
         due = min(room, ASIDE) if aside and other is None else room
         for one in turns:
@@ -109,8 +110,8 @@ def first_plan(
         proof = _enclosed(query, guides.fine) if word is None and closed else ""
         late = alive and not any(one.may_expand for one in turns)
         ends = not (alive or stages)
-        if is_proven and word is None and not proof and total >= PROOF:
-            none, is_proven = is_proven(budget), None
+        if is_proven and proofs and total >= proofs[0] and word is None and not proof:
+            none = is_proven(budget, proofs.pop(0) // PROOFS[0])
             if none:
                 break
         if aside and (ends or total >= due) and word is None and not proof and total < room:
