@@ -262,9 +262,13 @@ def _short(plan: Plan) -> list[int]:
 def _with_times(
     problem: Problem, plan: Plan, goal: Goal, times: Array, free: NDArray[np.bool_], least: float
 ) -> Plan | None:
-    """The word of a plan with times near some, those that are free at least so long, as it ends."""
+    """The word of a plan with times near some, those that are free at least so long, as it ends.
+
+    Where the heading may be another one at the goal, it is any within its tolerance.
+    """
     group = problem.automaton.model.group
-    exact = not (goal.free_heading or goal.tolerance_m or goal.tolerance_rad)
+    turns = goal.free_heading or goal.tolerance_rad > 0.0
+    exact = not (turns or goal.tolerance_m)
     twists = np.array([trim.body_velocity for trim in plan.trims])
     held = group.exp(np.where(free, 0.0, times)[:, None] * twists)  # as displacements
     steps = np.vstack([_displacements(plan), np.zeros(plan.start.size)])
@@ -274,13 +278,16 @@ def _with_times(
         start=plan.start,
         twists=twists,
         goal=goal.pose if exact else plan.end,
+        free_heading=turns,
         product=product,
         rows=free[None].astype(float) if fixed else None,
         targets=np.array([plan.durations.sum() - times[~free].sum()] if fixed else []),
     )
     changed, missing = closest_times(conditions, times, at_least=least)
-    times = np.where(free, changed, times)
-    return without_nothing(replace(plan, durations=times)) if missing < CLOSED else None
+    if missing >= CLOSED:
+        return None
+    plan = without_nothing(replace(plan, durations=np.where(free, changed, times)))
+    return plan if exact or goal.off(plan.end)[1] <= goal.tolerance_rad + CLOSED else None
 
 
 def _displacements(plan: Plan) -> Array:

@@ -148,3 +148,14 @@ def test_plans_among_obstacles_have_no_short_trims(seed: int) -> None:
         goal = problem.goals[0]
         other = with_lasting_coasts(problem, result.plan, goal, is_free=lambda _plan: True)
         assert other is result.plan or what_is_hit(problem, other, goal)
+
+
+def test_where_the_heading_is_free_a_moment_of_another_trim_is_left_out():
+    axis = np.linspace(-2.0, 2.0, 41)
+    robot = Automaton.of_grid(Unicycle(), [axis, axis])
+    there = Goal(pose=[4.2120714700905015, 0.9503587277779516, 0.0], free_heading=True)
+    about = Goal(pose=[3.86, 2.04, 0.54], tolerance_m=0.2, tolerance_rad=0.4)
+    problem = Problem(robot, [0, 0, 0], [there, about], horizon=Horizon(max_trims=3))
+    result = planning.plan(problem)
+    assert result.plan is not None
+    assert result.plan.durations.min() >= SHORT
