@@ -17,7 +17,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.optimal_control.blocks import Kind, kind_of
 from maneuver_automaton.optimal_control.ipopt import load_casadi
-from maneuver_automaton.optimal_control.scene import PlacesAt, Point
+from maneuver_automaton.optimal_control.scene import PlacesAt, Point, settled
 
 
 class PlaceTerm(NamedTuple):
@@ -73,7 +73,7 @@ def price_of_places(places: PlacesAt, point: Point, dof: int) -> float:
 
 def _rates(places: PlacesAt, point: Point, pose: Array) -> Array:
     control = np.vstack([point.control, point.control[-1:]])
-    return places(pose, point.state[:, pose.shape[1] :], control)
+    return settled(places(pose, point.state[:, pose.shape[1] :], control))
 
 
 def _steps(point: Point, dof: int) -> Array:

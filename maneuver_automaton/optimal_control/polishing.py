@@ -52,6 +52,7 @@ from maneuver_automaton.optimal_control.scene import (
     PolishScene,
     PolishSettings,
     SolverAnswer,
+    settled,
 )
 from maneuver_automaton.optimal_control.separation import Parting, held_near, pairs_near, parted
 from maneuver_automaton.optimal_control.transcription import unpacked
@@ -480,7 +481,7 @@ def polish(
         If CasADi is not installed.
     """
     settings = settings or PolishSettings()
-    began = budget.elapsed
+    began, ends = budget.elapsed, ends.settled
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
     program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
     ahead = settings.ahead * _fastest(point)
@@ -602,9 +603,9 @@ def _nothing(reason: str) -> SolverAnswer:
 def _point_of(guess: Guess, count: int) -> Point:
     """The guess on so many intervals."""
     return Point(
-        resampled(guess.state, count + 1),
-        held(guess.control, count),
-        np.full(count, guess.duration / count),
+        settled(resampled(guess.state, count + 1)),
+        settled(held(guess.control, count)),
+        settled(np.full(count, guess.duration / count)),
     )
 
 

@@ -51,9 +51,18 @@ class BodyPart:
         return float(np.hypot(*(high - low))) / 2.0
 
 
+DIGITS = 9  # decimals of what a solver is given: see `settled`
 INSIDE = (0.25, 0.5, 0.75)  # shares of an interval, at which it is looked at how far paths bend
 NEARBY = 1e-3  # [s] for the velocity of a corner
 ALWAYS, NEVER = -1, -2  # the interval of what is there in all of them, and in none
+
+
+def settled(values: Array) -> Array:
+    """The values without the last digits, in which a moved problem may differ from this one.
+
+    Where a solver goes may depend on each digit that it begins with, of several local optima.
+    """
+    return np.asarray(np.round(values, DIGITS) + 0.0)
 
 
 class MovingSolid(NamedTuple):
@@ -93,18 +102,18 @@ def pieces_during(
     for one in movers:
         first, last = one.there
         begin, end = np.clip(ends[:-1], first, last), np.clip(ends[1:], first, last)
-        both = np.concatenate([_corners(one, begin), _corners(one, end)], axis=1)
+        both = settled(np.concatenate([_corners(one, begin), _corners(one, end)], axis=1))
         # Of a clipped time nothing shifts.
         shares = np.stack([ends[:-1], ends[1:]], axis=1) / max(ends[-1], NEARBY)
         shares *= np.stack([begin == ends[:-1], end == ends[1:]], axis=1)
         rates = np.concatenate([_rates(one, begin), _rates(one, end)], axis=1)
         rates *= np.repeat(shares, len(one.corners), axis=1)[..., None]
-        bulges = one.rounding + _bulges(one, begin, end)
+        bulges = one.rounding + settled(_bulges(one, begin, end))
         solids += list(zip(both, bulges.tolist(), strict=True))
         there = (ends[:-1] <= last) & (ends[1:] >= first)
         intervals.append(np.where(there, np.arange(len(durations)), NEVER))
         pad = most - rates.shape[1]
-        shifts.append(np.pad(rates, ((0, 0), (0, pad), (0, 0))))
+        shifts.append(np.pad(settled(rates), ((0, 0), (0, pad), (0, 0))))
     return ObstaclePieces(
         solids,
         np.concatenate(intervals).astype(np.int64),
@@ -211,6 +220,15 @@ class MotionEnds(NamedTuple):
     start: tuple[float | None, ...]
     end: tuple[float | None, ...]
     duration: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s] from the one to the other
+
+    @property
+    def settled(self) -> MotionEnds:
+        """The same without the last digits."""
+        start, end = (
+            tuple(None if v is None else float(settled(np.array(v))) for v in state)
+            for state in (self.start, self.end)
+        )
+        return self._replace(start=start, end=end)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -47,7 +47,8 @@ class PolishedPrice:
         """The price of time or, where it has none, what a `known` plan costs per second; else 1."""
         if self.cost.time > self.waiting:
             return self.cost.time
-        return self.of(known) / known.duration - self.waiting if known else 1.0
+        value = self.of(known) / known.duration - self.waiting if known else 1.0
+        return float(f"{value:.9g}")  # as a moved problem has it
 
     def places(self, known: Plan | None) -> PlacesAt | None:
         """What places cost in the same unit, seen from the start; None if they cost nothing."""

@@ -35,6 +35,7 @@ from maneuver_automaton.optimal_control.scene import (
     Polished,
     PolishScene,
     PolishSettings,
+    settled,
 )
 from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.primitives.driving import drive
@@ -129,7 +130,7 @@ class PolishTask:
         everywhere = [Guard(lateral=most)] if math.isfinite(most) else []
         return PolishScene(
             parts=self.parts,
-            pieces=tuple((corners, by + self.margin) for corners, by in pieces),
+            pieces=tuple((settled(corners), by + self.margin) for corners, by in pieces),
             movers=tuple(mover for one in self.movers for mover in self._movers_of(one)),
             walls=tuple(self._walls()),
             guards=(*everywhere, *map(self._seen, self.guards)),
@@ -139,7 +140,8 @@ class PolishTask:
     def _seen(self, one: tuple[Guard, Shape]) -> Guard:
         """A guard with its solids seen from the start."""
         guard, shape = one
-        return guard._replace(solids=tuple(pieces_seen_from([shape], self.start[:3])))
+        seen = pieces_seen_from([shape], self.start[:3])
+        return guard._replace(solids=tuple((settled(corners), by) for corners, by in seen))
 
     def _movers_of(self, obstacle: Obstacle) -> Iterator[MovingSolid]:
         """The convex pieces of an obstacle that moves, seen from the start and its time."""
@@ -161,7 +163,7 @@ class PolishTask:
             if pair is not None:
                 low, high = (limit - float(self.start[axis]) for limit in pair)
                 walls += [(a, b, high), (-a, -b, -low)]
-        return walls
+        return [(a, b, c) for a, b, c in settled(np.array(walls).reshape(-1, 3)).tolist()]
 
     def ends(self, heading: float) -> MotionEnds:
         """First and last state seen from the start; the heading nearest to one that is near [rad].

@@ -287,3 +287,19 @@ def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:
     assert found.reason.startswith("no time was left: to build the program would take")
     assert found.build_s > 1e-3
     assert found.iterations == 0
+
+
+def test_the_last_digits_of_a_guess_and_of_the_ends_change_nothing() -> None:
+    """They are all that a moved problem differs by, and a solver's way may depend on them."""
+    box = SQUARE * [1.0, 0.6] + [2.0, 0.0]
+    scene = PolishScene(parts=(BODY,), pieces=((box, 0.0),))
+    one, noise = guess(aside=0.8), np.random.default_rng(0)
+    other = Guess(
+        state=one.state + noise.uniform(-1e-13, 1e-13, one.state.shape),
+        control=one.control + noise.uniform(-1e-13, 1e-13, one.control.shape),
+        duration=one.duration * (1.0 + 1e-15),
+    )
+    first = polish(ROBOT, at_rest(4.0), scene, one)
+    second = polish(ROBOT, at_rest(4.0 * (1.0 + 1e-15), 1e-14), scene, other)
+    np.testing.assert_array_equal(first.state, second.state)
+    assert first.iterations == second.iterations
