@@ -133,7 +133,7 @@ def test_who_cannot_reverse_pays_for_it_where_the_way_back_is_shorter():
         plan(posed(model, **conditions), time_limit=200.0)
         for model in (car, replace(car, min_speed=0.0))
     )
-    assert ahead.plan.sample().reduced_state[:, 0].min() >= 0.0
+    assert ahead.plan.sample().reduced_state[:, 0].min() >= -1e-12  # the sum of its last steps
     assert either.cost < ahead.cost < 1.01 * either.cost
 
 
