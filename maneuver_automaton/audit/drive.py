@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.frames import (
     INTEGRAL,
     SERIES,
@@ -21,7 +22,6 @@ from maneuver_automaton.audit.frames import (
     TO_NODES,
     FrameMotion,
     N,
-    Spans,
     frames_along,
     frames_through,
     placed,
