@@ -103,8 +103,9 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
         seen = np.zeros((numbers.size, 4, 3))
         seen[..., :2] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
         seen[..., :2] *= np.array([one.size for _, one in boxes])[:, None]
-        frames = np.array([[*one.center, one.heading] for _, one in boxes])
-        frames[:, :2] -= origins[numbers]
+        frames = np.zeros((numbers.size, 3))
+        frames[:, :2] = np.array([one.center for _, one in boxes]) - origins[numbers]
+        frames[:, 2] = [one.heading for _, one in boxes]
         corners = points_of(placed(frames[:, None], seen))
         following = np.roll(corners, -1, axis=1)
         found.append(

@@ -24,7 +24,6 @@ from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
     Disc,
-    OccupancyMap,
     Polygon,
     Shape,
     box_corners,
