@@ -44,16 +44,17 @@ def price_again(
     lasting = np.diff(drive.frames.times)
 
     def rates(spans: Spans) -> Array:
-        at = _nodes(spans)
-        shape = len(spans.element), SHARES.size
-        twists = drive.twists_at(*at).reshape(*shape, offset.size)
+        at, shape = _nodes(spans), (len(spans.element), SHARES.size)
+        near, metres = isinstance(cost, Clearance), cost.per == "metre"
+        if metres or not near:
+            twists = drive.twists_at(*at).reshape(*shape, offset.size)
         if isinstance(cost, Clearance):
             apart = np.min([_distances(one, around, *at, cost.within) for one in bodies], axis=0)
             found = cost.weight * (1.0 - apart.reshape(shape) / cost.within) ** 2
         else:
             poses = (drive.frames.at(*at) + offset).reshape(twists.shape)
             found = np.array(cost.rates(poses, twists), dtype=np.float64)
-        if cost.per == "metre":
+        if metres:
             found *= np.sqrt((np.delete(twists, 2, axis=2) ** 2).sum(axis=2))
         return found
 
