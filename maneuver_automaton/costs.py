@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -35,7 +35,7 @@ class StageCost(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
     """Prices of effort, norm of the control and time per second, of length and of switches.
 
@@ -51,11 +51,14 @@ class Cost:
     effort: float = 0.0  # c1
     norm: float = 0.0  # c2
     time: float = 0.0  # c3 [1/s]
-    effort_matrix: Array | None = None  # R (n_u, n_u), identity if None
+    effort_matrix: Array | None = field(
+        default=None, compare=False
+    )  # R (n_u, n_u), identity if None
     norm_order: float = 2.0  # 1, 2 or inf
     length: float = 0.0  # [1/m]
     switch: float = 0.0  # per switch of trims
     direction_change: float = 0.0  # per change between forward and reverse
+    _matrix: bytes = field(default=b"", init=False, repr=False)  # R, where equality is asked
 
     __repr__ = brief
 
@@ -70,7 +73,9 @@ class Cost:
         if self.norm_order not in NORM_ORDERS:
             raise ValueError(f"cost: norm_order must be 1, 2 or inf, got {self.norm_order}")
         if self.effort_matrix is not None:
-            object.__setattr__(self, "effort_matrix", _positive_definite(self.effort_matrix))
+            weight = _positive_definite(self.effort_matrix)
+            object.__setattr__(self, "effort_matrix", weight)
+            object.__setattr__(self, "_matrix", weight.tobytes())
 
     def terms(self) -> Cost:
         """The weights that it is the sum of: itself."""

@@ -14,8 +14,23 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import inner_kernel, kernel
+from maneuver_automaton.audit._kernels_edges import (
+    crosses,
+    meeting,
+    path_apart,
+    point_apart,
+    turns_about,
+)
+from maneuver_automaton.audit.arrays import (
+    FIRST_WITHIN,
+    FURTHER,
+    SPARE,
+    BodyOutline,
+    EdgeBoxes,
+    Outline,
+    Spans,
+)
 
-LEAST = 1e-300  # a squared length that is none
 ROUNDING = 1e-14  # relative to the coordinates: what a distance may be off
 HALVINGS = 32  # of a stretch at most
 MOST = 200_000  # halvings in all; with more, what is known is reported
@@ -30,14 +45,6 @@ class Ways(NamedTuple):
     bend: Array  # (e,) [m/s^2] how fast the velocity changes
     swerve: Array  # (e,) [1/s^2] what is added for each metre from the origin
     offset: complex  # [m] from the origin of the edges to that of the frames
-
-
-class Sides(NamedTuple):
-    """Edges of a body in its frame, or of obstacles."""
-
-    begins: NDArray[np.complex128]  # (n,) [m]
-    ends: NDArray[np.complex128]  # (n,) [m]
-    radius: Array  # (n,) [m]
 
 
 class Found(NamedTuple):
@@ -74,43 +81,9 @@ def _place(ways: Ways, element: int, share: float) -> tuple[complex, complex]:
 
 
 @inner_kernel
-def _apart(point: complex, a: complex, b: complex) -> float:
-    """Squared distance of a point to the segment from a to b."""
-    x, y = b.real - a.real, b.imag - a.imag
-    u, v = point.real - a.real, point.imag - a.imag
-    share = (u * x + v * y) / max(x * x + y * y, LEAST)
-    share = min(max(share, 0.0), 1.0)
-    u, v = u - share * x, v - share * y
-    return u * u + v * v
-
-
-@inner_kernel
-def _side(a: complex, b: complex, point: complex) -> float:
-    return (b.real - a.real) * (point.imag - a.imag) - (b.imag - a.imag) * (point.real - a.real)
-
-
-@inner_kernel
-def _path_apart(p: complex, q: complex, a: complex, b: complex) -> tuple[float, float, float]:
-    """Squared distances to the segment from a to b: of the chord from p to q, of p, and of q."""
-    first, last = _apart(p, a, b), _apart(q, a, b)
-    ends = min(first, last)
-    least = min(ends, min(_apart(a, p, q), _apart(b, p, q)))
-    x, y = q.real - p.real, q.imag - p.imag
-    # Where they cross, an end of the path is within half of its length from the edge.
-    if (
-        ends <= 0.25 * (x * x + y * y)
-        and _side(p, q, a) * _side(p, q, b) < 0.0
-        and _side(a, b, p) * _side(a, b, q) < 0.0
-    ):
-        least = 0.0
-    return least, first, last
-
-
-@inner_kernel
 def _near(
     ways: Ways,
-    body: Sides,
-    reach: Array,
+    body: BodyOutline,
     a: complex,
     b: complex,
     radius: float,
@@ -129,16 +102,16 @@ def _near(
     seen, seen_then = (a - place) * turn.conjugate(), (a - then) * turned.conjugate()
     # How far the end of the edge is from the body's frame at most, on the way.
     away = 0.5 * (abs(seen) + abs(seen_then) + ways.speed[element] * lasting)
-    for k in range(body.begins.size):
-        round_ = radius + body.radius[k]
-        own, after = body.begins[k], body.ends[k]
+    for k in range(body.edges.begins.size):
+        round_ = radius + body.edges.radius[k]
+        own, after = body.edges.begins[k], body.edges.ends[k]
         # The path of a corner of the body past the edge, that of an end of the edge past a side.
         for which in range(2):
             if which == 0:
-                near = _path_apart(place + turn * own, then + turned * own, a, b)
-                leaves = off + off_by_reach * reach[k]
+                near = path_apart(place + turn * own, then + turned * own, a, b)
+                leaves = off + off_by_reach * body.reach[k]
             else:
-                near = _path_apart(seen, seen_then, own, after)
+                near = path_apart(seen, seen_then, own, after)
                 leaves = off + off_by_reach * away
             straight = math.sqrt(near[0]) - round_
             chord, least = min(chord, straight), min(least, straight - leaves)
@@ -156,36 +129,26 @@ def _sharp(measured: float) -> float:
     return measured - max(1e-3, 0.01 * measured)
 
 
-@kernel
-def nearest_still(
+@inner_kernel
+def _nearest(
     ways: Ways,
-    body: Sides,
-    reach: Array,
-    middle: complex,
-    size: float,
-    edges: Sides,
-    element: IntArray,
-    begin: Array,
-    end: Array,
+    body: BodyOutline,
+    edges: Outline,
+    spans: Spans,
+    place: NDArray[np.complex128],
+    turn: NDArray[np.complex128],
     span: IntArray,
     edge: IntArray,
     doubt: float,
     enough: float,
     contact: float,
 ) -> Found:
-    """The least clearance over pairs of stretches and edges.
+    """The least clearance over pairs of stretches and edges, by number.
 
-    ``element``, ``begin`` and ``end`` are those of the stretches, as shares; ``span`` and ``edge``
-    the pairs. A disc of radius `size` [m] around `middle` holds the body, whose corners are at
-    distances `reach` (n,) from its frame. ``doubt`` [m] is taken off all bounds, ``enough`` is the
-    clearance that decides, and what is nearer than ``contact`` touches.
+    Places (2, s) and directions of the body are those as stretches begin and end.
     """
-    stretches = element.size
-    place = np.empty((2, stretches), dtype=np.complex128)
-    turn = np.empty((2, stretches), dtype=np.complex128)
-    for s in range(stretches):
-        place[0, s], turn[0, s] = _place(ways, element[s], begin[s])
-        place[1, s], turn[1, s] = _place(ways, element[s], end[s])
+    element, begin, end = spans.element, spans.begin, spans.end
+    middle = body.middle
     # From discs around the body: the pair that may be the nearest comes first.
     away = np.empty(span.size)
     for k in range(span.size):
@@ -195,8 +158,8 @@ def nearest_still(
         first, last = place[0, s] + turn[0, s] * middle, place[1, s] + turn[1, s] * middle
         off = eighth * (ways.bend[element[s]] + ways.swerve[element[s]] * abs(middle))
         half = 0.5 * (first + last)
-        apart = math.sqrt(_apart(half, edges.begins[j], edges.ends[j])) - edges.radius[j]
-        away[k] = apart - 0.5 * abs(last - first) - size - off - doubt
+        apart = math.sqrt(point_apart(half, edges.begins[j], edges.ends[j])) - edges.radius[j]
+        away[k] = apart - 0.5 * abs(last - first) - body.size - off - doubt
     floor, measured = math.inf, math.inf
     where, share, halvings = 0, 0.0, 0
     # Stretches that are halved later: where each ends, and how often it was halved.
@@ -218,7 +181,7 @@ def nearest_still(
             top = waiting - 1
             lasting = (ends[top] - now) * ways.lengths[here]
             near = _near(
-                ways, body, reach, a, b, radius, here, lasting,
+                ways, body, a, b, radius, here, lasting,
                 at, towards, places[top], turns[top], doubt,
             )  # fmt: skip
             if near.chord <= 0.0:
@@ -245,3 +208,117 @@ def nearest_still(
                 now, at, towards = ends[top], places[top], turns[top]
                 waiting -= 1
     return Found(min(floor, measured), measured, where, share, False)
+
+
+@inner_kernel
+def _overlaps(
+    body: BodyOutline, place: complex, turn: complex, edges: Outline, index: EdgeBoxes
+) -> bool:
+    """Whether a body overlaps the solid of an edge: they cross, or one holds the other."""
+    found = np.empty(index.number.size, dtype=np.int64)
+    middle, back, own = place + turn * body.middle, turn.conjugate(), body.edges
+    x, y, reach = middle.real, middle.imag, body.size
+    for n in range(meeting(index, x - reach, y - reach, x + reach, y + reach, found)):
+        edge = found[n]
+        a, b = (edges.begins[edge] - place) * back, (edges.ends[edge] - place) * back
+        turns = 0
+        for k in range(own.begins.size):
+            if k > 0 and own.solid[k] != own.solid[k - 1]:
+                turns = 0
+            turns += turns_about(own, k, a)
+            last = k + 1 == own.begins.size or own.solid[k + 1] != own.solid[k]
+            if (last and turns != 0) or crosses(a, b, own.begins[k], own.ends[k]):
+                return True
+    around = np.zeros(edges.solid[-1] + 1, dtype=np.int64)
+    for first in body.firsts:
+        point = place + turn * first
+        # What holds a point has an edge to its right.
+        count = meeting(index, point.real, point.imag, math.inf, point.imag, found)
+        around[:] = 0
+        for n in range(count):
+            around[edges.solid[found[n]]] += turns_about(edges, found[n], point)
+        if around.any():
+            return True
+    return False
+
+
+@inner_kernel
+def _grow(box: Array, point: complex, pad: float) -> None:
+    """Have a box hold all points that are no further from a point along each axis."""
+    box[0], box[1] = min(box[0], point.real - pad), min(box[1], point.imag - pad)
+    box[2], box[3] = max(box[2], point.real + pad), max(box[3], point.imag + pad)
+
+
+@kernel
+def nearest_still(
+    ways: Ways,
+    body: BodyOutline,
+    edges: Outline,
+    index: EdgeBoxes,
+    spans: Spans,
+    doubt: float,
+    enough: float,
+    contact: float,
+) -> Found:
+    """The least clearance of a body over stretches of time to edges, of which there is one.
+
+    ``doubt`` [m] is taken off all bounds, ``enough`` is the clearance that decides, and what is
+    nearer than ``contact`` touches.
+    """
+    stretches = spans.element.size
+    place = np.empty((2, stretches), dtype=np.complex128)
+    turn = np.empty((2, stretches), dtype=np.complex128)
+    # Boxes around the corners at both ends, and along the axes of the body as a stretch begins.
+    boxes, own = np.empty((stretches, 4)), np.empty((stretches, 4))
+    boxes[:, :2], own[:, :2] = math.inf, math.inf
+    boxes[:, 2:], own[:, 2:] = -math.inf, -math.inf
+    for s in range(stretches):
+        element = spans.element[s]
+        place[0, s], turn[0, s] = _place(ways, element, spans.begin[s])
+        place[1, s], turn[1, s] = _place(ways, element, spans.end[s])
+        back = turn[0, s].conjugate()
+        lasting = (spans.end[s] - spans.begin[s]) * ways.lengths[element]
+        leaves = 0.125 * lasting * lasting
+        leaves *= ways.bend[element] + ways.swerve[element] * body.most_reach
+        pad = body.radius + SPARE + leaves
+        for k in range(2):
+            for corner in body.edges.begins:
+                at = place[k, s] + turn[k, s] * corner
+                _grow(boxes[s], at, pad)
+                _grow(own[s], (at - place[0, s]) * back, pad)
+    if _overlaps(body, place[0, 0], turn[0, 0], edges, index):
+        return Found(0.0, 0.0, 0, 0.0, True)
+    # Further and further away, until a distance is measured within which none is left out.
+    met = np.empty(index.number.size, dtype=np.int64)
+    within = FIRST_WITHIN * body.size + SPARE
+    while within < math.inf:
+        span, edge = [0][:0], [0][:0]
+        for s in range(stretches):
+            box, seen = boxes[s], own[s]
+            count = meeting(
+                index, box[0] - within, box[1] - within, box[2] + within, box[3] + within, met
+            )
+            back = turn[0, s].conjugate()
+            for n in range(count):
+                a = (edges.begins[met[n]] - place[0, s]) * back
+                b = (edges.ends[met[n]] - place[0, s]) * back
+                far = edges.radius[met[n]] + within
+                if (
+                    max(a.real, b.real) + far >= seen[0]
+                    and max(a.imag, b.imag) + far >= seen[1]
+                    and min(a.real, b.real) - far <= seen[2]
+                    and min(a.imag, b.imag) - far <= seen[3]
+                ):
+                    span.append(s)
+                    edge.append(met[n])
+        if len(edge) == 0:
+            within *= FURTHER
+            continue
+        found = _nearest(
+            ways, body, edges, spans, place, turn,
+            np.array(span), np.array(edge), doubt, enough, contact,
+        )  # fmt: skip
+        if found.touches or found.measured <= within:
+            return found
+        within = found.measured
+    return Found(0.0, 0.0, 0, 0.0, True)

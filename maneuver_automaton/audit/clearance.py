@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton.audit._kernels_still import Found, Sides, Ways, nearest_still
-from maneuver_automaton.audit.frames import Spans
+from maneuver_automaton.audit._kernels_still import Found, Ways, nearest_still
+from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.outlines import Surroundings
-from maneuver_automaton.audit.pairs import StillEdges, bounded, moving_pairs, on_arcs, overlapped
+from maneuver_automaton.audit.pairs import StillEdges, moving_pairs, on_arcs, overlapped
 from maneuver_automaton.audit.passages import (
     AuditedBody,
     ClearanceBounds,
@@ -58,21 +57,21 @@ def least_clearance(
     """The least clearance of a body over stretches of time."""
     if not around.owners.size or not spans.element.size:
         return NEVER
-    places, least = places_of(body, spans), NEVER
-    if overlapped(body, around, places) >= 0:
-        start = float(body.frames.times_at(spans.element[:1], spans.begin[:1])[0])
-        return Least(0.0, 0.0, start)
-    if around.still.size:
+    found, least = None, NEVER
+    if around.still.size and not body.in_space:
         ask()
-        edges = StillEdges.near(body, around, places)
-        found = None if body.in_space else edges.nearest(partial(_compiled, body, around, enough))
-        if found is None or found.touches:
-            pairs, known = edges.nearest(partial(bounded, body, around))
-            least = _sharpened(body, around, pairs, known, least, enough, ask)
-        else:
-            element, share = np.array([found.element]), np.array([found.share])
-            time = float(body.frames.times_at(element, share)[0])
-            least = Least(found.distance, found.measured, time)
+        found = _compiled(body, around, spans, enough)
+        if not found.touches:
+            least = _at(body, found.distance, found.measured, found.element, found.share)
+            if not around.movers.motions:
+                return least
+    places = places_of(body, spans)
+    if overlapped(body, around, places) >= 0:
+        return _at(body, 0.0, 0.0, int(spans.element[0]), float(spans.begin[0]))
+    if around.still.size and (found is None or found.touches):
+        ask()
+        pairs, known = StillEdges.near(body, around, places).nearest()
+        least = _sharpened(body, around, pairs, known, least, enough, ask)
     for nearest, some in moving_pairs(body, around, places, least.measured):
         if not nearest < least.measured:
             break
@@ -82,33 +81,19 @@ def least_clearance(
     return least._replace(distance=max(least.distance, 0.0))
 
 
-def _compiled(
-    body: AuditedBody, around: Surroundings, enough: float, pairs: EdgePairs
-) -> tuple[float, Found]:
-    """The least distance measured [m] over pairs in the plane, and what is known of it."""
-    outline, frames, edges, spans = body.outline, body.frames, around.outline, pairs.places.spans
-    found = nearest_still(
-        Ways(
-            frames.series,
-            np.diff(frames.times),
-            frames.speed,
-            frames.bend,
-            frames.swerve,
-            body.offset,
-        ),
-        Sides(*outline.edges[:3]),
-        outline.reach,
-        outline.middle,
-        outline.size,
-        Sides(*edges[:3]),
-        *spans,
-        pairs.span,
-        pairs.edge,
-        body.doubt * (1.0 + outline.most_reach),
-        enough,
-        CONTACT,
-    )
-    return -math.inf if found.touches else found.measured, found
+def _at(body: AuditedBody, distance: float, measured: float, element: int, share: float) -> Least:
+    """What was found at a share of an element."""
+    time = body.frames.times_at(np.array([element]), np.array([share]))
+    return Least(distance, measured, float(time[0]))
+
+
+def _compiled(body: AuditedBody, around: Surroundings, spans: Spans, enough: float) -> Found:
+    """The least clearance to still edges in the plane."""
+    outline, frames = body.outline, body.frames
+    lengths = np.diff(frames.times)
+    ways = Ways(frames.series, lengths, frames.speed, frames.bend, frames.swerve, body.offset)
+    doubt = body.doubt * (1.0 + outline.most_reach)
+    return nearest_still(ways, outline, around.outline, around.index, spans, doubt, enough, CONTACT)
 
 
 def _sharpened(

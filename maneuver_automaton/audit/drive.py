@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.frames import (
     INTEGRAL,
     SERIES,
@@ -21,7 +22,6 @@ from maneuver_automaton.audit.frames import (
     TO_NODES,
     FrameMotion,
     N,
-    Spans,
     frames_along,
     frames_through,
     placed,
@@ -67,14 +67,14 @@ class DrivenPlan:
 
     def twists_at(self, elements: IntArray, shares: Array) -> Array:
         """Twists (m, dof) at shares of elements, (m,) each."""
-        return values_at(SERIES @ self.twists[elements], shares)
+        return values_at((SERIES @ self.twists)[elements], shares)
 
     def may_stand(self, elements: IntArray, shares: Array) -> NDArray[np.bool_]:
         """Whether (m,) no control, if there may be none, is a rest at shares of elements."""
         low, high = self.model.control_limits.T
         if (low > 0.0).any() or (high < 0.0).any():
             return np.zeros(shares.shape, dtype=np.bool_)
-        states = values_at(SERIES @ self.states[elements], shares)
+        states = values_at((SERIES @ self.states)[elements], shares)
         none = np.zeros((shares.size, low.size))
         return np.asarray(np.abs(self.model.body_velocity(states, none)).max(axis=1) == 0.0)
 

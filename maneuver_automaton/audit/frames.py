@@ -3,24 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial.legendre import leg2poly, leggauss, legvander
 
 from maneuver_automaton._arrays import Array, IntArray
-
-
-class Spans(NamedTuple):
-    """Stretches of time, in order, each within an element."""
-
-    element: IntArray  # (m,)
-    begin: Array  # (m,) share of the element
-    end: Array  # (m,)
-
-    def of(self, rows: Any) -> Spans:
-        """Some of them, by number, slice or truth."""
-        return Spans(self.element[rows], self.begin[rows], self.end[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

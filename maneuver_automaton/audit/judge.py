@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, wrapped
 from maneuver_automaton._kept import kept_by_first
+from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.clearance import CONTACT, NEVER, Least, least_clearance
 from maneuver_automaton.audit.drive import DrivenPlan, driven
-from maneuver_automaton.audit.frames import FrameMotion, Spans
+from maneuver_automaton.audit.frames import FrameMotion
 from maneuver_automaton.audit.outlines import (
     Surroundings,
     body_outline,
@@ -27,7 +28,7 @@ from maneuver_automaton.audit.outlines import (
 )
 from maneuver_automaton.audit.pairs import instant, overlapped, spans_within
 from maneuver_automaton.audit.passages import AuditedBody, EdgePairs, bounds_of
-from maneuver_automaton.audit.places import AGREED, MovingShapes, price_again
+from maneuver_automaton.audit.places import AGREED, price_again
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.shapes import AnyObstacle, Obstacle, Shape, name_of
 from maneuver_automaton.collision.zones import Zone
@@ -204,22 +205,11 @@ def audit_plan(
     prices: list[float] = []
     if places is not None and places.costs:
         ask()
-        moving = [MovingShapes(drive.frames, footprint)]
-        moving += [MovingShapes(drive.part(name), shapes) for name, shapes in (parts or {}).items()]
         offset = np.array(goal.pose)
         offset[2] = 0.0
+        known = {"bodies": list(bodies.values()), "around": around(obstacles, origin)}
         for cost, stated in zip(places.costs, places.prices, strict=True):
-            prices.append(
-                price_again(
-                    cost,
-                    drive,
-                    offset,
-                    bodies=moving,
-                    obstacles=obstacles,
-                    body_height=body_height,
-                    whole=places.whole,
-                )
-            )
+            prices.append(price_again(cost, drive, offset, **known, whole=places.whole))
             if not abs(prices[-1] - stated) <= AGREED * places.whole:
                 what = type(cost).__name__
                 reasons.append(f"{what} costs {prices[-1]:.6g}, not {stated:.6g} as stated")

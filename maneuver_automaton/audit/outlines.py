@@ -6,12 +6,14 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton.audit._kernels_edges import edges_near
+from maneuver_automaton.audit.arrays import BLOCK, BodyOutline, EdgeBoxes, Outline, Points
 from maneuver_automaton.audit.frames import placed
 from maneuver_automaton.collision.motion import Knots, Motion
 from maneuver_automaton.collision.shapes import (
@@ -25,59 +27,6 @@ from maneuver_automaton.collision.shapes import (
 )
 
 LOST = 1e-9  # share of an area, that a union may lose
-
-
-class Outline(NamedTuple):
-    """Edges of rings; a disc is an edge without length that has a radius."""
-
-    begins: Points  # (n,) [m], which are all corners
-    ends: Points  # (n,) [m]
-    radius: Array  # (n,) [m]
-    solid: IntArray  # (n,) which solid each edge bounds, in order; holes bound theirs too
-
-    def of(self, kept: NDArray[np.bool_] | IntArray) -> Outline:
-        """Some of its edges, in order, their solids numbered anew."""
-        solid = np.unique(self.solid[kept], return_inverse=True)[1]
-        return Outline(self.begins[kept], self.ends[kept], self.radius[kept], solid)
-
-    def at(self, rows: IntArray) -> Outline:
-        """Some of its edges, in any order, each with the number of its solid."""
-        return Outline(self.begins[rows], self.ends[rows], self.radius[rows], self.solid[rows])
-
-    @property
-    def firsts(self) -> IntArray:
-        """Numbers of the first edges of the solids."""
-        return np.flatnonzero(np.diff(self.solid, prepend=-1))
-
-    def turns_about(self, points: Points) -> IntArray:
-        """By how many turns each edge takes part in running around points (m,): (n, m)."""
-        a, b = self.begins[:, None], self.ends[:, None]
-        rises = (b.imag > points.imag).astype(np.int64) - (a.imag > points.imag)
-        to = points - a
-        turns = rises * (((b - a).conj() * to).imag * rises > 0.0)
-        if self.radius.any():
-            round_ = self.radius[:, None]
-            turns += (round_ > 0.0) & (np.abs(to) <= round_)
-        return turns
-
-    def holds(self, points: Points) -> Any:
-        """Whether points (m,) are in each solid (s, m): the rings run around them."""
-        if not self.radius.size:
-            return np.zeros((0, points.size), dtype=np.bool_)
-        return np.asarray(np.add.reduceat(self.turns_about(points), self.firsts, axis=0) != 0)
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class BodyOutline:
-    """The outline of a body, and how far it reaches."""
-
-    edges: Outline
-    firsts: Points  # (s,) a corner of each solid
-    reach: Array  # (n,) [m] from the frame to each corner
-    most_reach: float  # [m]
-    radius: float  # [m] the greatest
-    middle: complex  # of the box around the corners
-    size: float  # [m] radius of a disc around the middle that holds the body
 
 
 def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)) -> Outline:
@@ -154,8 +103,9 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
         seen = np.zeros((numbers.size, 4, 3))
         seen[..., :2] = [[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]]
         seen[..., :2] *= np.array([one.size for _, one in boxes])[:, None]
-        frames = np.array([[*one.center, one.heading] for _, one in boxes])
-        frames[:, :2] -= origins[numbers]
+        frames = np.zeros((numbers.size, 3))
+        frames[:, :2] = np.array([one.center for _, one in boxes]) - origins[numbers]
+        frames[:, 2] = [one.heading for _, one in boxes]
         corners = points_of(placed(frames[:, None], seen))
         following = np.roll(corners, -1, axis=1)
         found.append(
@@ -247,9 +197,6 @@ def _faces(ring: Array) -> Any:
     return whole
 
 
-Points: TypeAlias = NDArray[np.complex128]
-"""Points x + i y [m]; those of one call have shapes that broadcast."""
-
 LEAST = 1e-300  # a squared length that is none
 
 
@@ -330,8 +277,7 @@ class Surroundings:
     motion_of_edge: IntArray  # (n,) which motion an edge has; -1 if it is static
     movers: MovingEdges
     still: IntArray  # (k,) numbers of the static edges
-    tree: Any  # STRtree of these
-    right: float  # [m] no edge is further to the right
+    index: EdgeBoxes  # of these
     rounds: bool  # whether any edge has a radius
 
     def near(self, boxes: Array) -> tuple[IntArray, IntArray]:
@@ -339,10 +285,7 @@ class Surroundings:
 
         Of what has a height, and so may be flown over, all edges if one of them does.
         """
-        import shapely
-
-        which, edges = self.tree.query(shapely.box(*boxes.T))
-        return which, self.still[edges]
+        return edges_near(self.index, np.ascontiguousarray(boxes))
 
 
 def origin_of(place: ArrayLike) -> tuple[float, float]:
@@ -375,8 +318,6 @@ def surroundings_around(
     ValueError
         If a polygon has no area.
     """
-    import shapely
-
     motions: list[Motion] = []
     present: list[tuple[float, float]] = []
     heights = np.tile([-math.inf, math.inf], (len(obstacles), 1))
@@ -415,27 +356,30 @@ def surroundings_around(
         motion_of_edge=index,
         movers=movers,
         still=still,
-        tree=shapely.STRtree(_geometries(whole, still, heights_of)),
+        index=_boxed(whole, still, heights_of),
         rounds=bool(whole.radius.any()),
-        right=float((whole.begins.real + whole.radius).max(initial=0.0)),
     )
 
 
-def _geometries(outline: Outline, still: IntArray, heights: Array) -> Any:
-    """What the tree holds: edges, boxes around discs, and around solids that have a height."""
-    import shapely
-
+def _boxed(outline: Outline, still: IntArray, heights: Array) -> EdgeBoxes:
+    """Boxes around still edges; around whole solids where these have a height."""
     both = np.stack([outline.begins[still], outline.ends[still]], axis=1)
     ends, radius = both.view(np.float64).reshape(-1, 2, 2), outline.radius[still, None]
-    edges = shapely.linestrings(ends)
     low, high = ends.min(axis=1) - radius, ends.max(axis=1) + radius
-    solids = int(outline.solid.max(initial=-1)) + 1
-    least, most = np.full((solids, 2), math.inf), np.full((solids, 2), -math.inf)
-    np.minimum.at(least, outline.solid[still], low)
-    np.maximum.at(most, outline.solid[still], high)
     whole = np.isfinite(heights[still, :1])
-    low = np.where(whole, least[outline.solid[still]], low)
-    high = np.where(whole, most[outline.solid[still]], high)
-    boxed = np.flatnonzero(whole | (radius > 0.0))
-    edges[boxed] = shapely.box(*low[boxed].T, *high[boxed].T)
-    return edges
+    if whole.any():
+        solid, solids = outline.solid[still], int(outline.solid.max()) + 1
+        least, most = np.full((solids, 2), math.inf), np.full((solids, 2), -math.inf)
+        np.minimum.at(least, solid, low)
+        np.maximum.at(most, solid, high)
+        low, high = np.where(whole, least[solid], low), np.where(whole, most[solid], high)
+    # In columns of as many edges, and upwards within each.
+    x, y = (low + high).T
+    n, ranks = still.size, np.empty(still.size, dtype=np.int64)
+    ranks[np.argsort(x)] = np.arange(n)
+    order = np.lexsort((y, ranks * math.ceil(math.sqrt(n / BLOCK)) // max(n, 1)))
+    low, high, firsts = low[order], high[order], np.arange(0, n, BLOCK)
+    blocks = np.minimum.reduceat(low, firsts), np.maximum.reduceat(high, firsts)
+    return EdgeBoxes(
+        still[order], np.concatenate([low, high], axis=1), np.concatenate(blocks, axis=1)
+    )

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.frames import Spans
+from maneuver_automaton.audit.arrays import FIRST_WITHIN, FURTHER, SPARE, Outline, Points, Spans
 from maneuver_automaton.audit.outlines import (
-    Outline,
-    Points,
     Surroundings,
     crossed,
     directions,
@@ -30,13 +29,8 @@ from maneuver_automaton.audit.passages import (
     places_of,
 )
 
-T = TypeVar("T")
-
 CHORD = 0.25  # [rad] of the first stretches
 LONGEST = 64.0  # of which the path of a small body has so many
-SPARE = 1e-6  # [m] that nothing is left out for rounding
-FIRST_WITHIN = 0.1  # of the body's size: how far around it edges are looked for first
-FURTHER = 4.0  # times as far, if there is none
 NEAREST = 64  # pairs that are looked at first
 MANY = 256  # pairs at least, of which those that are far are left out first
 
@@ -109,7 +103,7 @@ def _overlapped_still(body: AuditedBody, around: Surroundings, here: _Here) -> i
     boxes = [(x.min() - radius, y.min() - radius, x.max() + radius, y.max() + radius)]
     # What holds a point has an edge to its right.
     firsts = here.firsts.tolist()
-    boxes += [(at.real, at.imag, max(around.right, at.real), at.imag) for at in firsts]
+    boxes += [(at.real, at.imag, math.inf, at.imag) for at in firsts]
     which, still = around.near(np.array(boxes))
     if body.in_space:
         tall = ~np.isfinite(around.heights[still]).all(axis=1)
@@ -181,32 +175,25 @@ class StillEdges:
         kept = _meets(self.around, self.places, self.own_boxes.grown(pad), span, edge)
         return EdgePairs(self.places, span[kept], edge[kept], None)
 
-    def nearest(self, measured: Callable[[EdgePairs], tuple[float, T]]) -> T:
-        """What is known of pairs among which the nearest of all is.
+    def nearest(self) -> tuple[EdgePairs, ClearanceBounds]:
+        """Pairs among which the nearest of all is, with bounds.
 
-        They are looked for further and further away, until a distance is `measured` [m] within
-        which none is left out.
+        They are looked for further and further away, until a distance is measured within which none
+        is left out.
         """
-        within = FIRST_WITHIN * self.body.outline.size + SPARE
+        body, around = self.body, self.around
+        within = FIRST_WITHIN * body.outline.size + SPARE
         while True:
             pairs = self.within(within)
             if not pairs.edge.size:
                 within *= FURTHER
                 continue
-            nearest, known = measured(pairs)
-            if nearest <= within:
-                return known
+            if pairs.edge.size > MANY:
+                pairs = _nearest_pairs(body, around, pairs)
+            known = bounds_of(body, around, pairs)
+            if (nearest := float(known.measured.min())) <= within:
+                return pairs, known
             within = nearest
-
-
-def bounded(
-    body: AuditedBody, around: Surroundings, pairs: EdgePairs
-) -> tuple[float, tuple[EdgePairs, ClearanceBounds]]:
-    """The least distance measured [m], and those pairs that may be the nearest, with bounds."""
-    if pairs.edge.size > MANY:
-        pairs = _nearest_pairs(body, around, pairs)
-    known = bounds_of(body, around, pairs)
-    return float(known.measured.min()), (pairs, known)
 
 
 def _nearest_pairs(body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> EdgePairs:

@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.audit.frames import FrameMotion, Spans
+from maneuver_automaton.audit.arrays import BodyOutline, Points, Spans
+from maneuver_automaton.audit.frames import FrameMotion
 from maneuver_automaton.audit.outlines import (
-    BodyOutline,
-    Points,
     Surroundings,
     crossed,
     directions,

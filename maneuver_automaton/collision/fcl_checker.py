@@ -24,7 +24,7 @@ from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
     Disc,
-    OccupancyMap,
+    Polygon,
     Shape,
     box_corners,
 )
@@ -50,6 +50,7 @@ from maneuver_automaton.collision.swept import (
 from maneuver_automaton.groups import SE2
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
+ROUNDED = 1e-7  # of the length of a coast, by which its box may be off
 GRID = 65536.0  # [m] between the origins of neighbourhoods: far enough to share, near enough to see
 _ONE_AT_A_TIME = threading.Lock()  # objects are shared, and moved before they are asked
 
@@ -120,10 +121,9 @@ class FclChecker:
         lasting = as_array("durations", durations)
         if lasting.size and not lasting.min() >= 0.0:
             raise ValueError(f"durations: got {lasting.min()} s, need at least 0")
-        with np.errstate(divide="ignore", over="ignore"):
-            across = np.minimum(lasting, 2.0 / np.abs(twists[:, 2]))  # of a circle
-        far = (np.hypot(twists[:, 0], twists[:, 1]) * across)[:, None]
-        laid = self._laid_near(here[:, :2] - far, here[:, :2] + far)
+        laid = self._ground.laid
+        if not laid.rows.all():
+            laid = self._laid_near(*_coasted_within(here, twists, lasting))
         return self._first_hit(here, twists, lasting, laid, ask)
 
     def courses_hit(
@@ -224,10 +224,8 @@ class FclChecker:
         speeds = point_speeds(twists, np.concatenate(self._body.pieces)).max(axis=1)
         moving = speeds * durations > STANDING
         first = self._first_pose_hit(starts, np.flatnonzero(~moving), laid)
-        turning = np.abs(twists[:, 2])
-        with np.errstate(divide="ignore", over="ignore"):
-            once = 2.0 * math.pi / turning  # then it is where it began
-        parts = windows(turning, np.where(moving, np.minimum(durations, once), 0.0))
+        lasting = np.where(moving, _once_round(twists[:, 2], durations), 0.0)
+        parts = windows(twists[:, 2], lasting)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
         kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
@@ -245,9 +243,10 @@ class FclChecker:
             if not hits:
                 break
             for row, triangle in hits.items():  # in order: the first is the first coast's
-                if solids[row].excess <= 0.5 * self.proven and _is_sooner(of[row], first):
+                if solids[row].excess <= 0.5 * self.proven and (not first or of[row] < first[0]):
                     first = int(of[row]), int(laid.owners[triangle])
-            rows = np.array([row for row in hits if _is_sooner(of[row], first)], dtype=np.int64)
+            sooner = [row for row in hits if not first or of[row] < first[0]]
+            rows = np.array(sooner, dtype=np.int64)
             hit = self._first_pose_hit(middles, rows, laid)
             if hit is not None:
                 first = int(of[hit[0]]), hit[1]
@@ -325,17 +324,14 @@ _BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).t
 def _ground_of(
     obstacles: tuple[AnyObstacle, ...], origin: tuple[float, float], excess: float
 ) -> _Ground:
-    to_origin = SE2(np.array([-origin[0], -origin[1], 0.0]))
-    static = [
-        (k, one)
-        for k, one in enumerate(obstacles)
-        if isinstance(one, OccupancyMap) or one.motion is None
-    ]
-    seen = tuple(one.moved(to_origin) if any(origin) else one for _, one in static)
+    static = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is None]
+    seen = tuple(obstacles[k] for k in static)
+    if any(origin):
+        seen = tuple(one.moved(SE2([-origin[0], -origin[1], 0.0])) for one in seen)
     nothing = np.zeros(0, dtype=np.int64)
     return _Ground(
         obstacles=seen,
-        numbers=np.array([k for k, _ in static], dtype=np.int64),
+        numbers=np.array(static, dtype=np.int64),
         boxes=_boxes_around(seen),
         excess=excess,
         laid=_Laid(np.zeros(len(seen), dtype=np.bool_), None, nothing),
@@ -352,21 +348,17 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
     boxes = np.zeros((len(obstacles), 4))
     rectangles, polygons = [], []
     for k, one in enumerate(obstacles):
-        if isinstance(one, OccupancyMap):  # wherever it is turned
-            boxes[k] = (
-                *(one.origin[:2] - np.hypot(*one.extent)),
-                *(one.origin[:2] + np.hypot(*one.extent)),
-            )
-        elif isinstance(one.shape, Disc):
-            boxes[k] = (
-                *(one.shape.center - one.shape.radius),
-                *(one.shape.center + one.shape.radius),
-            )
-        elif isinstance(one.shape, Box):
-            rectangles.append((k, one.shape))
-        else:
-            boxes[k] = *one.shape.corners.min(axis=0), *one.shape.corners.max(axis=0)
-            polygons.append(one.shape)
+        shape = getattr(one, "shape", one)
+        if isinstance(shape, Box):
+            rectangles.append((k, shape))
+        elif isinstance(shape, Polygon):
+            boxes[k] = *shape.corners.min(axis=0), *shape.corners.max(axis=0)
+            polygons.append(shape)
+        elif isinstance(shape, Disc):
+            boxes[k] = *(shape.center - shape.radius), *(shape.center + shape.radius)
+        else:  # a map, wherever it is turned
+            far = np.hypot(*shape.extent)
+            boxes[k] = *(shape.origin[:2] - far), *(shape.origin[:2] + far)
     if rectangles:
         corners = box_corners([one for _, one in rectangles])
         ends = [corners.min(axis=1), corners.max(axis=1)]
@@ -406,9 +398,22 @@ def _box_skin(ring: Array) -> Skin:
     return Skin(vertices, _BOX)
 
 
-def _is_sooner(coast: int, hit: tuple[int, int] | None) -> bool:
-    """Whether a coast comes before the one that is hit."""
-    return hit is None or coast < hit[0]
+def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Array, Array]:
+    """Corners (n, 2) of boxes around the places of coasts [m].
+
+    From each place the ways to both ends are together no longer than the coast: an ellipse.
+    """
+    lasting = _once_round(twists[:, 2], durations)[:, None]
+    begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting
+    ends = (SE2(starts) @ SE2.exp(lasting * twists)).pose[:, :2]
+    half = np.sqrt(np.maximum(length**2 - (ends - begins)[:, ::-1] ** 2, 0.0)) + ROUNDED * length
+    return 0.5 * (begins + ends - half), 0.5 * (begins + ends + half)
+
+
+def _once_round(turn_rates: Array, durations: Array) -> Array:
+    """How long coasts last (n,) [s] until they are where they began, or end."""
+    with np.errstate(divide="ignore", over="ignore"):
+        return np.asarray(np.minimum(durations, math.tau / np.abs(turn_rates)))
 
 
 def _object(skin: Skin) -> Any:

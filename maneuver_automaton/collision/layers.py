@@ -238,9 +238,11 @@ def layers_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[La
     >>> [layer.high for layer in layers_of((tower, Obstacle(Disc(2.0))), in_space=True)]
     [20.0, inf]
     """
+    if obstacles and not in_space:
+        return (Layer(-math.inf, math.inf, obstacles, tuple(range(len(obstacles)))),)
     groups: dict[tuple[float, float], list[int]] = {}
     for k, obstacle in enumerate(obstacles):
-        height = obstacle.height if in_space and isinstance(obstacle, Obstacle) else None
+        height = obstacle.height if isinstance(obstacle, Obstacle) else None
         groups.setdefault(height or (-np.inf, np.inf), []).append(k)
     return tuple(
         Layer(low, high, tuple(obstacles[k] for k in index), tuple(index))

@@ -148,7 +148,11 @@ class Box:
 def box_corners(boxes: Sequence[Box]) -> Array:
     """Corners (n, 4, 2) of boxes [m], as of each."""
     signs = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
-    frames = np.array([[*one.center, one.heading] for one in boxes])[:, None]
+    frames = np.empty((len(boxes), 1, 3))
+    frames[:, 0, :2], frames[:, 0, 2] = (
+        [one.center for one in boxes],
+        [one.heading for one in boxes],
+    )
     return SE2(frames).act(signs * np.array([one.size for one in boxes])[:, None])
 
 

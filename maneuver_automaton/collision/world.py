@@ -120,7 +120,8 @@ def world_of(
     solids, buckets, field = _static_arrays(static, footprint, frame, keep)
     there = present or tuple(one.presence for one in moving)
     followed = [_moving_of(obstacle) for obstacle in moving]
-    moving_arrays = _moving_obstacles(followed, pose, there, body.reach)
+    where = followed, pose, there, body.reach
+    moving_arrays = _moving_obstacles(*where) if followed else NOTHING_MOVES
     times = np.concatenate([moving_arrays.time, moving_arrays.present.ravel()])
     return World(
         frame=pose,
@@ -346,3 +347,6 @@ def slabs_of(moving: MovingObstacles, reach: float) -> Slabs:
     box = np.empty((2 * leaves * n, 4))
     _kernels_slabs.write_slabs(moving, begin, width, leaves, box)
     return Slabs(begin, width, leaves, 0, box)
+
+
+NOTHING_MOVES = _moving_obstacles([], np.zeros(3), (), 0.0)

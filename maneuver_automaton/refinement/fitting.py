@@ -68,6 +68,7 @@ SHORT = 0.02  # [s] that a trim lasts, unless the horizon says otherwise ...
 COSTLIER = 1e-3  # ... or the plan would become costlier by more than this share of its cost
 CLOSED = 1e-12  # [m, rad, s] that an exact end may miss
 MET = 1e-9  # [m, rad] from a goal, beyond its tolerance, where the checks take it to be met
+BESIDE = 1e-6  # [m, rad] from a goal, per metre to it, where exact times are worth a look
 NONE = 1e-8  # [s, rad] of a coast that is none, or of one that misses a whole turn
 MOST_TRIMS = 40  # of a library, of which every two are tried
 
@@ -168,12 +169,23 @@ def _short_words(
     turns = w != 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
         r = np.where(turns, -1j * v / w, 0.0)  # from the centre of a turn to the pose
-        centres = np.angle((z + r[i] - r[j] * last) / (r[i] - r[j]))  # of two turns decide
-        between = (
-            np.where(turns[j] & (r[i] != r[j]), centres, h) * turns[i]
-        )  # heading at the switch
-        left = z - r[i] * (np.exp(1j * between) - 1.0) - r[j] * (last - np.exp(1j * between))
+        before, after = r[i], r[j]
+        centres = np.angle((z + before - after * last) / (before - after))  # of two turns decide
+        # heading at the switch
+        between = np.where(turns[j] & (before != after), centres, h) * turns[i]
+        switch = np.exp(1j * between)
+        left = z - before * (switch - 1.0) - after * (last - switch)
         first, second = v[i], v[j] * last  # straights, which have to cover what is left
+        straight = np.where(turns[j], first, second)
+        beside = np.abs((left / straight).imag * np.abs(straight))
+        beside = np.where(turns[i] & turns[j], np.abs(left), beside)
+        beside = np.where(turns[i] | turns[j], beside, abs(wrapped(h)))
+        kept = np.flatnonzero(beside <= BESIDE * (1.0 + abs(z)))
+        if not kept.size:
+            return
+        i, j, between, left, first, second = (
+            one[kept] for one in (i, j, between, left, first, second)
+        )
         area = (first.conj() * second).imag
         times = np.array([(left.conj() * second).imag / area, (first.conj() * left).imag / area])
         one = turns[i] | turns[j] | (np.abs(area) <= NONE * np.abs(first * second))
