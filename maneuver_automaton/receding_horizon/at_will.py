@@ -24,7 +24,7 @@ from maneuver_automaton.planning.tracking import (
     stands_free,
     track,
 )
-from maneuver_automaton.problem import Bounds, Goal, Problem
+from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.receding_horizon.candidates import StepPlan, bounded
 from maneuver_automaton.receding_horizon.failsafe import FailSafe
 from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin
@@ -64,6 +64,7 @@ class InFreeSpace(StepSearch):
         found: list[StepPlan] = []
         now.exhaustive = True
         alternatives = PACES if self.settings.retimed else 0
+        searched = self.settings.continuous or bounded(here)
         for index, goal in enumerate(here.goals):
             same_goal = now.last is None or index == now.last.goal_index
             known = kept.plan if kept is not None and same_goal else None
@@ -72,8 +73,8 @@ class InFreeSpace(StepSearch):
                 self._over_budget()
                 break
             cost = kept.cost if kept is not None and same_goal else None
-            if cost is not None and self._is_sole(cost, goal):
-                continue
+            if cost is not None and not searched and cost <= tied(sole_bound(here, goal)):
+                continue  # it is the cheapest, and the only one that is so cheap
             results = search_goal(
                 here,
                 goal,
@@ -87,8 +88,7 @@ class InFreeSpace(StepSearch):
                 seeds=0 if cost is not None and self._goes_on(alternatives) else None,
             )
             proven = any(one.exhaustive for one in results)
-            decisive = not (self.settings.continuous or bounded(here))
-            now.exhaustive = now.exhaustive and proven and decisive
+            now.exhaustive = now.exhaustive and proven and not searched
             if any(one.status is SearchStatus.OUT_OF_BUDGET for one in results):
                 self._over_budget()
             for result in results:
@@ -99,11 +99,6 @@ class InFreeSpace(StepSearch):
                     if self.is_safe(plan):
                         found.append(now.candidate(plan, index, Origin.SEARCHED))
         return found
-
-    def _is_sole(self, cost: float, goal: Goal) -> bool:
-        """Whether a plan of this cost is the cheapest, and the only one that is so cheap."""
-        searched = self.settings.continuous or bounded(self.here)
-        return not searched and cost <= tied(sole_bound(self.here, goal))
 
     def _goes_on(self, alternatives: int) -> bool:
         """Whether insertion begins with the plan that is kept alone.
@@ -278,10 +273,9 @@ class AmongObstacles(StepSearch):
         if found.complete:
             yield found.plan, _evading(found.plan)
         self.tried = [found.plan] if rest is None else [found.plan, rest]
-        if rest is not None:  # a fail-safe trajectory of the last step
-            tail = self.continued(rest, rest.duration)
-            if tail is not None:
-                yield tail, _evading(tail)
+        tail = None if rest is None else self.continued(rest, rest.duration)
+        if tail is not None:  # a fail-safe trajectory of the last step goes on
+            yield tail, _evading(tail)
 
     def ambitions(self) -> Iterator[Plan]:
         """Paths to the goal that may be followed; where nothing moves, the last one alone."""

@@ -22,7 +22,7 @@ from maneuver_automaton.receding_horizon.log import first_part
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, merged
 from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.search._kernels_nodes import EMPTY
-from maneuver_automaton.search.arrays import Scene
+from maneuver_automaton.search.arrays import LatticeArrays, Scene
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 
 CELL = 0.25  # of the search, in turning radii
@@ -87,14 +87,14 @@ def search_fail_safe(
         trims = (problem.automaton.trims[rest],)
         stood = Plan(problem.start, trims, durations=[until - at], start_time=at)
         return FailSafe(plan=stood, free_until=until if free else at, complete=free, expansions=0)
-    library, scene = query.library.arrays, _scene(query)
-    task = _task(query, until)
-    search = _arrays(MOST_NODES)
-    kernels.begin(task, library, scene, search)
-    left = max_expansions
-    while left > 0 and kernels.expand(task, library, scene, search, min(TIMELY, left)):
-        left -= TIMELY
-        if budget.is_over:
+    task, scene = _task(query, until), _scene(query)
+    for library in _libraries(query, task):
+        search = _arrays(MOST_NODES)
+        kernels.begin(task, library, scene, search)
+        left = max_expansions
+        while left > 0 and kernels.expand(task, library, scene, search, min(TIMELY, left)):
+            left = 0 if budget.is_over else left - TIMELY
+        if search.state[kernels.FOUND] >= 0:
             break
     state = search.state
     node = int(state[kernels.BEST])
@@ -119,8 +119,7 @@ def _soonest(problem: Problem, plan: Plan) -> Plan:
         stands = float(plan.durations[-1]) + float(plan.durations[-2]) - half
         sooner = replace(plan, durations=np.append(plan.durations[:-2], [half, stands]))
         pose = sooner.switching_poses[-2]
-        free = stands_free(problem, pose, time=until - stands, duration=stands)
-        if free >= stands:
+        if stands_free(problem, pose, time=until - stands, duration=stands) >= stands:
             plan, most = sooner, half
         else:
             least = half
@@ -138,6 +137,16 @@ def _to_rest(problem: Problem) -> Problem:
     rest = automaton.trims[automaton.rest].name
     goal = replace(problem.goals[0], trim=rest, free_heading=False)
     return replace(problem, goals=(goal,))
+
+
+def _libraries(query: LatticeQuery, task: kernels.FailSafeTask) -> Iterator[LatticeArrays]:
+    """The library; for a vehicle that cannot rest, first one that leads away for short times."""
+    arrays, numbered = query.library.arrays, query.library.arrays.library
+    turns = numbered.twists[:, 2] != 0.0
+    if not task.rests and turns.any():
+        longest = np.where(turns, numbered.longest, np.minimum(numbered.longest, task.longest))
+        yield arrays._replace(library=numbered._replace(longest=longest))
+    yield arrays
 
 
 def _scene(query: LatticeQuery) -> Scene:

@@ -38,6 +38,7 @@ from maneuver_automaton.search.result import TIE, plan_of
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
 WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
 PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
+HEEDLESS_SHARE = 0.5  # of the time they leave, for a path past what stands still
 OTHERS = 3  # costlier words that are tried where the cheapest ones are not free
 NEARER = (NEARLY, 0.8, 0.6, 0.4)  # of a lost plan as far as it is free, where one may stand
 NEARER_SHARE = 0.4  # of the time left for the way there, which takes at most ...
@@ -161,9 +162,7 @@ class OverManeuvers(StepSearch):
 
     def _on_lattice(self) -> StepPlan | None:
         problem = self.onward()
-        if problem is None or problem.has_states:
-            return None
-        return self._best_on_lattice(problem, self.is_safe)
+        return None if problem is None else self._best_on_lattice(problem, self.is_safe)
 
     def _best_on_lattice(
         self, problem: Problem, is_good: Callable[[Plan], bool], *, first: bool = False
@@ -176,7 +175,8 @@ class OverManeuvers(StepSearch):
             return None
         query = lattice_query(problem, goals)
         best: StepPlan | None = None
-        budget = replace(self.for_plans, expansions=problem.search.max_expansions)
+        budget = self.now.budget.part(HEEDLESS_SHARE) if first else self.for_plans
+        budget = replace(budget, expansions=problem.search.max_expansions)
         for word in words_of(query, budget=budget, schedule=WordSchedule()):
             owner = query.goal_index[word.goal]
             for plan in fitted_plans(problem, plan_of_word(query, word), problem.goals[owner]):
@@ -196,12 +196,11 @@ class OverManeuvers(StepSearch):
     def fail_safe(self) -> Iterator[tuple[Plan, Decision]]:
         """Fail-safe trajectories: to go on for a while, to brake, to evade, or the last plan.
 
-        The last plan comes first unless obstacles have changed. The committed part is driven in
-        any case.
+        The last plan comes first unless something moves. The committed part is driven in any case.
         """
         rest, here = self.now.rest, self.here
         yield from self.approaches() if here.moves else self._nearer()
-        motions = [self._braking(), rest] if self.anew else [rest, self._braking()]
+        motions = [self._braking(), rest] if here.moves else [rest, self._braking()]
         kept = [plan for plan in motions if plan is not None and plan.trims]
         self.tried = [*kept]
         for until in (self.until, -math.inf):
@@ -228,8 +227,6 @@ class OverManeuvers(StepSearch):
 
     def heedless(self, static: Problem) -> Plan | None:
         """A plan to the goal of the problem without what moves in it: the lattice's first."""
-        if self.now.budget.is_over:
-            return None
         found = self._best_on_lattice(static, lambda plan: allowed(self.here, plan), first=True)
         return None if found is None else found.plan
 

@@ -300,7 +300,7 @@ class StepSearch:
             yield now.rest
         if onward is None:
             return
-        static = tuple(one for one in onward.obstacles if not moves(one))
+        static = tuple(one for one in self.here.obstacles if not moves(one))
         anyhow = Horizon(max_trims=onward.horizon.max_trims, min_coast=onward.horizon.min_coast)
         onward = replace(onward, obstacles=static, horizon=anyhow)
         if onward.via:  # what is to be passed next comes before the goal

@@ -10,7 +10,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
-from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
+from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, at_will, within
 from maneuver_automaton.receding_horizon.at_will import InFreeSpace
 from maneuver_automaton.receding_horizon.rest_of_plan import missed
 from maneuver_automaton.search import choose
@@ -482,7 +482,7 @@ class TestWordsLeftOut:
 
     @staticmethod
     def searching_all(monkeypatch):
-        monkeypatch.setattr(InFreeSpace, "_is_sole", lambda *_: False)
+        monkeypatch.setattr(at_will, "sole_bound", lambda *_: 0.0)
         monkeypatch.setattr(InFreeSpace, "_driven", lambda *_: None)
 
     @compiled_only

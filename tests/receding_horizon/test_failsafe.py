@@ -91,6 +91,20 @@ def test_what_cannot_stop_is_free_and_inside_for_as_long_as_is_said(bounds, most
     assert_kept_as_said(problem, search_fail_safe(problem, until=40.0, max_expansions=most))
 
 
+@pytest.mark.parametrize("inertia", [False, True])
+def test_what_cannot_stop_circles_and_in_a_lane_goes_straight_on(inertia):
+    states = ((1.0, 0.0), (0.8, 0.8), (0.8, -0.8))
+    ends = {"start_trim": "1, 0", "goal_trim": "1, 0", "automaton": unicycle_automaton(states)}
+    far = Disc(0.5, [20.0, 5.0])
+    problem = with_inertia(far, **ends) if inertia else among(far, robot=cannot_stop())
+    found = search_fail_safe(problem, until=15.0)
+    _, poses = driven(found.plan, np.zeros(2), step_m=0.05, step_rad=0.1)
+    assert found.complete
+    assert np.hypot(*poses[:, :2].T).max() < 3.0
+    lane = Bounds(x=(-9.0, 30.0), y=(-0.4, 0.4))
+    assert search_fail_safe(replace(problem, bounds=lane), until=15.0).complete
+
+
 def assert_kept_as_said(problem, found) -> None:
     """A motion that never stops lasts until it is said to be free, free of all, inside bounds."""
     assert found.plan.start_time + found.plan.duration == pytest.approx(found.free_until)

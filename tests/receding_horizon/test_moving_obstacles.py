@@ -10,7 +10,7 @@ import pytest
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Goal, Horizon
+from maneuver_automaton.problem import Bounds, Goal, Horizon, SearchSettings
 from maneuver_automaton.receding_horizon import (
     Decision,
     Disturbance,
@@ -76,7 +76,8 @@ class TestWaitingAndEvading:
     @pytest.mark.parametrize("side", [(6.0, 6.0)])
     def test_before_a_goal_that_becomes_occupied_it_stops(self, side):
         stays = moving_obstacle([0.0, 5.0], [side, (6.0, 0.0)])
-        loop = simulate(among(stays), step=0.5, steps=20, time_limit=0.1)
+        problem = among(stays, search=SearchSettings(max_expansions=100))
+        loop = simulate(problem, step=0.5, steps=16, time_limit=60.0)
         assert_free(loop)
         away = np.hypot(*(loop.poses[:, :2] - [6.0, 0.0]).T)
         assert away[8:].max() <= away[8] + 1e-9  # on, and never back

@@ -86,19 +86,30 @@ def test_undisturbed_the_first_plan_is_what_it_costs(problem):
 @pytest.mark.parametrize(
     ("automaton", "body", "far"),
     [
-        (unicycle_automaton(), Disc(0.22), 6.0),
+        (unicycle_automaton(), Disc(0.22), 4.0),
         pytest.param(car_automaton(), Box([4.0, 1.8], [1.4, 0.0]), 40.0, marks=pytest.mark.slow),
     ],
     ids=["unicycle", "car"],
 )
-def test_it_comes_near_a_goal_that_becomes_occupied(automaton, body, far):
-    box = Obstacle(Box([0.6, 0.6], [far, 0.0]))
+@pytest.mark.parametrize("comes", [False, True], ids=["appears", "comes"])
+def test_it_comes_near_a_goal_that_becomes_occupied(automaton, body, far, comes):
+    box = Box([0.6, 0.6])
+    there = Motion([0.0, 2.0], [[far, far, 0.0], [far, 0.0, 0.0]])
+    known = {"obstacles": [Obstacle(box, motion=there)]} if comes else {}
+    # one that appears is another value at every step, as from a detector
+    appears = lambda number: [box.moved(SE2([far, 0.0, 0.0]))] if number >= 4 else []  # noqa: E731
     loop = simulate(
-        posed([far, 0.0, 0.0], automaton=automaton, footprint=body),
+        posed(
+            [far, 0.0, 0.0],
+            automaton=automaton,
+            footprint=body,
+            search=SearchSettings(max_expansions=300),
+            **known,
+        ),
         step=0.5,
         steps=60,
-        obstacles=lambda number: [box] if number >= 4 else [],
-        time_limit=20.0,
+        obstacles=None if comes else appears,
+        time_limit=60.0,
     )
     assert "the goal is blocked" in loop.reason
     off = far - loop.poses[:, 0]
