@@ -22,6 +22,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import (
     AnyObstacle,
     AnyShape,
+    Box,
     OccupancyMap,
     Shape,
     as_shapes,
@@ -351,6 +352,16 @@ class Ground:
         return min(SCALE, 0.25 * min(widths))
 
     @property
+    def extent(self) -> tuple[Shape, ...]:
+        """Shapes outside of which nothing costs."""
+        if self.raster is None:
+            return self.areas
+        rows, columns = self.raster.values.shape
+        size = self.raster.resolution * np.array([columns, rows])
+        middle = SE2(self.raster.origin).act(0.5 * size)
+        return (Box(size, middle, heading=float(self.raster.origin[2])),)
+
+    @property
     def isotropic(self) -> bool:
         """Whether the rate is the same for all headings and velocities."""
         return self.raster is None or not self.raster.are_heights
@@ -543,6 +554,12 @@ def least_of(cost: PlaceCost, low: ArrayLike, high: ArrayLike) -> float:
     """A number that no rate is below while x and y [m] are between two corners; 0 if not known."""
     own: Callable[[Any, Any], float] | None = getattr(cost, "least", None)
     return 0.0 if own is None else own(low, high)
+
+
+def extent_of(cost: PlaceCost) -> tuple[Shape, ...]:
+    """Shapes outside of which it is 0; none if the cost does not say."""
+    own: tuple[Shape, ...] = getattr(cost, "extent", ())
+    return own
 
 
 def scale_of(cost: PlaceCost) -> float:

@@ -431,7 +431,7 @@ def as_footprint(value: Any) -> tuple[Shape, ...]:
     """
     shapes = as_shapes("footprint", value)
     for shape in shapes:
-        reach = _reach(shape)
+        reach = reach_of(shape)
         if reach > LARGEST_BODY:
             raise ValueError(
                 f"footprint: reaches {reach:g} m from the pose, need at most {LARGEST_BODY:g} m"
@@ -439,7 +439,7 @@ def as_footprint(value: Any) -> tuple[Shape, ...]:
     return shapes
 
 
-def _reach(shape: Shape) -> float:
+def reach_of(shape: Shape) -> float:
     """Greatest distance [m] of a point of a shape from the origin."""
     if isinstance(shape, Disc):
         return math.hypot(*shape.center) + shape.radius

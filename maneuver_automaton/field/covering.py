@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from typing import Any
@@ -17,23 +17,19 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton.audit import terminal_error
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import joined
-from maneuver_automaton.collision import (
-    Disc,
-    Obstacle,
-    Polygon,
-)
+from maneuver_automaton.collision import Disc, Obstacle, Polygon
 from maneuver_automaton.collision.outline import outlines, united
+from maneuver_automaton.collision.shapes import reach_of
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.field.ordering import cheapest_order, least_order_cost
+from maneuver_automaton.field.ordering import cheapest_order
 from maneuver_automaton.groups import SE2, LieGroup
-from maneuver_automaton.places import moved
-from maneuver_automaton.planning import Planner, PlanResult, PlanStatus, plan_many
+from maneuver_automaton.planning import Planner, PlanResult, PlanStatus
 from maneuver_automaton.planning.checking import check_plan
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.problem import Goal
+from maneuver_automaton.problem import Bounds, Goal
 
 NEAREST = 8  # swaths to which turns are planned at first, from each end
-SAME = 1e-11  # [m, rad] turns that differ by less are one
+SAME = 11  # digits [m, rad] in which turns that are planned once agree
 PEAR = 2.75  # radii that a turn forwards alone takes, to a swath beside
 ROUND = 1e-9  # share of a width by which a field may be wider than so many swaths
 MOST_DIRECTIONS = 64  # that are tried, those of the longest edges
@@ -94,18 +90,18 @@ class FieldProblem:
         for name, least in (("width", 1e-3), ("headland", 0.0)):
             if not least <= (value := getattr(self, name)) < math.inf:
                 raise ValueError(f"field: {name} must be a positive number, got {value}")
-        planner, model = self.planner, self.planner.automaton.model
+        planner, automaton = self.planner, self.planner.automaton
         if not all(isinstance(one, Obstacle) and one.motion is None for one in planner.obstacles):
             raise ValueError("field: an obstacle moves or is a map, need shapes that stand")
-        if model.group is not SE2 or planner.automaton.lattice is not None:
+        if automaton.model.group is not SE2 or automaton.lattice is not None:
             raise ValueError(
-                f"field: the {model.name} flies or is bound to a lattice, need a vehicle that "
-                "drives in every direction of the plane"
+                f"field: the {automaton.model.name} flies or is bound to a lattice, need a vehicle "
+                "that drives in every direction of the plane"
             )
         if self.radius == math.inf:
             raise ValueError("field: no trim turns, need some for the turns between swaths")
-        backs = bool((planner.automaton.body_velocities[:, 0] < 0.0).any())
-        if not self.headland and self.straight:
+        if self.straight and not self.headland:
+            backs = (automaton.body_velocities[:, 0] < 0.0).any()
             room = (1.0 if backs else PEAR) * self.radius + self._reach + planner.margin
             widths = max(1, math.ceil(room / self.width - ROUND))
             object.__setattr__(self, "headland", widths * self.width)
@@ -115,10 +111,10 @@ class FieldProblem:
         """The trim of the swaths: the one straight ahead that costs least a metre."""
         automaton = self.planner.automaton
         twists = automaton.body_velocities
-        ahead = np.flatnonzero((twists[:, 0] > 0.0) & ~twists[:, 1:].any(axis=1))
-        if not ahead.size:
+        ahead = (twists[:, 0] > 0.0) & ~twists[:, 1:].any(axis=1)
+        if not ahead.any():
             raise ValueError("field: no trim leads straight ahead, need one for the swaths")
-        cheapest: Trim = automaton.trims[ahead[np.argmin(self._rates[ahead])]]
+        cheapest: Trim = automaton.trims[np.argmin(np.where(ahead, self._rates, np.inf))]
         return cheapest
 
     @property
@@ -134,21 +130,15 @@ class FieldProblem:
         """What a metre costs by each trim; inf by those that do not move."""
         automaton = self.planner.automaton
         twists = automaton.body_velocities
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rates = self.planner.cost.rates(automaton.controls, twists)
-            rates = rates / np.hypot(twists[:, 0], twists[:, 1])
-        return np.where(twists[:, :2].any(axis=1), rates, np.inf)
+        speeds = np.hypot(twists[:, 0], twists[:, 1])
+        rates = self.planner.cost.rates(automaton.controls, twists)
+        metre = np.full(speeds.shape, np.inf)
+        return np.asarray(np.divide(rates, speeds, out=metre, where=speeds > 0.0))
 
     @property
     def _reach(self) -> float:
         """How far [m] the body reaches from its pose; what it carries aside."""
-        ends = [
-            np.hypot(*one.center) + one.radius
-            if isinstance(one, Disc)
-            else np.hypot(*one.corners.T)
-            for one in self.planner.footprint
-        ]
-        return float(max(map(np.max, ends), default=0.0))
+        return max(map(reach_of, self.planner.footprint), default=0.0)
 
     @property
     def whole(self) -> Any:
@@ -187,17 +177,15 @@ class FieldProblem:
         return replace(self.planner, obstacles=obstacles, start_trim=named)
 
     def moved(self, by: LieGroup) -> FieldProblem:
-        """The field moved by a planar pose, with all that stands in it."""
-        if not self.planner.bounds.are_open:
-            raise ValueError("field: bounds do not move with the symmetry")
-        direction = None if self.direction is None else self.direction + float(by.pose[2])
-        there = replace(
-            self.planner,
-            obstacles=tuple(one.moved(by) for one in self.planner.obstacles),
-            zones=tuple(one.moved(by) for one in self.planner.zones),
-            place_costs=tuple(moved(one, by) for one in self.planner.place_costs),
+        """The field moved by a planar pose, with all that stands in it; bounds must be open."""
+        there = self.planner.problem(np.zeros(3), np.zeros(3)).moved(by)
+        around = {name: getattr(there, name) for name in ("obstacles", "zones", "place_costs")}
+        return replace(
+            self,
+            planner=replace(self.planner, **around),
+            shape=self.shape.moved(by),
+            direction=None if self.direction is None else self.direction + float(by.pose[2]),
         )
-        return replace(self, planner=there, shape=self.shape.moved(by), direction=direction)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -207,7 +195,7 @@ class FieldResult:
     problem: FieldProblem
     swaths: Array  # (n, 2, 3) poses at begin and end, in order
     turns: tuple[Plan, ...]  # between them; fewer where one is missing
-    result: PlanResult  # of the whole, as of any problem: `plan`, `cost`, `audit`, `status`
+    result: PlanResult  # of the whole; without a plan it says between which swaths no turn is
     order_bound: float | None = None  # no order of these swaths has cheaper turns; None: not known
     turns_cost: float | None = None
 
@@ -231,9 +219,8 @@ class FieldResult:
     @property
     def lengths(self) -> tuple[float, float]:
         """Metres of all swaths, and of all turns between them."""
-        swaths = float(np.linalg.norm(np.diff(self.swaths[:, :, :2], axis=1), axis=-1).sum())
         in_metres = replace(self.result.problem, cost=Cost(length=1.0))
-        return swaths, sum(in_metres.cost_of(turn) for turn in self.turns)
+        return float(_lengths(self.swaths).sum()), sum(map(in_metres.cost_of, self.turns))
 
 
 def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> FieldResult:
@@ -254,11 +241,6 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
     jobs : int
         Processes at a time.
 
-    Returns
-    -------
-    FieldResult
-        Its ``result`` has no plan where swaths cannot be joined; the reason says which.
-
     Raises
     ------
     ValueError
@@ -275,23 +257,33 @@ def cover(problem: FieldProblem, *, time_limit: float = 1.0, jobs: int = 1) -> F
     >>> len(done.swaths), done.covered, done.result.audit.passed
     (4, 1.0, True)
     """
-    turns = _Turns(problem, _swaths(problem), time_limit=time_limit, jobs=jobs)
-    turns.plan(turns.nearest())
-    while True:
-        order, proven = cheapest_order(turns.costs)
+    planner, swaths = problem.inside, _swaths(problem)
+    both = np.stack([swaths, swaths[:, ::-1] + [0.0, 0.0, math.pi]], axis=1).reshape(-1, 2, 3)
+    ends, begins, swath = both[:, None, 1], both[:, 0], np.arange(len(both)) // 2
+    costs = problem._rates.min() * np.linalg.norm((ends - begins)[..., :2], axis=-1)  # at least
+    costs[swath[:, None] == swath] = np.inf
+    near = np.argsort(np.round(costs, 6), axis=1, kind="stable")[:, :NEAREST]
+    wanted = [(s, t) for s, row in enumerate(near.tolist()) for t in row if costs[s, t] < np.inf]
+    known: dict[tuple[int, int], Plan | None] = {}
+    while wanted:
+        goals = [Goal(both[t, 0], trim=planner.start_trim) for _, t in wanted]
+        starts = both[[s for s, _ in wanted], 1]
+        turns = _turns(planner, starts, goals, time_limit=time_limit, jobs=jobs)
+        for pair, start, goal, turn in zip(wanted, starts, goals, turns, strict=True):
+            known[pair] = turn
+            asked = planner.problem(start, goal)
+            costs[pair] = np.inf if turn is None else asked.cost_of(turn)
+        order, bound = cheapest_order(costs)
         pairs = list(itertools.pairwise(order))
-        if not (missing := [pair for pair in pairs if not turns.known[pair]]):
-            break
-        turns.plan(missing)
-    cost = sum(float(turns.costs[pair]) for pair in pairs)
-    bound = cost if proven else least_order_cost(turns.costs)
+        wanted = [pair for pair in pairs if pair not in known]
+    driven = [known[pair] for pair in pairs]
     return FieldResult(
         problem=problem,
-        swaths=turns.states[order],
-        turns=tuple(turns.plans[pair] for pair in pairs if pair in turns.plans),
-        result=turns.joined(order),
-        turns_cost=cost,
-        order_bound=bound if problem.planner.automaton.is_kinematic else None,
+        swaths=both[order],
+        turns=tuple(turn for turn in driven if turn is not None),
+        result=_as_one(problem, planner, both[order], driven),
+        turns_cost=sum(float(costs[pair]) for pair in pairs),
+        order_bound=bound if planner.automaton.is_kinematic else None,
     )
 
 
@@ -299,20 +291,15 @@ def _swaths(problem: FieldProblem) -> Array:
     """Swaths (n, 2, 3) in the best direction, from one side to the other."""
     if problem.direction is not None:
         return _swaths_along(problem, problem.direction)
-    ring = problem.shape.corners
-    edges = np.roll(ring, -1, axis=0) - ring
-    long = np.argsort(-np.round(np.linalg.norm(edges, axis=1), 6), kind="stable")
-    tried: list[float] = []
-    for angle in np.arctan2(edges[long, 1], edges[long, 0]).tolist():
-        if all(abs(math.remainder(angle - one, math.pi)) > 1e-9 for one in tried):
-            tried.append(angle)
-    found = [_swaths_along(problem, angle) for angle in tried[:MOST_DIRECTIONS]]
-    return min(
-        found,
-        key=lambda one: (
-            len(one), round(float(np.linalg.norm(one[:, 1] - one[:, 0], axis=1).sum()), 6)
-        ),
-    )  # fmt: skip
+    edges = np.roll(problem.shape.corners, -1, axis=0) - problem.shape.corners
+    longest = np.argsort(-np.round(np.linalg.norm(edges, axis=1), 6), kind="stable")
+    angles = np.arctan2(edges[longest, 1], edges[longest, 0])[:MOST_DIRECTIONS].tolist()
+    found = [_swaths_along(problem, angle) for angle in angles]
+    return min(found, key=lambda one: (len(one), round(float(_lengths(one).sum()), 6)))
+
+
+def _lengths(swaths: Array) -> Array:
+    return np.asarray(np.hypot(*(swaths[:, 1, :2] - swaths[:, 0, :2]).T))
 
 
 def _swaths_along(problem: FieldProblem, angle: float) -> Array:
@@ -323,136 +310,70 @@ def _swaths_along(problem: FieldProblem, angle: float) -> Array:
     count = max(1, math.ceil((high - low) / width - ROUND))
     if count > MOST_SWATHS:
         raise ValueError(f"field: takes {count} swaths, need at most {MOST_SWATHS}: a wider width")
-    apart = (high - low - width) / (count - 1) if count > 1 else 0.0
-    first = low + 0.5 * width if count > 1 else 0.5 * (low + high)
+    inset = min(0.5 * width, 0.5 * (high - low))
     rows = []
-    for y in (first + apart * np.arange(count)).tolist():
+    for y in np.linspace(low + inset, high - inset, count).tolist():
         strip = shapely.box(left - 1.0, y - 0.5 * width, right + 1.0, y + 0.5 * width)
         parts = shapely.get_parts(strip.intersection(inner))
-        spans = sorted(one.bounds[::2] for one in parts if one.area > 1e-4 * width * width)
-        rows += [[[x, y, 0.0] for x in span] for span in _united(spans)]
+        x = shapely.bounds(parts[shapely.area(parts) > 1e-4 * width * width])[:, ::2]
+        united_x = shapely.union_all(shapely.box(x[:, 0], 0.0, x[:, 1], 1.0))
+        spans = shapely.bounds(shapely.get_parts(united_x))[:, ::2]
+        rows += [[[x, y, 0.0] for x in span] for span in sorted(spans.tolist())]
     return np.asarray((turned @ SE2(np.array(rows))).pose)
 
 
-def _united(spans: Iterable[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Intervals in their order, those that overlap or touch as one."""
-    whole: list[tuple[float, float]] = []
-    for low, high in spans:
-        if whole and low <= whole[-1][1]:
-            whole[-1] = (whole[-1][0], max(high, whole[-1][1]))
-        else:
-            whole.append((low, high))
-    return whole
+def _turns(planner: Planner, starts: Array, goals: Sequence[Goal], **how: Any) -> list[Plan | None]:
+    """A plan from each start to its goal: that of free space where it stays inside, or another."""
+    how["take"] = attrgetter("plan")
+    leads = (SE2(starts).inverse() @ SE2(np.array([goal.pose for goal in goals]))).pose
+    keys = list(map(tuple, np.round(leads, SAME).tolist()))
+    alike = {key: replace(goals[0], pose=lead) for key, lead in zip(keys, leads, strict=True)}
+    away = replace(planner, obstacles=(), zones=(), bounds=Bounds(), place_costs=())
+    free = dict(zip(alike, away.plan_many(np.zeros(3), [*alike.values()], **how), strict=True))
+    found: list[Plan | None] = []
+    for start, goal, key in zip(starts, goals, keys, strict=True):
+        turn = free[key] and free[key].moved(SE2(start))
+        asked = planner.problem(start, goal)
+        inside = turn and check_plan(asked, turn, goal, planner.workspace).passed
+        found.append(turn if inside and not planner.place_costs else None)
+    if left := [k for k, turn in enumerate(found) if turn is None]:
+        among = planner.plan_many(starts[left], [goals[k] for k in left], **how)
+        for k, turn in zip(left, among, strict=True):
+            found[k] = turn
+    return found
 
 
-class _Turns:
-    """Turns from the end of each swath to the begin of each other, as far as they are planned."""
-
-    def __init__(
-        self, problem: FieldProblem, swaths: Array, *, time_limit: float, jobs: int
-    ) -> None:
-        back = swaths[:, ::-1] + [0.0, 0.0, math.pi]
-        self.states = np.stack([swaths, back], axis=1).reshape(-1, 2, 3)  # (2 n, 2, 3)
-        self.problem, self.planner = problem, problem.inside
-        self.how: dict[str, Any] = {
-            "time_limit": time_limit,
-            "jobs": jobs,
-            "take": attrgetter("plan"),
-        }
-        self.alike: list[tuple[Array, Plan | None]] = []  # in free space, by where they lead
-        self.plans: dict[tuple[int, int], Plan] = {}
-        here, there, swath = (
-            self.states[:, 1, :2],
-            self.states[:, 0, :2],
-            np.arange(len(back) * 2) // 2,
+def _as_one(
+    problem: FieldProblem, planner: Planner, swaths: Array, turns: Sequence[Plan | None]
+) -> PlanResult:
+    """Swaths and turns as one plan, checked and audited like any other."""
+    straight, goal = problem.straight, Goal(swaths[-1, 1], trim=planner.start_trim)
+    asked = planner.problem(swaths[0, 0], goal)
+    if None in turns:
+        x, y = swaths[turns.index(None), 1, :2].tolist()
+        reason = (
+            f"no turn was found from the end of a swath at ({x:.4g}, {y:.4g}) inside a headland of "
+            f"{problem.headland:g} m; need a wider headland, a vehicle that turns within less than "
+            f"{problem.radius:.3g} m, or more time for each turn"
         )
-        self.costs = problem._rates.min() * np.linalg.norm(here[:, None] - there, axis=-1)
-        self.known = swath[:, None] == swath
-        self.costs[self.known] = np.inf
-
-    def goal(self, state: int, end: int) -> Goal:
-        """The begin (0) or end (1) of a swath, in its trim where that matters."""
-        return Goal(self.states[state, end], trim=self.planner.start_trim)
-
-    def nearest(self) -> list[tuple[int, int]]:
-        """From each end to the begins that may be cheapest."""
-        near = np.argsort(np.round(self.costs, 6), axis=1, kind="stable")[:, :NEAREST]
-        return [(s, t) for s in range(len(near)) for t in near[s].tolist() if not self.known[s, t]]
-
-    def plan(self, pairs: Sequence[tuple[int, int]]) -> None:
-        """Plan the turns of some pairs of states, all that are alike once."""
-        leads = [(SE2(self.states[s, 1]).inverse() @ SE2(self.states[t, 0])).pose for s, t in pairs]
-        new: list[Array] = []
-        for lead in leads:
-            if not any(_alike(lead, one) for one in (*new, *(one for one, _ in self.alike))):
-                new.append(lead)
-        away = self.planner.problem(np.zeros(3), self.goal(0, 0))
-        problems = [
-            replace(away, goals=(replace(away.goals[0], pose=lead),), obstacles=()) for lead in new
-        ]
-        self.alike += zip(new, plan_many(problems, **self.how), strict=True)
-        hit = []
-        for (s, t), lead in zip(pairs, leads, strict=True):
-            self.known[s, t], self.costs[s, t] = True, np.inf
-            free = next(plan for one, plan in self.alike if _alike(lead, one))
-            if free is None:
-                continue
-            plan, goal = free.moved(SE2(self.states[s, 1])), self.goal(t, 0)
-            asked = self.planner.problem(plan.start, goal)
-            if check_plan(asked, plan, goal, self.planner.workspace).passed:
-                self._keep((s, t), plan)
-            else:
-                hit.append((s, t))
-        if hit:
-            starts, goals = [self.states[s, 1] for s, _ in hit], [self.goal(t, 0) for _, t in hit]
-            for pair, found in zip(
-                hit, self.planner.plan_many(starts, goals, **self.how), strict=True
-            ):
-                if found is not None:
-                    self._keep(pair, found)
-
-    def _keep(self, pair: tuple[int, int], plan: Plan) -> None:
-        self.plans[pair] = plan
-        self.costs[pair] = self.planner.problem(plan.start, self.goal(pair[1], 0)).cost_of(plan)
-
-    def joined(self, order: Sequence[int]) -> PlanResult:
-        """Swaths and turns as one plan, checked and audited like any other."""
-        goal, straight = self.goal(order[-1], 1), self.problem.straight
-        asked = self.planner.problem(self.states[order[0], 0], goal)
-        lost = [pair for pair in itertools.pairwise(order) if pair not in self.plans]
-        if lost:
-            x, y = self.states[lost[0][0], 1, :2].tolist()
-            return PlanResult(
-                problem=asked,
-                status=PlanStatus.NO_PLAN,
-                reason=f"no turn was found from the end of a swath at ({x:.4g}, {y:.4g}) inside a "
-                f"headland of {self.problem.headland:g} m; need a wider headland, a vehicle that "
-                f"turns within less than {self.problem.radius:.3g} m, or more time for each turn",
-            )
-        lasting = np.linalg.norm(self.states[:, 1] - self.states[:, 0], axis=1)
-        lasting /= straight.body_velocity[0]
-        plan = Plan(asked.start, (straight,), durations=lasting[order[:1]])
-        for s, t in itertools.pairwise(order):
-            if (turn := self.plans[s, t]).trims:
-                plan = joined(plan, turn)
-            plan = joined(plan, Plan(self.states[t, 0], (straight,), durations=lasting[[t]]))
-        found = check_plan(asked, plan, goal, self.planner.workspace)
-        if not found.passed or found.audit is None:
-            return PlanResult(problem=asked, status=PlanStatus.NO_PLAN, reason=found.reason)
-        return PlanResult(
-            problem=asked,
-            status=PlanStatus.FOUND,
-            reason="",
-            plan=plan,
-            goal_index=0,
-            cost=asked.cost_of(plan),
-            terminal_error=terminal_error(plan, goal),
-            clearance_m=found.audit.min_clearance_m,
-            audit=found.audit,
-        )
-
-
-def _alike(one: Array, other: Array) -> bool:
-    """Whether two turns lead to the same place."""
-    off = one - other
-    return bool(np.abs(off[:2]).max() < SAME and abs(math.remainder(off[2], math.tau)) < SAME)
+        return PlanResult(problem=asked, status=PlanStatus.NO_PLAN, reason=reason)
+    times = _lengths(swaths) / straight.body_velocity[0]
+    plan = Plan(asked.start, (straight,), durations=times[:1])
+    for swath, time, turn in zip(swaths[1:], times[1:], turns, strict=True):
+        if turn is not None and turn.trims:
+            plan = joined(plan, turn)
+        plan = joined(plan, Plan(swath[0], (straight,), durations=[time]))
+    found = check_plan(asked, plan, goal, planner.workspace)
+    if not found.passed or found.audit is None:
+        return PlanResult(problem=asked, status=PlanStatus.NO_PLAN, reason=found.reason)
+    return PlanResult(
+        problem=asked,
+        status=PlanStatus.FOUND,
+        reason="",
+        plan=plan,
+        goal_index=0,
+        cost=asked.cost_of(plan),
+        terminal_error=terminal_error(plan, goal),
+        clearance_m=found.audit.min_clearance_m,
+        audit=found.audit,
+    )

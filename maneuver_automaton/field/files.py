@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import shapely
 from pydantic import Field
 
@@ -19,33 +18,24 @@ from maneuver_automaton.exports.geojson import save_features
 from maneuver_automaton.field.covering import FieldProblem, FieldResult
 from maneuver_automaton.formats.statement import simple_polygon
 from maneuver_automaton.formats.text_source import read_text
-from maneuver_automaton.formats.yaml_source import Document, parse
+from maneuver_automaton.formats.yaml_source import parse
 from maneuver_automaton.models import Model
 from maneuver_automaton.planning import Planner
-from maneuver_automaton.scenario.parts import (
-    FilePart,
-    Number,
-    Polygon,
-    Polygons,
-    Positive,
-    at,
-    checked,
-    optional,
-)
+from maneuver_automaton.scenario import parts
 from maneuver_automaton.scenario.scenario import scenario_of_document
 
-GEOJSON = (".geojson", ".json")
 TIME_LIMIT_S = 1.0  # for each turn, where nothing is stated
+NOWHERE = {"pose": [0.0, 0.0, 0.0]}  # start and goal of a scenario whose vehicle alone is asked for
 
 
-class FieldPart(FilePart):
+class FieldPart(parts.FilePart):
     """What is to be covered: `field` of a file, which has neither start nor goal."""
 
-    polygon_m: Polygon | None = optional("corners [x, y]; left out where GeoJSON has them")
-    holes_m: Polygons = Field((), description="polygons inside polygon_m that are not entered")
-    width_m: Positive | None = optional("working width")
-    headland_m: Positive | None = optional("width of the strip to turn in; left out: chosen")
-    direction_rad: Number | None = optional("of the swaths; left out: the best of the edges'")
+    polygon_m: parts.Polygon | None = parts.optional("corners; left out where GeoJSON has them")
+    holes_m: parts.Polygons = Field((), description="polygons inside polygon_m, not entered")
+    width_m: parts.Positive | None = parts.optional("working width")
+    headland_m: parts.Positive | None = parts.optional("strip to turn in; left out: chosen")
+    direction_rad: parts.Number | None = parts.optional("of swaths; left out: the best edge's")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -79,16 +69,21 @@ def load_field(
     InvalidScenario
         If a file cannot be read or used.
     """
-    in_degrees = path.suffix.lower() in GEOJSON
-    if in_degrees == (beside is None):
-        what = (
-            "GeoJSON states no vehicle, need --with" if in_degrees else "states its vehicle itself"
-        )
-        raise InvalidScenario(f"{path}: {what}{'' if in_degrees else '; leave --with out'}")
+    is_geojson = path.suffix.lower() in (".geojson", ".json")
+    if is_geojson == (beside is None):
+        wrong = "GeoJSON states no vehicle, need" if is_geojson else "states its vehicle; leave out"
+        raise InvalidScenario(f"{path}: {wrong} --with")
     document = parse(read_text(beside or path), name=str(beside or path))
-    part, rest = _parted(document)
-    found = {**part.model_dump(exclude_none=True)}
-    if in_degrees:
+    if not isinstance(document.value, dict):
+        raise document.error((), "is no mapping, need a scenario with the key 'field'")
+    rest, part, at = dict(document.value), FieldPart(), ("field",)
+    if "field" in rest:
+        if ends := {"start", "goal"} & set(rest):
+            raise document.error((min(ends),), "is for plan; a field has none, leave it out")
+        own = replace(document, value=rest.pop("field"), homes={(): at})
+        part = parts.checked(own, FieldPart)
+    found = part.model_dump(exclude_none=True)
+    if is_geojson:
         ground, origin = _polygon_of(path, origin)
         found |= ground
     found |= {key: value for key, value in stated.items() if value is not None}
@@ -96,45 +91,25 @@ def load_field(
         raise document.error(("field",), "polygon_m is missing, need the corners of the field")
     if "width_m" not in found:
         raise InvalidScenario(f"{path}: width_m: missing, need the working width, or --width")
-    scenario = scenario_of_document(rest, path=beside or path, begin=0.0, own=model)
-    planner = Planner(
-        **{
-            one.name: getattr(scenario.problem, one.name)
-            for one in fields(Planner)
-            if one.init and one.name != "start_trim"
-        }
-    )
-    with at(document, ("field",) if "field" in document.value else ()):
+    driver = replace(document, value={"start": NOWHERE, "goal": NOWHERE} | rest)
+    scenario = scenario_of_document(driver, path=beside or path, begin=0.0, own=model)
+    keys = {one.name for one in fields(Planner) if one.init} - {"start_trim"}
+    with parts.at(document, at if "field" in document.value else ()):
         problem = FieldProblem(
-            planner,
+            Planner(**{key: getattr(scenario.problem, key) for key in keys}),
             simple_polygon(found["polygon_m"], found["holes_m"]),
             width=found["width_m"],
             headland=found.get("headland_m", 0.0),
             direction=found.get("direction_rad"),
         )
         _ = problem.inner
-    limited = "time_limit_s" in (document.value.get("search") or {})
+    limited = "time_limit_s" in (rest.get("search") or {})
     return FieldScenario(
-        name=scenario.name if not in_degrees else path.stem,
+        name=path.stem if is_geojson else scenario.name,
         problem=problem,
         time_limit_s=scenario.time_limit_s if limited else TIME_LIMIT_S,
         origin=origin,
     )
-
-
-def _parted(document: Document) -> tuple[FieldPart, Document]:
-    """The field of a file, and the rest as a scenario, whose start and goal nobody asks for."""
-    whole = document.value
-    if not isinstance(whole, dict):
-        raise document.error((), "is no mapping, need a scenario with the key 'field'")
-    if "field" in whole and (ends := {"start", "goal"} & set(whole)):
-        raise document.error((min(ends),), "is for plan; a field has none, leave it out")
-    part = FieldPart()
-    if "field" in whole:
-        part = checked(replace(document, value=whole["field"], homes={(): ("field",)}), FieldPart)
-    nowhere = {"pose": [0.0, 0.0, 0.0]}
-    rest = {"start": nowhere, "goal": nowhere} | {k: v for k, v in whole.items() if k != "field"}
-    return part, replace(document, value=rest)
 
 
 def _polygon_of(
@@ -144,28 +119,21 @@ def _polygon_of(
     try:
         document = json.loads(read_text(path))
         listed = document["features"] if document["type"] == "FeatureCollection" else [document]
-        areas = [
-            (one.get("geometry", one)["coordinates"], one.get("properties") or {})
-            for one in listed
-            if one.get("geometry", one)["type"] == "Polygon"
-        ]
+        areas = [one for one in listed if one.get("geometry", one)["type"] == "Polygon"]
         if len(areas) != 1:
-            raise InvalidScenario(f"{path}: has {len(areas)} polygons, need one, the field")
-        ((coordinates, properties),) = areas
-        rings = [np.array(ring, dtype=np.float64)[:, :2] for ring in coordinates]
+            raise ValueError(f"it has {len(areas)} polygons, need one, the field")
+        area = shapely.force_2d(shapely.geometry.shape(areas[0].get("geometry", areas[0])))
+        if not ("crs" in document or document.get("units") == "m"):
+            middle = shapely.box(*area.bounds).centroid
+            place = origin = origin or (round(middle.y, 6), round(middle.x, 6))
+            area = shapely.transform(area, lambda degrees: metres_of(degrees, origin=place))
+        known = areas[0].get("properties") or {}
+        keys = {"width_m", "headland_m", "direction_rad"} & set(known)
+        found: dict[str, Any] = {key: float(known[key]) for key in keys}
     except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
         raise InvalidScenario(f"{path}: is no GeoJSON with a polygon: {error}") from error
-    if not ("crs" in document or document.get("units") == "m"):
-        low, high = rings[0].min(axis=0), rings[0].max(axis=0)
-        middle = np.round(0.5 * (low + high), 6)
-        origin = origin or (float(middle[1]), float(middle[0]))
-        try:
-            rings = [metres_of(ring, origin=origin) for ring in rings]
-        except ValueError as error:
-            raise InvalidScenario(f"{path}: {error}") from error
-    keys = ("width_m", "headland_m", "direction_rad")
-    known = {key: float(properties[key]) for key in keys if key in properties}
-    return {"polygon_m": rings[0], "holes_m": rings[1:], **known}, origin
+    rings = [shapely.get_coordinates(ring) for ring in (area.exterior, *area.interiors)]
+    return found | {"polygon_m": rings[0], "holes_m": rings[1:]}, origin
 
 
 def save_field_geojson(
@@ -178,15 +146,14 @@ def save_field_geojson(
 def _features(covered: FieldResult) -> Iterator[dict[str, Any]]:
     problem = covered.problem
 
-    def feature(geometry: Any, **facts: Any) -> dict[str, Any]:
+    def feature(geometry: Any, kind: str, **facts: Any) -> dict[str, Any]:
         drawn = json.loads(shapely.to_geojson(geometry))
-        return {"type": "Feature", "properties": facts, "geometry": drawn}
+        return {"type": "Feature", "properties": {"kind": kind, **facts}, "geometry": drawn}
 
-    yield feature(shapely.orient_polygons(problem.whole), kind="field")
-    yield feature(shapely.orient_polygons(problem.inner), kind="inner", headland_m=problem.headland)
-    for k, poses in enumerate(covered.swaths):
-        line = shapely.LineString(poses[:, :2])
-        yield feature(line, kind="swath", number=k + 1, width_m=problem.width)
+    yield feature(shapely.orient_polygons(problem.whole), "field")
+    yield feature(shapely.orient_polygons(problem.inner), "inner", headland_m=problem.headland)
+    for k, line in enumerate(shapely.linestrings(covered.swaths[:, :, :2])):
+        yield feature(line, "swath", number=k + 1, width_m=problem.width)
     for k, turn in enumerate(covered.turns):
         line = shapely.LineString(turn.sample().pose[:, :2])
-        yield feature(line, kind="turn", number=k + 1, duration_s=turn.duration)
+        yield feature(line, "turn", number=k + 1, duration_s=turn.duration)

@@ -26,6 +26,7 @@ from maneuver_automaton.collision.layers import (
 from maneuver_automaton.collision.world import World, frame_at_first, world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
+from maneuver_automaton.places import PlaceCost, extent_of
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.problem import Bounds, Problem
 from maneuver_automaton.search.arrays import Scene
@@ -46,7 +47,7 @@ class Worlds:
     bands: tuple[Layer, ...]  # obstacles between neighbouring heights, in the problem's altitudes
     between: tuple[World, ...]  # the worlds of these
     zones: tuple[World, ...]  # every zone as if it were an obstacle
-    outer: World  # all obstacles and all zones, so that paths lead round them
+    outer: World  # all obstacles, zones and dear places, so that paths lead round them
     flat: LayerArrays | None  # they as arrays, where heights do not matter
 
 
@@ -103,6 +104,7 @@ def _worlds_on(
         _worlds,
         setting.obstacles,
         setting.zones,
+        setting.place_costs,
         tuple(part.shapes for part in parts),
         frame,
         (low + below, high + above) if setting.start.size > 3 else None,
@@ -113,6 +115,7 @@ def _worlds_on(
 def _worlds(
     obstacles: tuple[AnyObstacle, ...],
     zones: tuple[Zone, ...],
+    costs: tuple[PlaceCost, ...],
     bodies: tuple[_Shapes, ...],
     frame: tuple[float, ...],
     heights: tuple[float, float] | None,
@@ -130,6 +133,7 @@ def _worlds(
     plane = whole if heights is None else around(always(obstacles, low=heights[0], high=heights[1]))
     plane = replace(plane, body=body_of(bodies[0]))
     solid = tuple(Obstacle(zone.shape) for zone in zones)
+    dear = tuple(Obstacle(shape) for cost in costs for shape in extent_of(cost))
     between = tuple(around(band.obstacles) for band in bands)
     beside = tuple(around((one,)) for one in solid)
     everywhere = np.full(len(between) + len(beside), np.inf)
@@ -139,7 +143,7 @@ def _worlds(
         bands=bands,
         between=between,
         zones=beside,
-        outer=around((*obstacles, *solid)) if solid else whole,
+        outer=around((*obstacles, *solid, *dear)) if solid or dear else whole,
         flat=None
         if heights is not None
         else layer_arrays([*between, *beside], low=-everywhere, high=everywhere, plane=plane),
