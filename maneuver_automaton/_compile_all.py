@@ -1,7 +1,7 @@
-"""Compile every listed kernel in all cores: when the package is installed, or when one is missing.
+"""Compile listed kernels in all cores: when the package is installed, or when one is missing.
 
-Each process is handed one kernel after the other, neighbours in the list: those share functions.
-What all share, and is compiled once, comes first.
+Each process is handed one module after the other, from either end of the list: the kernels of a
+module, and of neighbours, share functions, which each process compiles for itself.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import gc
+import itertools
 import math
 import os
 import platform
@@ -18,51 +19,51 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from maneuver_automaton import _kernel_list
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
+from maneuver_automaton._kernel_list import LATER, kernel_names, later_uses, module_of
 
 FIRST = ("refinement.", "search._kernels_lattice", "receding_horizon.")  # share most, take longest
 HELD = 2e9  # [bytes] that one process may come to hold; 1.6 to 1.9 GB are measured
 KEPT = 8  # folders of compiled kernels, of other versions and of sources that were edited
+EVERY = "MANEUVER_AUTOMATON_COMPILE_ALL"  # set where a build is to compile every kernel
 LOCK = ".compiling"  # name of the lock in the folder
 STALE = 20.0  # [s] after which a lock that is touched no more is nobody's
 WORKER = "MANEUVER_AUTOMATON_COMPILES"  # set in the environment of the processes that compile
 X86_64_V3 = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "popcnt", "sse4.2", "xsave")
 
 # Called again and again with the kernels that are compiled, and with all
-Report = Callable[[Sequence[str], Sequence[str]], None]
+Report = Callable[[Sequence[str], Collection[str]], None]
 
 
 def compile_kernels(
-    *, jobs: int | None = None, report: Report | None = None, settings: dict[str, str] | None = None
+    names: Collection[str],
+    *,
+    jobs: int | None = None,
+    report: Report | None = None,
+    settings: dict[str, str] | None = None,
 ) -> list[str]:
-    """Compile what is not compiled yet, in several processes; what failed, and why."""
-
-    def place(name: str) -> tuple[bool, bool, str]:
-        is_shared = False
-        with contextlib.suppress(ImportError):  # the process that is handed it says so
-            is_shared = getattr(_kernel_list.kernel_named(name), "is_shared", False)
-        return not is_shared, not any(one in name for one in FIRST), name
-
-    names = sorted(_kernel_list.listed(), key=place)
-    waiting, failed, done = deque(names), list[str](), list[str]()
+    """Compile those that are not compiled yet, in several processes; what failed, and why."""
     workers = [_worker(settings or {}) for _ in range(min(jobs or affordable(), len(names)))]
+    modules = [list(its) for _, its in itertools.groupby(sorted(names), module_of)]
+    waiting = deque(sorted(modules, key=lambda its: not module_of(its[0]).startswith(FIRST)))
+    failed, done = list[str](), list[str]()
 
     def serve(number: int, worker: subprocess.Popen[str]) -> None:
         assert worker.stdin is not None
         assert worker.stdout is not None
         with contextlib.suppress(IndexError, OSError):
             while True:
-                name = waiting.popleft() if number % 2 == 0 else waiting.pop()
-                worker.stdin.write(f"{name}\n")
-                worker.stdin.flush()
-                answer = worker.stdout.readline().strip()
-                if answer != "done":
-                    failed.append(f"{name}: {answer or 'the compiler ended'}")
-                done.append(name)
+                for name in waiting.popleft() if number % 2 == 0 else waiting.pop():
+                    worker.stdin.write(f"{name}\n")
+                    worker.stdin.flush()
+                    answer = worker.stdout.readline().strip()
+                    if answer != "done":
+                        failed.append(f"{name}: {answer or 'the compiler ended'}")
+                    done.append(name)
 
     threads = [
         threading.Thread(target=serve, args=pair, daemon=True) for pair in enumerate(workers)
@@ -83,25 +84,27 @@ def compile_kernels(
     return failed
 
 
-def compile_missing(*, jobs: int | None = None) -> list[str] | None:
-    """Compile all kernels into the user's cache, unless another process does: then wait for it.
+def compile_missing(names: Collection[str], *, jobs: int | None = None) -> list[str] | None:
+    """Compile kernels into the user's cache, unless another process does: then wait for it.
 
     What failed, and why; None where no folder can be written, or in a process that compiles itself.
     """
-    folder = kernel_folder()
+    folder, theirs = kernel_folder(), set[str]()
     if folder is None or os.environ.get(WORKER) or not os.access(folder, os.W_OK):
         return None
     from numba.core import event
 
     with event.trigger_event("numba:compile", data={}):
-        while not _locked(folder / LOCK):
+        while not _locked(folder / LOCK, names):
+            with contextlib.suppress(OSError):
+                theirs = set((folder / LOCK).read_text().split())
             time.sleep(0.2)
-            if not (folder / LOCK).exists():
+            if theirs.issuperset(names) and not (folder / LOCK).exists():
                 return []  # the other process has compiled them
         try:
             with _bar() as bar:
                 report = functools.partial(_report, folder / LOCK, bar)
-                return compile_kernels(jobs=jobs, report=report)
+                return compile_kernels(names, jobs=jobs, report=report)
         finally:
             with contextlib.suppress(OSError):
                 (folder / LOCK).unlink()
@@ -112,7 +115,7 @@ def compile_missing(*, jobs: int | None = None) -> list[str] | None:
                     shutil.rmtree(old, ignore_errors=True)
 
 
-def _report(lock: Path, bar: Report | None, done: Sequence[str], names: Sequence[str]) -> None:
+def _report(lock: Path, bar: Report | None, done: Sequence[str], names: Collection[str]) -> None:
     """Say that this process is still at work, and how far it is."""
     with contextlib.suppress(OSError):
         os.utime(lock)
@@ -137,17 +140,19 @@ def work() -> None:
 
 
 def ship(package: Path) -> list[str]:
-    """Compile all kernels into a package that is built, for every processor of its kind.
+    """Compile kernels into a package that is built, for every processor of its kind.
 
-    Prints a line when it begins, and one for each room that is done.
+    All that first plans need, or every one where `EVERY` is set. Prints a line when it begins, one
+    for each room that is done, and one of what is left.
     """
     folder, jobs, said = package / SHIPPED, affordable(), set[str]()
+    names = [one for one in kernel_names() if os.environ.get(EVERY) or not later_uses(one)]
 
     def say(text: str) -> None:
         begin = "\r" if sys.stdout.isatty() else ""  # over the sign that pip turns there
         print(f"{begin}  {text}", flush=True)  # noqa: T201
 
-    def report(done: Sequence[str], names: Sequence[str]) -> None:
+    def report(done: Sequence[str], names: Collection[str]) -> None:
         left = {name.split(".")[1] for name in set(names).difference(done)}
         for room in sorted({name.split(".")[1] for name in names} - left - said):
             said.add(room)
@@ -156,7 +161,9 @@ def ship(package: Path) -> list[str]:
     say(f"compiling kernels, {jobs} at a time; this takes some minutes of processor time")
     target = {"NUMBA_CPU_NAME": processors()[0], "NUMBA_CPU_FEATURES": ""}
     settings = {"NUMBA_CACHE_DIR": str(folder), **target}
-    failed = compile_kernels(jobs=jobs, report=report, settings=settings)
+    failed = compile_kernels(names, jobs=jobs, report=report, settings=settings)
+    if left := len(kernel_names()) - len(names):
+        say(f"left to their first use: {left} kernels, for {', '.join(LATER)}")
     for other in folder.glob(f"{KERNELS}*"):
         if other.name != f"{KERNELS}{source_hash()}":
             for path in other.iterdir():
@@ -226,13 +233,14 @@ def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:
     )
 
 
-def _locked(lock: Path) -> bool:
-    """Whether the lock is ours now: one that its process touches no more is taken."""
+def _locked(lock: Path, names: Iterable[str]) -> bool:
+    """Whether the lock is ours now, to compile `names`: one that nobody touches is taken."""
     try:
         with contextlib.suppress(FileNotFoundError):
             if time.time() - lock.stat().st_mtime > STALE:
                 lock.unlink()
-        os.close(os.open(lock, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644))
+        with lock.open("x") as stream:
+            stream.write("\n".join(names))
     except FileExistsError:
         return False
     return True

@@ -24,7 +24,7 @@ from numba.core.types.containers import BaseTuple
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
 from maneuver_automaton._compile_all import compile_missing, processors
 from maneuver_automaton._kernel_folders import shipped_folder
-from maneuver_automaton._kernel_list import kernel_named, listed
+from maneuver_automaton._kernel_list import compiled_with, kernel_named, later_uses, listed
 
 ENDING = ".nbc"
 OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
@@ -55,7 +55,11 @@ class KernelCache:
         """What was compiled for a signature; None if that is not to be had."""
         rtsys.initialize(target_context)
         found = self._found(signature, target_context)
-        if found is None and _is_listed(self.name, signature) and _all_compiled():
+        if (
+            found is None
+            and _is_listed(self.name, signature)
+            and _compiled(tuple(compiled_with(self.name)))
+        ):
             found = self._found(signature, target_context)
         return found
 
@@ -113,12 +117,12 @@ def _is_listed(name: str, signature: Any) -> bool:
 
 
 @functools.cache
-def _all_compiled() -> bool:
-    """Have all kernels compiled, the first time that one of them is missing."""
-    if shipped_folder():
+def _compiled(names: tuple[str, ...]) -> bool:
+    """Have kernels compiled, the first time that one of them is missing."""
+    if shipped_folder() and not later_uses(names[0]):
         say_once("shipped", f"{shipped_folder()}: {OTHER}")
     try:
-        failed = compile_missing()
+        failed = compile_missing(names)
     except OSError as error:  # a full disk, no more processes: each kernel is compiled when used
         say_once("alone", f"kernels are compiled one by one: {error.strerror or error}")
         return False

@@ -48,6 +48,7 @@ USES = {  # modules of kernels, by what calls them
     "state lattice": ("search._kernels_state_lattice", "search._kernels_nodes"),
     "timed lattice": ("search._kernels_state_lattice", "search._kernels_timed_lattice"),
     "fail-safe": ("receding_horizon._kernels_failsafe",),
+    "unconstrained loop": ("receding_horizon._kernels_unconstrained",),
     "meetings": ("fleet._kernels_meetings",),
     "separation": ("bounds._kernels_boxes", "bounds._kernels_connectivity"),
     "cells": (
@@ -56,7 +57,16 @@ USES = {  # modules of kernels, by what calls them
         "bounds._kernels_certificate",
         "bounds._kernels_dual",
     ),
+    "roads": (
+        "roads._kernels_beam",
+        "roads._kernels_costs",
+        "roads._kernels_motion",
+        "roads._kernels_polish",
+    ),
 }
+# What an installation leaves to the first who needs it: first plans of cars and robots do not, and
+# it is four tenths of all that the compiler has to do.
+LATER = ("state lattice", "timed lattice", "fail-safe", "unconstrained loop", "cells", "roads")
 
 Stated = Any  # a type as the list has it
 
@@ -66,6 +76,29 @@ def load_kernels(*uses: str) -> None:
     for use in uses:
         for module in USES[use]:
             _load(f"{__package__}.{module}")
+
+
+def kernel_names() -> list[str]:
+    """All kernels, as ``module.name``."""
+    return list(_rows())
+
+
+def module_of(name: str) -> str:
+    """The module of a kernel, as `USES` has it."""
+    return name.removeprefix(f"{__package__}.").rpartition(".")[0]
+
+
+def later_uses(name: str) -> frozenset[str]:
+    """The uses of `LATER` that a kernel serves; none where an installation compiles it."""
+    module = module_of(name)
+    uses = frozenset(use for use, modules in USES.items() if module in modules)
+    return uses if uses.issubset(LATER) else frozenset()
+
+
+def compiled_with(name: str) -> list[str]:
+    """The kernels to compile where one is missing: of the same uses, or all of an installation."""
+    uses = later_uses(name)
+    return [one for one in _rows() if later_uses(one) == uses or later_uses(one) & uses]
 
 
 @functools.cache

@@ -16,7 +16,19 @@ from numba import types
 import maneuver_automaton
 from maneuver_automaton import _compile_all, _kernel_cache
 from maneuver_automaton._kernel_cache import KernelCache
-from maneuver_automaton._kernel_list import kernel_named, listed, stated, type_of, write_list
+from maneuver_automaton._kernel_list import (
+    LATER,
+    USES,
+    compiled_with,
+    kernel_named,
+    kernel_names,
+    later_uses,
+    listed,
+    module_of,
+    stated,
+    type_of,
+    write_list,
+)
 
 PACKAGE = Path(maneuver_automaton.__file__).parent
 Pair = namedtuple("Pair", "near far")
@@ -35,6 +47,22 @@ def test_every_kernel_is_listed():
     assert set(listed()) == decorated
     for name in listed():
         assert kernel_named(name).__name__ == name.rsplit(".", 1)[1]
+
+
+def test_a_missing_kernel_is_compiled_with_those_of_its_uses():
+    names = kernel_names()
+    assert {one for modules in USES.values() for one in modules} <= set(map(module_of, names))
+    assert {use for name in names for use in later_uses(name)} == set(LATER)
+    installed = [name for name in names if not later_uses(name)]
+    for name in names:
+        together = compiled_with(name)
+        assert name in together
+        if name in installed:
+            assert together == installed
+        else:
+            assert not set(together).intersection(installed)
+    (road,) = {tuple(compiled_with(name)) for name in names if module_of(name).startswith("roads.")}
+    assert {module_of(name) for name in road} == set(USES["roads"])
 
 
 @pytest.mark.parametrize(
@@ -109,41 +137,64 @@ def test_kernels_that_came_compiled_are_used_where_the_processor_has_what_they_n
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-def test_kernels_are_compiled_by_several_processes(monkeypatch):
+def test_kernels_are_compiled_by_several_processes():
     names = ("collision._kernels_field.count_buckets", "collision._kernels_field.fill_buckets")
-    few = {f"maneuver_automaton.{name}": () for name in names}
-    monkeypatch.setattr("maneuver_automaton._kernel_list.listed", lambda: few)
+    few = [f"maneuver_automaton.{name}" for name in names]
     seen = []
-    failed = _compile_all.compile_kernels(jobs=2, report=lambda *both: seen.append(both))
+    failed = _compile_all.compile_kernels(few, jobs=2, report=lambda *both: seen.append(both))
     assert failed == []
     assert set(seen[-1][0]) == set(seen[-1][1]) == set(few)
-    monkeypatch.setattr("maneuver_automaton._kernel_list.listed", lambda: {"no.kernel": ()})
-    assert _compile_all.compile_kernels(jobs=1) == ["no.kernel: KeyError: 'no.kernel'"]
+    failed = _compile_all.compile_kernels(["no.kernel"], jobs=1)
+    assert failed == ["no.kernel: KeyError: 'no.kernel'"]
 
 
 def test_the_lock_of_a_process_that_is_gone_is_taken(tmp_path):
     lock = tmp_path / "lock"
-    assert _compile_all._locked(lock)
-    assert not _compile_all._locked(lock)
+    assert _compile_all._locked(lock, [])
+    assert not _compile_all._locked(lock, [])
     os.utime(lock, (0.0, 0.0))
     _compile_all._report(lock, None, ["one"], ["one", "other"])  # its process is at work
-    assert not _compile_all._locked(lock)
+    assert not _compile_all._locked(lock, [])
     os.utime(lock, (0.0, 0.0))
-    assert _compile_all._locked(lock)
+    assert _compile_all._locked(lock, [])
 
 
-def test_a_build_says_which_rooms_are_done(tmp_path, monkeypatch, capsys):
-    def compiled(*, jobs, report, settings):
+def test_kernels_that_another_process_compiles_are_waited_for(tmp_path, monkeypatch):
+    lock, compiled = tmp_path / _compile_all.LOCK, []
+    monkeypatch.setattr(_compile_all, "kernel_folder", lambda: tmp_path)
+    monkeypatch.setattr(_compile_all, "compile_kernels", lambda names, **_: compiled.append(names))
+    monkeypatch.setattr(_compile_all.time, "sleep", lambda _: lock.unlink())  # the other is done
+    monkeypatch.delenv(_compile_all.WORKER, raising=False)
+    for others, own in (("ab", "ab"), ("abc", "b"), ("ab", "bc")):
+        assert _compile_all._locked(lock, others)
+        _compile_all.compile_missing(own)
+        assert not lock.exists()
+    assert compiled == ["bc"]
+
+
+def test_a_build_says_which_rooms_are_done_and_what_is_left(tmp_path, monkeypatch, capsys):
+    seen = []
+
+    def compiled(names, *, jobs, report, settings):
+        seen.append(names)
         report(["ma.words.a"], ["ma.words.a", "ma.search.b", "ma.words.c"])
         report(["ma.words.a", "ma.words.c"], ["ma.words.a", "ma.search.b", "ma.words.c"])
         report(["ma.words.a", "ma.words.c"], ["ma.words.a", "ma.search.b", "ma.words.c"])
         return []
 
     monkeypatch.setattr(_compile_all, "compile_kernels", compiled)
+    monkeypatch.delenv(_compile_all.EVERY, raising=False)
     assert _compile_all.ship(tmp_path) == []
-    first, *rooms = capsys.readouterr().out.splitlines()
+    first, room, last = capsys.readouterr().out.splitlines()
     assert f"{_compile_all.affordable()} at a time" in first
-    assert rooms == ["  compiled words (2 of 3 kernels)"]
+    assert room == "  compiled words (2 of 3 kernels)"
+    assert last.endswith("kernels, for " + ", ".join(LATER))
+    monkeypatch.setenv(_compile_all.EVERY, "1")
+    assert _compile_all.ship(tmp_path) == []
+    assert "left" not in capsys.readouterr().out
+    some, every = seen
+    assert every == kernel_names()
+    assert some == [name for name in every if not later_uses(name)]
 
 
 V1, V2 = "4:memory:/me\n", "0::/me\n"
@@ -203,12 +254,12 @@ def test_without_a_word_of_the_system_memory_does_not_count(tmp_path, monkeypatc
 
 
 def test_a_disk_that_is_full_ends_nothing(monkeypatch, caplog):
-    def full():
+    def full(names):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(_kernel_cache, "compile_missing", full)
     monkeypatch.setattr("maneuver_automaton._cache_files._said", set())
-    assert not _kernel_cache._all_compiled.__wrapped__()
+    assert not _kernel_cache._compiled.__wrapped__((kernel_names()[0],))
     assert caplog.messages[-1] == "kernels are compiled one by one: No space left on device"
 
 

@@ -263,7 +263,7 @@ def cache_clear(_: Given) -> int:
 
 @command("compile", "jobs:processes")
 def compile_all(given: Given) -> int:
-    """Compile all kernels now; an installation that is not editable brings them."""
+    """Compile all kernels now; an installation that is not editable brings those of first plans."""
     from maneuver_automaton.cli import file_commands
 
     return file_commands.compile_all(jobs=given.jobs)

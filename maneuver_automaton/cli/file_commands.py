@@ -22,7 +22,7 @@ from maneuver_automaton._kernel_folders import (
     kernel_folder,
     user_cache_folder,
 )
-from maneuver_automaton._kernel_list import listed
+from maneuver_automaton._kernel_list import kernel_names
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain
 from maneuver_automaton.cli.inputs import (
@@ -97,14 +97,14 @@ def _folders() -> list[Path]:
 def compile_all(*, jobs: int | None) -> int:
     """Compile what is missing in the user's cache, and say where it lies."""
     began = time.perf_counter()
-    failed = compile_missing(jobs=jobs)
+    failed = compile_missing(kernel_names(), jobs=jobs)
     if failed is None:
         complain(f"compile: no folder can be written; {CACHE} names another one")
         return BAD_INPUT
     for failure in failed:
         complain(failure)
     took = time.perf_counter() - began
-    line = f"{len(listed()) - len(failed)} kernels are compiled, after {took:.1f} s: "
+    line = f"{len(kernel_names()) - len(failed)} kernels are compiled, after {took:.1f} s: "
     console().print(f"{line}{kernel_folder()}", soft_wrap=True)
     return BAD_INPUT if failed else FOUND
 

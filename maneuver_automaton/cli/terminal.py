@@ -110,7 +110,7 @@ def shortened(rows: list[list[str]]) -> list[list[str]]:
 
 
 _shown: list[Any] = []  # what rich shows on the terminal: one bar at most
-COMPILING = "compiling kernels, once after installation: this may take a minute ..."
+COMPILING = "compiling kernels, once, at their first use: this may take a minute ..."
 
 
 class Advance(Protocol):
