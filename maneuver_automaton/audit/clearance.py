@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from maneuver_automaton.audit._kernels_still import Found, Ways, nearest_still
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.outlines import Surroundings
-from maneuver_automaton.audit.pairs import StillEdges, moving_pairs, on_arcs, overlapped
+from maneuver_automaton.audit.pairs import moving_pairs, nearest_still_pairs, on_arcs, overlapped
 from maneuver_automaton.audit.passages import (
     AuditedBody,
     ClearanceBounds,
@@ -70,7 +70,7 @@ def least_clearance(
         return _at(body, 0.0, 0.0, int(spans.element[0]), float(spans.begin[0]))
     if around.still.size and (found is None or found.touches):
         ask()
-        pairs, known = StillEdges.near(body, around, places).nearest()
+        pairs, known = nearest_still_pairs(body, around, places)
         least = _sharpened(body, around, pairs, known, least, enough, ask)
     for nearest, some in moving_pairs(body, around, places, least.measured):
         if not nearest < least.measured:
