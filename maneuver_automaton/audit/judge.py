@@ -105,10 +105,7 @@ def distance_to(end: Array, goal: Goal) -> TerminalError:
     """How far a pose (dof,), counted from the goal's place, is from the goal."""
     places = [0, 1, *range(3, end.size)]
     heading = 0.0 if goal.free_heading else float(abs(wrapped(end[2] - goal.pose[2])))
-    return TerminalError(
-        position_m=float(np.linalg.norm(end[places])),
-        heading_rad=heading,
-    )
+    return TerminalError(position_m=float(np.linalg.norm(end[places])), heading_rad=heading)
 
 
 def audit_plan(

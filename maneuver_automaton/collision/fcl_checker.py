@@ -20,20 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines
-from maneuver_automaton.collision.shapes import (
-    AnyObstacle,
-    Box,
-    Disc,
-    Polygon,
-    Shape,
-    box_corners,
-)
-from maneuver_automaton.collision.solids import (
-    Skin,
-    body_skin,
-    obstacle_regions,
-    obstacle_skin,
-)
+from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon, Shape, box_corners
+from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_regions, obstacle_skin
 from maneuver_automaton.collision.swept import (
     STANDING,
     GrownBody,
@@ -164,12 +152,7 @@ class FclChecker:
         return self._ground.near(np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1))
 
     def _first_step_hit(
-        self,
-        poses: Array,
-        steps: Array,
-        courses: IntArray,
-        laid: _Laid,
-        ask: Callable[[], None],
+        self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Callable[[], None]
     ) -> tuple[int, int] | None:
         """The first of some steps of courses that touches a static obstacle, and which."""
         if laid.static is None:
@@ -211,12 +194,7 @@ class FclChecker:
         return bool(_touching([_object(skin)], np.zeros((1, 3)), laid.static))
 
     def _first_hit(
-        self,
-        starts: Array,
-        twists: Array,
-        durations: Array,
-        laid: _Laid,
-        ask: Callable[[], None],
+        self, starts: Array, twists: Array, durations: Array, laid: _Laid, ask: Callable[[], None]
     ) -> tuple[int, int] | None:
         """The first of some coasts that touches a static obstacle, and which."""
         if laid.static is None:
@@ -439,11 +417,7 @@ def _turns(poses: Array) -> Array:
 
 
 def _touching(
-    ones: Sequence[Any],
-    poses: Array,
-    other: Any,
-    *,
-    most: int | None = None,
+    ones: Sequence[Any], poses: Array, other: Any, *, most: int | None = None
 ) -> dict[int, int]:
     """Which of some objects (n) at poses (n, 3) touch another, and which of its triangles."""
     import fcl
