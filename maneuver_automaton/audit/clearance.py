@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton.audit._kernels_still import Found, Ways, nearest_still
+from maneuver_automaton.audit._kernels_still import Ways, nearest_still
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.outlines import Surroundings
 from maneuver_automaton.audit.pairs import moving_pairs, nearest_still_pairs, on_arcs, overlapped
@@ -60,7 +60,12 @@ def least_clearance(
     found, least = None, NEVER
     if around.still.size and not body.in_space:
         ask()
-        found = _compiled(body, around, spans, enough)
+        outline, own = body.outline, body.frames
+        lengths = np.diff(own.times)
+        ways = Ways(own.series, lengths, own.speed, own.bend, own.swerve, body.offset)
+        doubt = body.doubt * (1.0 + outline.most_reach)
+        edges = around.outline, around.index
+        found = nearest_still(ways, outline, *edges, spans, doubt, enough, CONTACT)
         if not found.touches:
             least = _at(body, found.distance, found.measured, found.element, found.share)
             if not around.movers.motions:
@@ -85,15 +90,6 @@ def _at(body: AuditedBody, distance: float, measured: float, element: int, share
     """What was found at a share of an element."""
     time = body.frames.times_at(np.array([element]), np.array([share]))
     return Least(distance, measured, float(time[0]))
-
-
-def _compiled(body: AuditedBody, around: Surroundings, spans: Spans, enough: float) -> Found:
-    """The least clearance to still edges in the plane."""
-    outline, frames = body.outline, body.frames
-    lengths = np.diff(frames.times)
-    ways = Ways(frames.series, lengths, frames.speed, frames.bend, frames.swerve, body.offset)
-    doubt = body.doubt * (1.0 + outline.most_reach)
-    return nearest_still(ways, outline, around.outline, around.index, spans, doubt, enough, CONTACT)
 
 
 def _sharpened(

@@ -204,9 +204,9 @@ def audit_plan(
         ask()
         offset = np.array(goal.pose)
         offset[2] = 0.0
-        known = {"bodies": list(bodies.values()), "around": around(obstacles, origin)}
+        beside = list(bodies.values()), around(obstacles, origin)
         for cost, stated in zip(places.costs, places.prices, strict=True):
-            prices.append(price_again(cost, drive, offset, **known, whole=places.whole))
+            prices.append(price_again(cost, drive, offset, *beside, whole=places.whole))
             if not abs(prices[-1] - stated) <= AGREED * places.whole:
                 what = type(cost).__name__
                 reasons.append(f"{what} costs {prices[-1]:.6g}, not {stated:.6g} as stated")

@@ -306,7 +306,7 @@ def _ground_of(
     static = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is None]
     seen = tuple(obstacles[k] for k in static)
     if any(origin):
-        seen = tuple(one.moved(SE2([-origin[0], -origin[1], 0.0])) for one in seen)
+        seen = tuple(one.moved(SE2(np.array([-origin[0], -origin[1], 0.0]))) for one in seen)
     nothing = np.zeros(0, dtype=np.int64)
     return _Ground(
         obstacles=seen,
@@ -327,7 +327,7 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
     boxes = np.zeros((len(obstacles), 4))
     rectangles, polygons = [], []
     for k, one in enumerate(obstacles):
-        shape = getattr(one, "shape", one)
+        shape: Any = getattr(one, "shape", one)
         if isinstance(shape, Box):
             rectangles.append((k, shape))
         elif isinstance(shape, Polygon):
