@@ -48,8 +48,9 @@ def price_again(
         at, shape = (np.repeat(spans.element, SHARES.size), shares.ravel()), shares.shape
         twists = drive.twists_at(*at).reshape(*shape, offset.size)
         if isinstance(cost, Clearance):
-            apart = np.min([_distances(one, around, *at, cost.within) for one in bodies], axis=0)
-            found = cost.weight * (1.0 - apart.reshape(shape) / cost.within) ** 2
+            apart = [_distances(one, around, *at, cost.within) for one in bodies]
+            near = 1.0 - np.minimum.reduce(apart).reshape(shape) / cost.within
+            found = np.asarray(cost.weight * near * near)
         else:
             poses = (drive.frames.at(*at) + offset).reshape(twists.shape)
             found = np.array(cost.rates(poses, twists), dtype=np.float64)

@@ -169,8 +169,8 @@ def _short_words(
         kept = np.flatnonzero(beside <= BESIDE * (1.0 + abs(z)))
         if not kept.size:
             return
-        pairs = i, j, between, left, first, second
-        i, j, between, left, first, second = (one[kept] for one in pairs)
+        i, j, between = i[kept], j[kept], between[kept]
+        left, first, second = left[kept], first[kept], second[kept]
         area = (first.conj() * second).imag
         times = np.array([(left.conj() * second).imag / area, (first.conj() * left).imag / area])
         one = turns[i] | turns[j] | (np.abs(area) <= NONE * np.abs(first * second))
