@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton.audit._kernels_still import Found, Ways, nearest_still
+from maneuver_automaton.audit._kernels_still import Ways, nearest_still
 from maneuver_automaton.audit.arrays import Spans
 from maneuver_automaton.audit.outlines import Surroundings
-from maneuver_automaton.audit.pairs import StillEdges, moving_pairs, on_arcs, overlapped
+from maneuver_automaton.audit.pairs import moving_pairs, nearest_still_pairs, on_arcs, overlapped
 from maneuver_automaton.audit.passages import (
     AuditedBody,
     ClearanceBounds,
@@ -60,7 +60,12 @@ def least_clearance(
     found, least = None, NEVER
     if around.still.size and not body.in_space:
         ask()
-        found = _compiled(body, around, spans, enough)
+        outline, own = body.outline, body.frames
+        lengths = np.diff(own.times)
+        ways = Ways(own.series, lengths, own.speed, own.bend, own.swerve, body.offset)
+        doubt = body.doubt * (1.0 + outline.most_reach)
+        edges = around.outline, around.index
+        found = nearest_still(ways, outline, *edges, spans, doubt, enough, CONTACT)
         if not found.touches:
             least = _at(body, found.distance, found.measured, found.element, found.share)
             if not around.movers.motions:
@@ -70,7 +75,7 @@ def least_clearance(
         return _at(body, 0.0, 0.0, int(spans.element[0]), float(spans.begin[0]))
     if around.still.size and (found is None or found.touches):
         ask()
-        pairs, known = StillEdges.near(body, around, places).nearest()
+        pairs, known = nearest_still_pairs(body, around, places)
         least = _sharpened(body, around, pairs, known, least, enough, ask)
     for nearest, some in moving_pairs(body, around, places, least.measured):
         if not nearest < least.measured:
@@ -85,15 +90,6 @@ def _at(body: AuditedBody, distance: float, measured: float, element: int, share
     """What was found at a share of an element."""
     time = body.frames.times_at(np.array([element]), np.array([share]))
     return Least(distance, measured, float(time[0]))
-
-
-def _compiled(body: AuditedBody, around: Surroundings, spans: Spans, enough: float) -> Found:
-    """The least clearance to still edges in the plane."""
-    outline, frames = body.outline, body.frames
-    lengths = np.diff(frames.times)
-    ways = Ways(frames.series, lengths, frames.speed, frames.bend, frames.swerve, body.offset)
-    doubt = body.doubt * (1.0 + outline.most_reach)
-    return nearest_still(ways, outline, around.outline, around.index, spans, doubt, enough, CONTACT)
 
 
 def _sharpened(

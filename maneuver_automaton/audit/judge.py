@@ -105,10 +105,7 @@ def distance_to(end: Array, goal: Goal) -> TerminalError:
     """How far a pose (dof,), counted from the goal's place, is from the goal."""
     places = [0, 1, *range(3, end.size)]
     heading = 0.0 if goal.free_heading else float(abs(wrapped(end[2] - goal.pose[2])))
-    return TerminalError(
-        position_m=float(np.linalg.norm(end[places])),
-        heading_rad=heading,
-    )
+    return TerminalError(position_m=float(np.linalg.norm(end[places])), heading_rad=heading)
 
 
 def audit_plan(
@@ -207,9 +204,9 @@ def audit_plan(
         ask()
         offset = np.array(goal.pose)
         offset[2] = 0.0
-        known = {"bodies": list(bodies.values()), "around": around(obstacles, origin)}
+        beside = list(bodies.values()), around(obstacles, origin)
         for cost, stated in zip(places.costs, places.prices, strict=True):
-            prices.append(price_again(cost, drive, offset, **known, whole=places.whole))
+            prices.append(price_again(cost, drive, offset, *beside, whole=places.whole))
             if not abs(prices[-1] - stated) <= AGREED * places.whole:
                 what = type(cost).__name__
                 reasons.append(f"{what} costs {prices[-1]:.6g}, not {stated:.6g} as stated")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -147,53 +146,32 @@ def instant(body: AuditedBody, around: Surroundings, time: float) -> EdgePairs:
     return EdgePairs(places, np.zeros_like(edge), edge, frames)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class StillEdges:
-    """The still edges near a body over stretches of time."""
+def nearest_still_pairs(
+    body: AuditedBody, around: Surroundings, places: SpanPlaces
+) -> tuple[EdgePairs, ClearanceBounds]:
+    """Pairs of stretches and still edges among which the nearest of all is, with bounds.
 
-    body: AuditedBody
-    around: Surroundings
-    places: SpanPlaces
-    pad: Array  # (s, 1) [m] by which the boxes are too small
-    boxes: _Boxes  # around its corners
-    own_boxes: _Boxes  # the same, along the axes of the body as a stretch begins
-
-    @classmethod
-    def near(cls, body: AuditedBody, around: Surroundings, places: SpanPlaces) -> StillEdges:
-        """Those of some surroundings."""
-        pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
-        boxes, own = (
-            _Boxes.around(places.corners),
-            _Boxes.around(np.asarray((places.corners - places.place[0]) * places.turn[0].conj())),
-        )
-        return cls(body, around, places, pad, boxes, own)
-
-    def within(self, distance: float) -> EdgePairs:
-        """All pairs that come nearer than a distance [m], and others."""
-        pad = self.pad + distance
-        span, edge = self.around.near(np.concatenate(self.boxes.grown(pad), axis=1))
-        kept = _meets(self.around, self.places, self.own_boxes.grown(pad), span, edge)
-        return EdgePairs(self.places, span[kept], edge[kept], None)
-
-    def nearest(self) -> tuple[EdgePairs, ClearanceBounds]:
-        """Pairs among which the nearest of all is, with bounds.
-
-        They are looked for further and further away, until a distance is measured within which none
-        is left out.
-        """
-        body, around = self.body, self.around
-        within = FIRST_WITHIN * body.outline.size + SPARE
-        while True:
-            pairs = self.within(within)
-            if not pairs.edge.size:
-                within *= FURTHER
-                continue
-            if pairs.edge.size > MANY:
-                pairs = _nearest_pairs(body, around, pairs)
-            known = bounds_of(body, around, pairs)
-            if (nearest := float(known.measured.min())) <= within:
-                return pairs, known
-            within = nearest
+    They are looked for further and further away, until a distance is measured within which none is
+    left out.
+    """
+    pad = (body.outline.radius + SPARE + _off_chords(body, places))[:, None]
+    boxes = _Boxes.around(places.corners)
+    # Those along the axes of the body as a stretch begins are closer to it.
+    own = _Boxes.around(np.asarray((places.corners - places.place[0]) * places.turn[0].conj()))
+    within = FIRST_WITHIN * body.outline.size + SPARE
+    while True:
+        span, edge = around.near(np.concatenate(boxes.grown(pad + within), axis=1))
+        kept = _meets(around, places, own.grown(pad + within), span, edge)
+        pairs = EdgePairs(places, span[kept], edge[kept], None)
+        if not pairs.edge.size:
+            within *= FURTHER
+            continue
+        if pairs.edge.size > MANY:
+            pairs = _nearest_pairs(body, around, pairs)
+        known = bounds_of(body, around, pairs)
+        if (nearest := float(known.measured.min())) <= within:
+            return pairs, known
+        within = nearest
 
 
 def _nearest_pairs(body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> EdgePairs:

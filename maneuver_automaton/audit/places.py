@@ -32,9 +32,9 @@ def price_again(
     cost: PlaceCost,
     drive: DrivenPlan,
     offset: Array,
-    *,
     bodies: Sequence[AuditedBody],
     around: Surroundings,
+    *,
     whole: float,
 ) -> float:
     """The integral of a cost along a drive whose poses are counted from a place (dof,).
@@ -44,17 +44,17 @@ def price_again(
     lasting = np.diff(drive.frames.times)
 
     def rates(spans: Spans) -> Array:
-        at, shape = _nodes(spans), (len(spans.element), SHARES.size)
-        near, metres = isinstance(cost, Clearance), cost.per == "metre"
-        if metres or not near:
-            twists = drive.twists_at(*at).reshape(*shape, offset.size)
+        shares = spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES
+        at, shape = (np.repeat(spans.element, SHARES.size), shares.ravel()), shares.shape
+        twists = drive.twists_at(*at).reshape(*shape, offset.size)
         if isinstance(cost, Clearance):
-            apart = np.min([_distances(one, around, *at, cost.within) for one in bodies], axis=0)
-            found = cost.weight * (1.0 - apart.reshape(shape) / cost.within) ** 2
+            apart = [_distances(one, around, *at, cost.within) for one in bodies]
+            near = 1.0 - np.minimum.reduce(apart).reshape(shape) / cost.within
+            found = np.asarray(cost.weight * near * near)
         else:
             poses = (drive.frames.at(*at) + offset).reshape(twists.shape)
             found = np.array(cost.rates(poses, twists), dtype=np.float64)
-        if metres:
+        if cost.per == "metre":
             found *= np.sqrt((np.delete(twists, 2, axis=2) ** 2).sum(axis=2))
         return found
 
@@ -80,12 +80,6 @@ def price_again(
             np.stack([middle, rest.end], axis=1).ravel(),
         )
     return done + float(fine.sum())
-
-
-def _nodes(spans: Spans) -> tuple[IntArray, Array]:
-    """Elements, and shares of them, at all `SHARES` of stretches (n * 7,)."""
-    shares = spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES
-    return np.repeat(spans.element, SHARES.size), shares.ravel()
 
 
 def _no_longer(spans: Spans, lasting: Array, speeds: Array) -> Spans:

@@ -20,20 +20,8 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines
-from maneuver_automaton.collision.shapes import (
-    AnyObstacle,
-    Box,
-    Disc,
-    Polygon,
-    Shape,
-    box_corners,
-)
-from maneuver_automaton.collision.solids import (
-    Skin,
-    body_skin,
-    obstacle_regions,
-    obstacle_skin,
-)
+from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon, Shape, box_corners
+from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_regions, obstacle_skin
 from maneuver_automaton.collision.swept import (
     STANDING,
     GrownBody,
@@ -164,12 +152,7 @@ class FclChecker:
         return self._ground.near(np.concatenate([low[:, :2] - reach, high[:, :2] + reach], axis=1))
 
     def _first_step_hit(
-        self,
-        poses: Array,
-        steps: Array,
-        courses: IntArray,
-        laid: _Laid,
-        ask: Callable[[], None],
+        self, poses: Array, steps: Array, courses: IntArray, laid: _Laid, ask: Callable[[], None]
     ) -> tuple[int, int] | None:
         """The first of some steps of courses that touches a static obstacle, and which."""
         if laid.static is None:
@@ -211,24 +194,24 @@ class FclChecker:
         return bool(_touching([_object(skin)], np.zeros((1, 3)), laid.static))
 
     def _first_hit(
-        self,
-        starts: Array,
-        twists: Array,
-        durations: Array,
-        laid: _Laid,
-        ask: Callable[[], None],
+        self, starts: Array, twists: Array, durations: Array, laid: _Laid, ask: Callable[[], None]
     ) -> tuple[int, int] | None:
         """The first of some coasts that touches a static obstacle, and which."""
         if laid.static is None:
             return None
         speeds = point_speeds(twists, np.concatenate(self._body.pieces)).max(axis=1)
         moving = speeds * durations > STANDING
-        first = self._first_pose_hit(starts, np.flatnonzero(~moving), laid)
+        standing = np.flatnonzero(~moving)
+        first = self._first_pose_hit(starts[standing], standing, laid)
         lasting = np.where(moving, _once_round(twists[:, 2], durations), 0.0)
         parts = windows(twists[:, 2], lasting)
         if first is not None:
             parts = parts.of(parts.coast < first[0])
         kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
+
+        def posed(of: IntArray, times: Array) -> Array:
+            return (SE2(starts[of]) @ SE2.exp(times[:, None] * twists[of])).pose
+
         while parts.coast.size:
             ask()
             of = parts.coast
@@ -236,31 +219,30 @@ class FclChecker:
                 _sliced(self._body, kinds[k], level)
                 for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
             ]
-            times = np.stack([parts.begins, parts.begins + 0.5 * parts.lengths])
-            begins, middles = (SE2(starts[of]) @ SE2.exp(times[..., None] * twists[of])).pose
             objects = [solid.object for solid in solids]
-            hits = _touching(objects, begins, laid.static)
-            if not hits:
-                break
+            hits = _touching(objects, posed(of, parts.begins), laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
                 if solids[row].excess <= 0.5 * self.proven and (not first or of[row] < first[0]):
                     first = int(of[row]), int(laid.owners[triangle])
             sooner = [row for row in hits if not first or of[row] < first[0]]
-            rows = np.array(sooner, dtype=np.int64)
-            hit = self._first_pose_hit(middles, rows, laid)
+            if not sooner:
+                break
+            parts = parts.of(np.array(sooner))
+            middles = posed(parts.coast, parts.begins + 0.5 * parts.lengths)
+            hit = self._first_pose_hit(middles, parts.coast, laid)
             if hit is not None:
-                first = int(of[hit[0]]), hit[1]
-                rows = rows[of[rows] < first[0]]
-            parts = halves(parts.of(rows))
+                first, parts = hit, parts.of(parts.coast < hit[0])
+            parts = halves(parts)
         return first
 
-    def _first_pose_hit(self, poses: Array, rows: IntArray, laid: _Laid) -> tuple[int, int] | None:
-        """The first of some rows of poses (n, 3) that touches a static obstacle, and which."""
-        if laid.static is None:
+    def _first_pose_hit(
+        self, poses: Array, numbers: IntArray, laid: _Laid
+    ) -> tuple[int, int] | None:
+        """The number (n,) of the first pose (n, 3) that touches a static obstacle, and which."""
+        if laid.static is None or not numbers.size:
             return None
-        body = [_standing(self._body)] * rows.size
-        hits = _touching(body, poses[rows], laid.static, most=1)
-        return next(((int(rows[row]), int(laid.owners[at])) for row, at in hits.items()), None)
+        hits = _touching([_standing(self._body)] * numbers.size, poses, laid.static, most=1)
+        return next(((int(numbers[row]), int(laid.owners[at])) for row, at in hits.items()), None)
 
 
 class Course(NamedTuple):
@@ -290,17 +272,14 @@ class _Ground:
 
     def near(self, boxes: Array) -> _Laid:
         """All obstacles that meet one of some boxes (m, 4), and others."""
-        laid, own = self.laid, self.boxes
-        waiting = np.flatnonzero(~laid.rows)
-        if not waiting.size:
+        laid = self.laid
+        if laid.rows.all():
             return laid
-        low, high = own[waiting, None, :2], own[waiting, None, 2:]
+        low, high = self.boxes[:, None, :2], self.boxes[:, None, 2:]
         meets = np.all((low <= boxes[:, 2:]) & (high >= boxes[:, :2]), axis=-1)
-        near = waiting[np.any(meets, axis=1)]
-        if not near.size:
+        rows = laid.rows | meets.any(axis=1)
+        if not (rows & ~laid.rows).any():
             return laid
-        rows = laid.rows.copy()
-        rows[near] = True
         which = np.flatnonzero(rows)
         found = [self.obstacles[k] for k in which.tolist()]
         skin, of = obstacle_skin(obstacle_regions(found, excess=self.excess))
@@ -327,7 +306,7 @@ def _ground_of(
     static = [k for k, one in enumerate(obstacles) if getattr(one, "motion", None) is None]
     seen = tuple(obstacles[k] for k in static)
     if any(origin):
-        seen = tuple(one.moved(SE2([-origin[0], -origin[1], 0.0])) for one in seen)
+        seen = tuple(one.moved(SE2(np.array([-origin[0], -origin[1], 0.0]))) for one in seen)
     nothing = np.zeros(0, dtype=np.int64)
     return _Ground(
         obstacles=seen,
@@ -348,7 +327,7 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
     boxes = np.zeros((len(obstacles), 4))
     rectangles, polygons = [], []
     for k, one in enumerate(obstacles):
-        shape = getattr(one, "shape", one)
+        shape: Any = getattr(one, "shape", one)
         if isinstance(shape, Box):
             rectangles.append((k, shape))
         elif isinstance(shape, Polygon):
@@ -438,11 +417,7 @@ def _turns(poses: Array) -> Array:
 
 
 def _touching(
-    ones: Sequence[Any],
-    poses: Array,
-    other: Any,
-    *,
-    most: int | None = None,
+    ones: Sequence[Any], poses: Array, other: Any, *, most: int | None = None
 ) -> dict[int, int]:
     """Which of some objects (n) at poses (n, 3) touch another, and which of its triangles."""
     import fcl

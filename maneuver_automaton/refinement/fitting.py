@@ -112,31 +112,21 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
     [('ahead',)]
     """
     automaton, found = problem.automaton, list[tuple[Plan, int]]()
+    start, clock = problem.start, problem.start_time
     for index, goal in enumerate(problem.goals):
-        distance, turn = goal.off(problem.start)
+        distance, turn = goal.off(start)
         if distance <= goal.tolerance_m + MET and turn <= goal.tolerance_rad + MET:
             restless = automaton.is_kinematic and automaton.rest is None
             first = [] if restless else [problem.first_trim]
             if automaton.is_kinematic or np.array_equal(
                 first[0].reduced_state, problem.last_trim(goal).reduced_state
             ):
-                plan = Plan(
-                    problem.start,
-                    first,
-                    durations=[0.0] * len(first),
-                    start_time=problem.start_time,
-                )
+                plan = Plan(start, first, durations=[0.0] * len(first), start_time=clock)
                 found.append((plan, index))
         elif not goal.free_heading and len(joined := _joined(problem, goal)) <= MOST_TRIMS:
             for trims, times in _short_words(problem, goal, joined):
                 switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
-                plan = Plan(
-                    problem.start,
-                    trims,
-                    durations=times,
-                    maneuvers=switches,
-                    start_time=problem.start_time,
-                )
+                plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
                 found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
 
@@ -169,23 +159,18 @@ def _short_words(
     turns = w != 0.0
     with np.errstate(divide="ignore", invalid="ignore"):
         r = np.where(turns, -1j * v / w, 0.0)  # from the centre of a turn to the pose
-        before, after = r[i], r[j]
-        centres = np.angle((z + before - after * last) / (before - after))  # of two turns decide
-        # heading at the switch
-        between = np.where(turns[j] & (before != after), centres, h) * turns[i]
-        switch = np.exp(1j * between)
-        left = z - before * (switch - 1.0) - after * (last - switch)
+        centres = np.angle((z + r[i] - r[j] * last) / (r[i] - r[j]))  # of two turns decide
+        between = np.where(turns[j] & (r[i] != r[j]), centres, h) * turns[i]  # at the switch
+        left = z - r[i] * (np.exp(1j * between) - 1.0) - r[j] * (last - np.exp(1j * between))
         first, second = v[i], v[j] * last  # straights, which have to cover what is left
         straight = np.where(turns[j], first, second)
-        beside = np.abs((left / straight).imag * np.abs(straight))
-        beside = np.where(turns[i] & turns[j], np.abs(left), beside)
-        beside = np.where(turns[i] | turns[j], beside, abs(wrapped(h)))
+        beside = np.where(turns[i] & turns[j], left, (left / straight).imag * straight)
+        beside = np.where(turns[i] | turns[j], np.abs(beside), abs(wrapped(h)))
         kept = np.flatnonzero(beside <= BESIDE * (1.0 + abs(z)))
         if not kept.size:
             return
-        i, j, between, left, first, second = (
-            one[kept] for one in (i, j, between, left, first, second)
-        )
+        i, j, between = i[kept], j[kept], between[kept]
+        left, first, second = left[kept], first[kept], second[kept]
         area = (first.conj() * second).imag
         times = np.array([(left.conj() * second).imag / area, (first.conj() * left).imag / area])
         one = turns[i] | turns[j] | (np.abs(area) <= NONE * np.abs(first * second))
