@@ -186,7 +186,7 @@ def _pipeline(name: str) -> dict[str, Any]:
 def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     import numba
 
-    return numba.njit(
+    compiled = numba.njit(
         nogil=True,
         error_model="numpy",
         no_cpython_wrapper=True,
@@ -194,13 +194,35 @@ def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
         **_pipeline("LinkedCompiler"),
         **options,
     )(function)
+    return _for_any_number(compiled)
+
+
+def _for_any_number(compiled: Any) -> Any:
+    """Compile it once where kernels call it: numba does so anew for every number written there."""
+    from numba import types
+
+    def widened(kind: Any) -> Any:
+        if isinstance(kind, types.IntegerLiteral):
+            return kind.literal_type
+        if isinstance(kind, types.UniTuple | types.Tuple):
+            return types.Tuple.from_types(tuple(map(widened, kind.types)))
+        return kind
+
+    usual = getattr(compiled, "get_call_template", None)
+    if usual is None:  # numba is switched off
+        return compiled
+    compiled.get_call_template = lambda args, kws: usual(
+        tuple(map(widened, args)), {name: widened(kind) for name, kind in kws.items()}
+    )
+    return compiled
 
 
 def _shared(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     how = _pipeline("SharedCompiler")
     if not how:  # compiled plainly, it is linked into what calls it
         return _inner(function, options)
-    return _cached(function, {"no_cpython_wrapper": True, **options}, "SharedCompiler")
+    shared = _cached(function, {"no_cpython_wrapper": True, **options}, "SharedCompiler")
+    return _for_any_number(shared)
 
 
 def _cached(

@@ -232,7 +232,9 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     for one in maps:
         x, y, heading = one.origin.tolist()
         c, s = math.cos(heading), math.sin(heading)
-        _kernels_field.write_map(*where, one.blocked, one.resolution, x, y, c, s)
+        blocked = one.blocked.view()
+        blocked.setflags(write=False)  # as those of a map from another process are not
+        _kernels_field.write_map(*where, blocked, one.resolution, x, y, c, s)
     return Field(distance, float(origin[0]), float(origin[1]), cell, cap)
 
 
