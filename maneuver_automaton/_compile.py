@@ -24,7 +24,6 @@ class CompiledLater:
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
-        self.is_shared = getattr(make, "func", None) is _shared  # by the kernels that call it
         self._function = function
         self._make = make
 
@@ -186,34 +185,30 @@ def _pipeline(name: str) -> dict[str, Any]:
 def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     import numba
 
-    compiled = numba.njit(
+    made = numba.njit(
         nogil=True,
         error_model="numpy",
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,
         **_pipeline("LinkedCompiler"),
         **options,
-    )(function)
-    return _for_any_number(compiled)
+    )
+    return _for_any_number(made(function))
 
 
 def _for_any_number(compiled: Any) -> Any:
-    """Compile it once where kernels call it: numba does so anew for every number written there."""
+    """Have it compiled once: numba does so anew for every integer that stands in a call of it."""
     from numba import types
 
     def widened(kind: Any) -> Any:
-        if isinstance(kind, types.IntegerLiteral):
-            return kind.literal_type
         if isinstance(kind, types.UniTuple | types.Tuple):
             return types.Tuple.from_types(tuple(map(widened, kind.types)))
-        return kind
+        return kind.literal_type if isinstance(kind, types.IntegerLiteral) else kind
 
-    usual = getattr(compiled, "get_call_template", None)
-    if usual is None:  # numba is switched off
-        return compiled
-    compiled.get_call_template = lambda args, kws: usual(
-        tuple(map(widened, args)), {name: widened(kind) for name, kind in kws.items()}
-    )
+    if usual := getattr(compiled, "get_call_template", None):  # none: numba is switched off
+        compiled.get_call_template = lambda args, kws: usual(
+            tuple(map(widened, args)), {name: widened(kind) for name, kind in kws.items()}
+        )
     return compiled
 
 
@@ -221,8 +216,8 @@ def _shared(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     how = _pipeline("SharedCompiler")
     if not how:  # compiled plainly, it is linked into what calls it
         return _inner(function, options)
-    shared = _cached(function, {"no_cpython_wrapper": True, **options}, "SharedCompiler")
-    return _for_any_number(shared)
+    options = {"no_cpython_wrapper": True, **options}
+    return _for_any_number(_cached(function, options, "SharedCompiler"))
 
 
 def _cached(

@@ -64,8 +64,7 @@ USES = {  # modules of kernels, by what calls them
         "roads._kernels_polish",
     ),
 }
-# What an installation leaves to the first who needs it: first plans of cars and robots do not, and
-# it is four tenths of all that the compiler has to do.
+# What an installation leaves to its first use: the first plan of no scenario here needs any of it.
 LATER = ("state lattice", "timed lattice", "fail-safe", "unconstrained loop", "cells", "roads")
 
 Stated = Any  # a type as the list has it
