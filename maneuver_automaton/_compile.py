@@ -24,7 +24,6 @@ class CompiledLater:
 
     def __init__(self, function: Callable[..., Any], make: Callable[..., Any]) -> None:
         functools.update_wrapper(self, function)
-        self.is_shared = getattr(make, "func", None) is _shared  # by the kernels that call it
         self._function = function
         self._make = make
 
@@ -186,21 +185,39 @@ def _pipeline(name: str) -> dict[str, Any]:
 def _inner(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     import numba
 
-    return numba.njit(
+    made = numba.njit(
         nogil=True,
         error_model="numpy",
         no_cpython_wrapper=True,
         no_cfunc_wrapper=True,
         **_pipeline("LinkedCompiler"),
         **options,
-    )(function)
+    )
+    return _for_any_number(made(function))
+
+
+def _for_any_number(compiled: Any) -> Any:
+    """Have it compiled once: numba does so anew for every integer that stands in a call of it."""
+    from numba import types
+
+    def widened(kind: Any) -> Any:
+        if isinstance(kind, types.UniTuple | types.Tuple):
+            return types.Tuple.from_types(tuple(map(widened, kind.types)))
+        return kind.literal_type if isinstance(kind, types.IntegerLiteral) else kind
+
+    if usual := getattr(compiled, "get_call_template", None):  # none: numba is switched off
+        compiled.get_call_template = lambda args, kws: usual(
+            tuple(map(widened, args)), {name: widened(kind) for name, kind in kws.items()}
+        )
+    return compiled
 
 
 def _shared(function: Callable[..., Any], options: dict[str, Any]) -> Any:
     how = _pipeline("SharedCompiler")
     if not how:  # compiled plainly, it is linked into what calls it
         return _inner(function, options)
-    return _cached(function, {"no_cpython_wrapper": True, **options}, "SharedCompiler")
+    options = {"no_cpython_wrapper": True, **options}
+    return _for_any_number(_cached(function, options, "SharedCompiler"))
 
 
 def _cached(

@@ -26,7 +26,15 @@ from maneuver_automaton import _kernel_list
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 from maneuver_automaton._kernel_list import LATER, kernel_names, later_uses, module_of
 
-FIRST = ("refinement.", "search._kernels_lattice", "receding_horizon.")  # share most, take longest
+FIRST = (  # modules that share functions, those that take longest first; the others share less
+    "refinement.",
+    "search._kernels_lattice",
+    "receding_horizon.",
+    "search._kernels_begin",
+    "search._kernels_distance",
+    "search._kernels_waiting",
+    "collision.",
+)
 HELD = 2e9  # [bytes] that one process may come to hold; 1.6 to 1.9 GB are measured
 KEPT = 8  # folders of compiled kernels, of other versions and of sources that were edited
 EVERY = "MANEUVER_AUTOMATON_COMPILE_ALL"  # set where a build is to compile every kernel
@@ -49,7 +57,9 @@ def compile_kernels(
     """Compile those that are not compiled yet, in several processes; what failed, and why."""
     workers = [_worker(settings or {}) for _ in range(min(jobs or affordable(), len(names)))]
     modules = [list(its) for _, its in itertools.groupby(sorted(names), module_of)]
-    waiting = deque(sorted(modules, key=lambda its: not module_of(its[0]).startswith(FIRST)))
+    waiting = deque(
+        sorted(modules, key=lambda its: [not module_of(its[0]).startswith(one) for one in FIRST])
+    )
     failed, done = list[str](), list[str]()
 
     def serve(number: int, worker: subprocess.Popen[str]) -> None:
@@ -131,7 +141,7 @@ def work() -> None:
     for line in sys.stdin:
         name, answer = line.strip(), "done"
         try:
-            for signature in _kernel_list.listed()[name]:
+            for signature in _kernel_list.signatures_of(name):
                 _kernel_list.kernel_named(name).compile(signature)  # type: ignore[attr-defined]
         except Exception as error:  # noqa: BLE001, whatever it is, the kernel is compiled when used
             answer = " ".join(f"{type(error).__name__}: {error}".split())

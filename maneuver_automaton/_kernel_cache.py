@@ -24,7 +24,13 @@ from numba.core.types.containers import BaseTuple
 from maneuver_automaton._cache_files import read_checked, say_once, write_checked
 from maneuver_automaton._compile_all import compile_missing, processors
 from maneuver_automaton._kernel_folders import shipped_folder
-from maneuver_automaton._kernel_list import compiled_with, kernel_named, later_uses, listed
+from maneuver_automaton._kernel_list import (
+    compiled_with,
+    kernel_named,
+    kernel_names,
+    later_uses,
+    signatures_of,
+)
 
 ENDING = ".nbc"
 OTHER = "made for another processor, Python or numba: kernels are compiled anew, once"
@@ -113,7 +119,7 @@ class KernelCache:
 
 
 def _is_listed(name: str, signature: Any) -> bool:
-    return tuple(signature) in listed().get(name, ())
+    return name in kernel_names() and tuple(signature) in signatures_of(name)
 
 
 @functools.cache

@@ -64,8 +64,7 @@ USES = {  # modules of kernels, by what calls them
         "roads._kernels_polish",
     ),
 }
-# What an installation leaves to the first who needs it: first plans of cars and robots do not, and
-# it is four tenths of all that the compiler has to do.
+# What an installation leaves to its first use: the first plan of no scenario here needs any of it.
 LATER = ("state lattice", "timed lattice", "fail-safe", "unconstrained loop", "cells", "roads")
 
 Stated = Any  # a type as the list has it
@@ -105,12 +104,11 @@ def compiled_with(name: str) -> list[str]:
 def _load(module: str) -> None:
     from numba.extending import typeof_impl
 
-    for name, signatures in _rows().items():
+    for name in _rows():
         one: Any = kernel_named(name) if module in name else None
         if not hasattr(one, "compile"):  # of another module, or numba is switched off
             continue
-        for args in signatures:
-            kinds = tuple(map(type_of, args))
+        for kinds in signatures_of(name):
             one.compile(kinds)
             for kind in kinds:  # or the first call looks for what types such tuples have
                 if hasattr(kind, "instance_class"):
@@ -124,12 +122,9 @@ def _rows() -> dict[str, list[list[Stated]]]:
 
 
 @functools.cache
-def listed() -> dict[str, tuple[tuple[Any, ...], ...]]:
-    """The types of the arguments of each kernel, by ``module.name``, in the order of the list."""
-    return {
-        name: tuple(tuple(map(type_of, args)) for args in signatures)
-        for name, signatures in _rows().items()
-    }
+def signatures_of(name: str) -> tuple[tuple[Any, ...], ...]:
+    """The types of the arguments of each kind of call that a kernel is compiled for."""
+    return tuple(tuple(map(type_of, args)) for args in _rows()[name])
 
 
 def kernel_named(name: str) -> Callable[..., Any]:

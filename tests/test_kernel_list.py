@@ -23,8 +23,8 @@ from maneuver_automaton._kernel_list import (
     kernel_named,
     kernel_names,
     later_uses,
-    listed,
     module_of,
+    signatures_of,
     stated,
     type_of,
     write_list,
@@ -44,8 +44,8 @@ def test_every_kernel_is_listed():
         if before in ("@kernel", "@bare_kernel", "@shared_kernel", "@bare_shared_kernel")
         for name in [line.removeprefix("def ").split("(")[0]]
     }
-    assert set(listed()) == decorated
-    for name in listed():
+    assert set(kernel_names()) == decorated
+    for name in kernel_names():
         assert kernel_named(name).__name__ == name.rsplit(".", 1)[1]
 
 
@@ -88,8 +88,8 @@ def test_types_are_written_and_read(kind, name):
 def test_the_list_is_written_as_it_was_read(tmp_path, monkeypatch):
     file = tmp_path / "kernels.json"
     monkeypatch.setattr("maneuver_automaton._kernel_list.FILE", file)
-    before = listed()
-    write_list({name: list(args) for name, args in before.items()})
+    before = {name: signatures_of(name) for name in kernel_names()}
+    write_list(before)
     assert file.read_text() == (PACKAGE / "kernels.json").read_text()
 
 

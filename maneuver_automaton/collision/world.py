@@ -227,14 +227,14 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     cap = keep + max(4.0 * body.half_width, body.inscribed, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     distance = np.full((rows, columns), cap)
-    origin = low - cap
-    where = (distance, float(origin[0]), float(origin[1]), cell, cap)
+    where = (distance, *(low - cap).tolist(), cell, cap)
     _kernels_field.write_pieces(*where, solids.edges, solids.first, solids.plates, listed)
     for one in maps:
         x, y, heading = one.origin.tolist()
-        c, s = math.cos(heading), math.sin(heading)
-        _kernels_field.write_map(*where, one.blocked, one.resolution, x, y, c, s)
-    return Field(distance, float(origin[0]), float(origin[1]), cell, cap)
+        turn = math.cos(heading), math.sin(heading)
+        cells = np.broadcast_to(one.blocked, one.blocked.shape)  # read-only, wherever it is from
+        _kernels_field.write_map(*where, cells, one.resolution, x, y, *turn)
+    return Field(*where)
 
 
 def _buckets(plates: Array, body: Body, keep: float) -> Buckets:

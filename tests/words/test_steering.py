@@ -40,7 +40,7 @@ def planted(rng, kinds, *, sideways, displaced):
         end = end @ SE2.exp(times[:, k, None] * twists[:, k])
         if k < 2:
             end = end @ SE2(between[:, k])
-    return twists, between, times, end.pose
+    return twists, between, times, np.array(end.pose)
 
 
 @pytest.mark.parametrize("displaced", [0.0, 1.0], ids=["joined", "displaced"])
