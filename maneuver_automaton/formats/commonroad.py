@@ -18,6 +18,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +97,7 @@ def read_commonroad(path: Path) -> tuple[Statement, ...]:
             name=name if len(problems) == 1 else f"{name} case {k}",
             lanelets=tuple(lanelets.values()),
             start=_start(problem.need("initialState"), step),
-            goals=tuple(_goals(problem, lanelets, step)),
+            goals=tuple(_goals(problem, lanelets, step, notes)),
             traffic=traffic,
             step=step,
             source=", ".join(
@@ -346,20 +347,29 @@ def _start(state: Element, step: float) -> RoadStart:
     )
 
 
-def _goals(problem: Element, lanelets: Mapping[int, Lanelet], step: float) -> Iterator[GoalRegion]:
-    states = [
+def _goals(
+    problem: Element, lanelets: Mapping[int, Lanelet], step: float, notes: list[str]
+) -> Iterator[GoalRegion]:
+    regions = [
         one
         for element in problem.all("goalRegion")
         for one in (element.all("state") if element.get("state") else (element,))
     ]
-    states += problem.all("goalState")
+    states = [*regions, *problem.all("goalState")]
     if not states:
         raise problem.error("the element goalState is missing")
-    for state in states:
+    for k, state in enumerate(states):
         begin, end = _interval(state.need("time"))
         position, heading, speed = (
             state.get(tag) for tag in ("position", "orientation", "velocity")
         )
+        places = () if position is None else position.children
+        known = [one for one in places if one.tag != "lanelet" or one.whole("ref") in lanelets]
+        if position is not None and known:  # another place is enough
+            position = replace(position, children=known)
+        elif position is not None and k < len(regions):  # commonroad-io reads no goalRegion
+            position = None
+            notes.append(f"goal {k + 1}: any place counts, since the file lacks its lanelets")
         try:
             yield GoalRegion(
                 places=None if position is None else tuple(_places(position, lanelets)),

@@ -31,6 +31,7 @@ WAYS = ("left", "straight", "right", "leftStraight", "straightRight", "leftRight
 STRAIGHT = math.radians(30.0)  # to which a lanelet goes straight on from the one before it
 FALSE = ("false", "0")
 SIDES = ("leftBound", "rightBound")
+WITHOUT_REFS = (*SIDES, "trajectory", "occupancySet")  # many points and states
 LIGHT, SIGN = "trafficLightRef", "trafficSignRef"
 OTHERS = ("sidewalk", "crosswalk", "bicycleLane", "busLane")  # lanes that are not for cars
 READ = (
@@ -213,6 +214,15 @@ def not_obeyed(root: Element) -> Iterator[str]:
     bounds = [one for lane in lanes for side in SIDES for one in lane.all(side)]
     if any("solid" in one.text for bound in bounds for one in bound.all("lineMarking")):
         yield "not obeyed: solid lines between lanes of one direction are crossed"
+    every = [root]
+    for element in every:  # which grows meanwhile
+        every += [one for one in element.children if one.tag not in WITHOUT_REFS]
+    ids = {one.attributes.get("id", "").strip() for one in every}
+    all_refs = [
+        (one.tag, one.attributes["ref"].strip()) for one in every if "ref" in one.attributes
+    ]
+    if lost := Counter(f"{tag} {ref}" for tag, ref in all_refs if ref not in ids):
+        yield f"not followed, since the file holds nothing of this id: {_counted(lost)}"
     if unread := Counter(one.tag for one in root.children if one.tag not in READ):
         yield f"not read: the elements {_counted(unread)}"
 

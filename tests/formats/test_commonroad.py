@@ -224,15 +224,9 @@ def test_static_obstacles_stand_where_they_began(tmp_path):
 
 @needs_data
 def test_the_given_scenarios_are_read():
-    found, refused = {}, []
-    for file in sorted(SCENARIOS.glob("*.xml")):
-        try:
-            found[file.stem] = read_commonroad(file)[0].road
-        except InvalidScenario as error:
-            refused.append(str(error))
+    found = {file.stem: read_commonroad(file)[0].road for file in SCENARIOS.glob("*.xml")}
     assert len(found) >= 11
-    (said,) = refused
-    assert "got 31598, but no lanelet of the file has this id" in said
+    assert any("lanelet 31598" in said for said in found["ZAM_Tutorial-1_1_T-1"].notes)
     assert [len(found["DEU_Ffb-1_6_T-1"].lanelets), len(found["DEU_Gar-1_1_T-1"].traffic)] == [
         20,
         4,

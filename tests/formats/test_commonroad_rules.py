@@ -12,6 +12,7 @@ from maneuver_automaton.collision import Box, Disc, Polygon
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.commonroad import is_commonroad, n_problems, read_commonroad
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads import plan_road
 from maneuver_automaton.scenario import load_scenario
 from tests.quickly import quick_are
 from tests.roads.files import (
@@ -363,3 +364,35 @@ def test_problems_are_counted_by_elements(tmp_path):
     assert not is_commonroad(file)
     file.write_text("no XML")
     assert (is_commonroad(file), n_problems(file)) == (False, 0)
+
+
+CROSSING = """<intersection id="50"><incoming id="51"><incomingLanelet ref="1"/>
+<successorsLeft ref="96"/><isLeftOf ref="51"/></incoming></intersection>"""
+
+
+def test_what_a_file_refers_to_and_lacks_is_told_once(tmp_path):
+    lost = """<predecessor ref="91"/><successor ref="92"/><successor ref="92"/>
+    <adjacentLeft ref="93" drivingDir="same"/><trafficLightRef ref="94"/>
+    <stopLine><trafficSignRef ref="95"/></stopLine>"""
+    goal = ANY.replace("<time>", '<position><lanelet ref="1"/><lanelet ref="97"/></position><time>')
+    road = read(tmp_path, piece(1, 0.0, 200.0, lost), CROSSING, problem(goal=goal))
+    assert road.notes == (
+        "not followed, since the file holds nothing of this id: adjacentLeft 93, lanelet 97, "
+        "predecessor 91, successor 92 (2 times), successorsLeft 96, trafficLightRef 94, "
+        "trafficSignRef 95",
+    )
+    assert road.goals[0].lanelets == (1,)
+    assert plan_road(road, time_limit=60.0).plan is not None
+
+
+def test_an_old_goal_on_a_lanelet_that_the_file_lacks_is_any_place(tmp_path):
+    goal = ANY.replace("<time>", '<position><lanelet ref="97"/></position><time>')
+    old = goal.replace("goalState>", "state>")
+    road = read(tmp_path, *LANES, problem(goal=f"<goalRegion>{old}</goalRegion>"))
+    assert road.notes == (
+        "not followed, since the file holds nothing of this id: lanelet 97",
+        "goal 1: any place counts, since the file lacks its lanelets",
+    )
+    assert road.goals[0].places is None
+    with pytest.raises(InvalidScenario, match="ref: got 97, but no lanelet of the file"):
+        read(tmp_path, *LANES, problem(goal=goal))
