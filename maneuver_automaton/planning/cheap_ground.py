@@ -27,8 +27,8 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
 
     The way leads over cells of a grid, each at what its place costs under the heading of a step,
     and at the invariant cost of a metre. Closed in the first one, too, is what costs more than the
-    way beside it, but for around the ends. None where no place is sampled: what is near obstacles
-    costs no more there than elsewhere.
+    way near it, but for next to the way and around the ends. There is none where no place is
+    sampled: what is near obstacles costs no more there than elsewhere.
     """
     from scipy import ndimage
 
@@ -45,8 +45,10 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     off, out = np.ones(least.shape, dtype=np.bool_), np.ones(least.shape, dtype=np.bool_)
     off[tuple(way.T)], out[ends[:, 1], ends[:, 0]] = False, False
     far, (i, j) = ndimage.distance_transform_edt(off, return_indices=True)
-    half = WIDE * max(library.radius, query.world.body.reach) / cell + 1.0
-    dearer = (least > DEARER * least[i, j]) & (ndimage.distance_transform_edt(out) > half)
+    near = max(library.radius, query.world.body.reach) / cell
+    half = WIDE * near + 1.0
+    dearer = (least > DEARER * least[i, j]) & (far > near)
+    dearer &= ndimage.distance_transform_edt(out) > half
     corner = SE2(query.world.frame) @ SE2(np.array([*(low - 0.5 * cell), 0.0]))
     for closed in ((far > half) | dearer, far > half):
         walls = OccupancyMap(closed, resolution=cell, origin=corner.pose, name="beside the way")
