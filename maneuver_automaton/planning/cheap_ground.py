@@ -26,9 +26,9 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     """Problems with all closed but a corridor along the cheapest way of a point, where ends allow.
 
     The way leads over cells of a grid, each at what its place costs under the heading of a step,
-    and at the invariant cost of a metre. Closed in the first one, too, is what costs more than the
-    way near it, but for next to the way and around the ends. There is none where no place is
-    sampled: what is near obstacles costs no more there than elsewhere.
+    and at the invariant cost of a metre. What costs more than the way beside it is closed, too, but
+    for around the ends: in the second problem from a length scale on, in the last not at all. There
+    is none where no place is sampled: near obstacles nothing costs more than elsewhere.
     """
     from scipy import ndimage
 
@@ -42,15 +42,15 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     ends = np.rint((np.vstack([query.start, *query.goals])[:, :2] - low) / cell).astype(np.int64)
     ends = np.clip(ends, 0, np.array(rates.shape[:0:-1]) - 1)
     way, least = _cheapest_way(rates, ends), rates.min(axis=0)
-    off, out = np.ones(least.shape, dtype=np.bool_), np.ones(least.shape, dtype=np.bool_)
-    off[tuple(way.T)], out[ends[:, 1], ends[:, 0]] = False, False
-    far, (i, j) = ndimage.distance_transform_edt(off, return_indices=True)
+    aside, out = np.ones(least.shape, dtype=np.bool_), np.ones(least.shape, dtype=np.bool_)
+    aside[tuple(way.T)], out[ends[:, 1], ends[:, 0]] = False, False
+    far, (i, j) = ndimage.distance_transform_edt(aside, return_indices=True)
     near = max(library.radius, query.world.body.reach) / cell
     half = WIDE * near + 1.0
-    dearer = (least > DEARER * least[i, j]) & (far > near)
-    dearer &= ndimage.distance_transform_edt(out) > half
+    dearer = (least > DEARER * least[i, j]) & (ndimage.distance_transform_edt(out) > half)
     corner = SE2(query.world.frame) @ SE2(np.array([*(low - 0.5 * cell), 0.0]))
-    for closed in ((far > half) | dearer, far > half):
+    for off in (0.0, near, half):
+        closed = (far > half) | (dearer & (far > off))
         walls = OccupancyMap(closed, resolution=cell, origin=corner.pose, name="beside the way")
         problem = replace(query.problem, obstacles=(*query.problem.obstacles, walls))
         if blocked_ends(problem) is None:
