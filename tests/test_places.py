@@ -25,6 +25,7 @@ from maneuver_automaton import (
     Polygon,
     Problem,
     SearchSettings,
+    Unicycle,
     load_scenario,
     plan,
     verify,
@@ -208,6 +209,26 @@ def test_plans_say_what_they_cost_and_where():
     assert "place_price" not in plain["audit"]
     planner = Planner(CAR, obstacles=WALLS, footprint=BODY, place_costs=Clearance(2.0, 1.0))
     assert planner.problem([0, 0, 0], [18, 0.5, 0]).place_costs == planner.place_costs
+
+
+@pytest.mark.slow  # 5 s each: long ways are improved
+@pytest.mark.parametrize("ends", ["outside", "inside"])
+def test_the_way_leads_round_a_wide_patch_of_mud(ends):
+    """Past two corners, 41.05 m; dearer ground aside, or mud at the ends, must not hide that."""
+    mud = Ground(Box([10.0, 12.0], [20.0, -2.0]), price=5.0)
+    aside = Ground(Disc(3.0, [7.0, -16.0]), price=100.0)
+    at_ends = Ground([Box([6.0, 6.0]), Box([6.0, 6.0], [40.0, 0.0])], price=3.0)
+    controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1), "spin": (0, 1), "back": (-1, 0)}
+    here = Problem(
+        Automaton.of_controls(Unicycle(), controls),
+        [0, 0, 0],
+        [40, 0, 0],
+        place_costs=(mud, aside if ends == "outside" else at_ends),
+        search=SearchSettings(max_expansions=300),
+    )
+    corners = 2.0 * math.hypot(15.0, 4.0) + 10.0
+    least = corners if ends == "outside" else corners + 2.0 * 3.0 * math.hypot(3.0, 0.8)
+    assert plan(here, time_limit=60.0).cost == pytest.approx(least, rel=0.02)
 
 
 @pytest.mark.slow

@@ -18,10 +18,10 @@ from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.same_motion import UNFINISHED, is_new
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Disc, Obstacle, OccupancyMap
-from maneuver_automaton.groups import SE2
+from maneuver_automaton.collision import Disc, Obstacle
 from maneuver_automaton.planning.blocked import blocked_ends, goals_left
 from maneuver_automaton.planning.bounds import lattice_bound
+from maneuver_automaton.planning.cheap_ground import with_cheapest_way_left
 from maneuver_automaton.planning.checking import Condition, load_checks
 from maneuver_automaton.planning.free_space import free_words, word_candidate, words_once
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents, PlanningStep
@@ -60,9 +60,8 @@ BEFORE_POLISHING = 0.2  # share of what is left that the lattice gets, where the
 ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the first
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
-ROUND_SHARE, COUNTED_ROUND = 0.3, 0.7  # of the time left, of expansions: round dear places
+ROUND_SHARE, COUNTED_ROUND = 0.2, 0.7  # of the time left, of expansions: each way round
 STEERED_SHARE = 0.3  # of the time and of the expansions left: as if steering at rest cost nothing
-DEAR = 0.2  # share of the greatest rate above which places are closed then
 PAID = 0.02  # share of a cost that its places have to cost for that
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
@@ -351,19 +350,17 @@ class LatticeWords(PlanningStep):
                 self.gained(timed)
 
     def _go_round(self) -> None:
-        """Note a word that leads round all dear places, if it costs less than what is known.
+        """Note a word along the cheapest way of a point, if it costs less than what is known.
 
         Estimates of the search are too low there to find a way round: it expands the places first.
         """
         query, best = self.query, self.words[-1]
         paid = best.cost - with_price(query.library.priced, best).cost
-        problem = with_dear_places_closed(query) if paid > PAID * best.cost else None
-        if problem is None:
-            return
-        closed = lattice_query(
-            problem, _goals(query), prepared=query.prepared, library=query.library
-        )
-        self._by_way_of(closed, ROUND_SHARE, counted=COUNTED_ROUND)
+        for problem in with_cheapest_way_left(query) if paid > PAID * best.cost else ():
+            closed = lattice_query(
+                problem, _goals(query), prepared=query.prepared, library=query.library
+            )
+            self._by_way_of(closed, ROUND_SHARE, counted=COUNTED_ROUND)
 
     def _by_way_of(self, other: LatticeQuery, share: float, *, counted: float) -> None:
         """Note the word of another query with the same maneuvers, if it costs less than known."""
@@ -440,27 +437,6 @@ def _goals(query: LatticeQuery) -> list[int]:
 def _candidate(query: LatticeQuery, word: Word) -> Candidate:
     make = functools.partial(plan_of_word, query, word)
     return Candidate(word.cost + query.padding, query.goal_index[word.goal], make)
-
-
-def with_dear_places_closed(query: LatticeQuery) -> Problem | None:
-    """The problem with obstacles in place of what costs much, whatever the heading; if ends allow.
-
-    Near obstacles nothing is closed.
-    """
-    place, problem = query.around.place, query.problem
-    if not place.value.size:
-        return None
-    per_metre, per_second = place.value[:2].min(axis=(0, 1)), place.value[2:].min(axis=1).sum(0)
-    rates = per_metre + per_second
-    if not rates.max() > 0.0:
-        return None
-    middle = SE2(query.world.frame) @ SE2(np.array([place.origin_x, place.origin_y, 0.0]))
-    corner = middle @ SE2(np.array([-0.5 * place.cell, -0.5 * place.cell, 0.0]))
-    dear = OccupancyMap(
-        rates > DEAR * rates.max(), resolution=place.cell, origin=corner.pose, name="dear places"
-    )
-    closed = replace(problem, obstacles=(*problem.obstacles, dear), place_costs=())
-    return closed if blocked_ends(closed) is None else None
 
 
 def with_way_blocked(problem: Problem, known: Plan) -> Iterator[Problem]:
