@@ -325,7 +325,7 @@ def push_others(
         place, _, _ = place_in(search.table, column - lattice.step[e, 0], row - lattice.step[e, 1])
         if place < 0:
             continue
-        before = search.node[place, lattice.source[e]]
+        before = int(search.node[place, lattice.source[e]])  # a number of 32 bits has no room
         other = (before << ITEM_BITS) | e
         if before >= 0 and other != item:
             key = search.cost[before] + lattice.cost[e] + ahead

@@ -5,8 +5,11 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
+import os
+import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -198,6 +201,19 @@ def looks_ahead(monkeypatch):
 @pytest.mark.parametrize("seed", range(12, 18))
 def test_costs_without_obstacles_hide_no_cheaper_plan(seed, looks_ahead):
     test_a_plan_is_a_shortest_path_whatever_its_goal_and_prices(seed)
+
+
+def test_interpreted_kernels_find_the_same_word():
+    """Numbers of 32 bits overflow in plain NumPy where a compiled kernel widens them."""
+    order = (
+        "from tests.planning.test_on_state_lattice import *\n"
+        "print(plan(drawn(4, library()), time_limit=600.0).plan.word)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", order], cwd=Path(__file__).parents[2], capture_output=True,
+        text=True, check=False, env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+    )  # fmt: skip
+    assert done.stdout.strip() == str(plan(drawn(4, library())).plan.word), done.stderr
 
 
 @pytest.mark.slow
