@@ -49,9 +49,9 @@ FIRST_CHUNK = 512  # motions
 SMALLEST = 2048  # nodes and places, and eight times as many motions
 DIRECTIONS = 16  # in which a displacement is priced
 # Of the highest price in a direction: the full one is tight far from the aims, where the
-# displacement decides, a lower one where turns do. Of a car's library both leave two thirds of the
-# nodes that one of them leaves (62,000 to 84,000 of 16 drawn goals, 286,000 by the least price).
-SHARES = 1.0 - 1e-9, 0.4
+# displacement decides, a lower one where turns do. Of a car's library both leave four of five
+# nodes that the full one leaves (98,000 of 127,000, for 23 drawn goals).
+SHARES = 1.0 - 1e-9, 0.25
 HALVINGS = 14  # of the range in which the highest price is looked for
 STEEPEST = 8.0  # times the least price of an edge, up to which it is
 
