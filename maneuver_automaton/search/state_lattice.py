@@ -41,7 +41,7 @@ from maneuver_automaton.search.scene import for_library
 from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
-CLOSE = 1e-6  # [half widths of the body] by which pieces of courses may be off
+CLOSE = 1e-9  # [half widths of the body] by which pieces of courses may be off: bounds are as exact
 MARGIN = 2e-5  # [m] what is nearer to a solid touches it; as fine as the checks of a plan
 MOST_ROOTS = 1 << 16  # nodes at the goals that a search begins from
 MOST_STATES = 256  # at a place, which has room for all of them

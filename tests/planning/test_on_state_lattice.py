@@ -349,6 +349,27 @@ def test_a_lattice_of_nav2_is_left_by_no_cheaper_plan():
     assert len(goals) == 8
 
 
+@needs_data
+def test_a_primitive_that_ends_on_the_bounds_stays_inside_them():
+    automaton = read_primitives(DATA / "sbpl/mprim/unicycle_first_order_0.mprim").automaton
+    for name in ("heading 1", "heading 13"):
+        start = np.array([0.0, 0.0, automaton.model.heading(automaton[name].reduced_state)])
+        tried = 0
+        for one in automaton.maneuvers:
+            y = (SE2(start) @ SE2(one.course.pose)).pose[:, 1]
+            side = np.sign(y[-1])
+            if one.source != name or (side * np.diff(y) <= 0.0).any():
+                continue
+            bounds = Bounds(y=(min(0.0, y[-1]), max(0.0, y[-1])))
+            goal = (SE2(start) @ SE2(one.displacement)).pose
+            problem = Problem(automaton, start, goal, start_trim=name, bounds=bounds)
+            result = plan(problem, time_limit=60.0)
+            assert result.status is PlanStatus.FOUND, (one.name, result.reason)
+            assert result.cost == pytest.approx(one.duration * one.cost_multiplier)
+            tried += 1
+        assert tried > 1
+
+
 def dijkstra(automaton, most):
     """Costs up to a limit from the origin at the first trim, without obstacles."""
     cell, edges = automaton.model.resolution, {}
