@@ -6,10 +6,7 @@ FILE holds primitives (.mprim of SBPL, a lattice of Nav2). The peer keeps one nu
 and tests the cells that the body covers along a primitive, as SBPL and Nav2 do: its cells count as
 a whole, so that among solids it may pay more. It knows no bound of the cost to go, and ends at the
 goal. What is measured of the plan is the whole call: search, checks, audit; the median of some
-calls of both. `first` is the first call to a goal of its heading, which has no table of costs
-without obstacles yet; `turned` is the first one after a goal a quarter turn from it, whose table
-serves both where the library looks the same from all four sides; `same tests` is the search of the
-package without any bound, with its own tests.
+calls of both. `same tests` is the search of the package without any bound, with its own tests.
 """
 
 from __future__ import annotations
@@ -154,22 +151,11 @@ def graph_on(problem, planner):
     return graph_of(problem, range(len(problem.goals)), planner.workspace.prepared)
 
 
-def forget(problem, planner):
-    """Forget all costs without obstacles, which stay with a library."""
-    graph_on(problem, planner).tables.clear()
-
-
-def around(problem):
-    """The goal and the start of a problem, turned by a quarter turn about the start."""
-    seen = SE2(problem.start).inverse() @ SE2(problem.goals[0].pose)
-    return (SE2(problem.start) @ SE2(np.array([0.0, 0.0, math.pi / 2])) @ seen).pose
-
-
 def uninformed(problem, planner):
     """The search of the package without any bound of the cost to go."""
     graph = graph_on(problem, planner)
-    nothing = np.where(np.isfinite(graph.aims.surplus), 0.0, np.inf)
-    aims = graph.aims._replace(per_metre=0.0, surplus=nothing)
+    nothing = np.where(np.isfinite(graph.aims.offset), 0.0, np.inf)
+    aims = graph.aims._replace(slope=np.zeros_like(graph.aims.slope), offset=nothing)
     one = GraphSearch.of(replace(graph, aims=aims), weight=1.0, budget=UNLIMITED)
     while one.alive:
         one.run(1 << 20, math.inf)
@@ -178,7 +164,7 @@ def uninformed(problem, planner):
 
 def main(files):
     print(
-        "library, seed | plan: cost, bound, expansions, first, turned and usual ms "
+        "library, seed | plan: cost, bound, expansions, ms "
         "| Dijkstra: cost, expansions, ms | same tests: ms"
     )
     for file in files:
@@ -188,7 +174,7 @@ def main(files):
         arrays = tables(
             automaton, shapely.box(-size[0] / 2, -size[1] / 2, size[0] / 2, size[1] / 2)
         )
-        sums = np.zeros(5)
+        sums = np.zeros(3)
         for seed in range(SEEDS):
             problem, (start, goal) = drawn(automaton, size, seed)
             centres = np.arange(SPAN + 1) * res
@@ -207,27 +193,23 @@ def main(files):
             ask = functools.partial(planner.plan, problem.start, problem.goals, time_limit=60.0)
             other = functools.partial(dijkstra, *arrays, blocked, start, goal)
             uninformed(problem, planner), other()  # all is compiled
-            forget(ask().problem, planner)
-            first, result = timed(ask)
-            forget(result.problem, planner)
-            planner.plan(problem.start, around(problem), time_limit=60.0)
-            turned = timed(ask)[0]
+            result = ask()
             ours = statistics.median(timed(ask)[0] for _ in range(CALLS))
             peer, (cost, expansions) = timed(other)
             peer = statistics.median([peer, *(timed(other)[0] for _ in range(CALLS - 1))])
             same = timed(functools.partial(uninformed, problem, planner))[0]
-            sums += first, turned, ours, peer, same
+            sums += ours, peer, same
             shown = math.inf if result.cost is None else result.cost
             kind = "" if result.bound is None else f"{result.bound.kind} {result.lower_bound:.4f}"
             done = result.counts["expansions"]
             mine = f"{shown:9.4f} {kind or result.status.value} {done:6}"
-            mine += f" {first:6.1f} {turned:6.1f} {ours:6.1f}"
+            mine += f" {ours:6.1f}"
             peers = f"{cost:9.4f} {expansions:7} {peer:6.1f} | {same:7.1f}"
             print(f"{Path(file).name:16} {seed} | {mine} | {peers}", flush=True)
-        first, turned, ours, peer, same = sums
+        ours, peer, same = sums
         print(
-            f"{Path(file).name:16} sum: {ours:.0f} ms, first calls {first:.0f} ms, "
-            f"turned {turned:.0f} ms, Dijkstra {peer:.0f} ms, with the same tests {same:.0f} ms"
+            f"{Path(file).name:16} sum: {ours:.0f} ms, Dijkstra {peer:.0f} ms, "
+            f"with the same tests {same:.0f} ms"
         )
 
 

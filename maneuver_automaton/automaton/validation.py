@@ -25,12 +25,12 @@ def trims_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Int
     return np.flatnonzero((ahead & back)[classes])
 
 
-def part_between(automaton: Automaton, start: int, goals: Iterable[int]) -> Automaton:
+@kept_by_first
+def part_between(automaton: Automaton, start: int, goals: tuple[int, ...]) -> Automaton:
     """The trims of `trims_between` and the maneuvers among them; the same automaton if that is all.
 
     Start and goals stay, also where no maneuvers lead from one to the other.
     """
-    goals = sorted(set(goals))
     kept = {start, *goals, *trims_between(automaton, start, goals).tolist()}
     return automaton if len(kept) == len(automaton) else _part(automaton, tuple(sorted(kept)))
 

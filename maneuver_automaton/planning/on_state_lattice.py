@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TypeAlias
 
-from maneuver_automaton._arrays import Array
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton.same_motion import POLISHED
 from maneuver_automaton.budget import Budget
@@ -28,6 +28,7 @@ RELAXED_SHARE = 0.5  # of the time, where others search on if the cheapest path 
 MOST_WIDER = 2  # times that a window is widened where there is no plan
 MORE = 1.25, 1.6, 2.5, math.inf  # times the cost among what stands, up to which plans are sought
 LONGER = 1e-9  # share of the longest time by which plans may be longer
+_Why: TypeAlias = tuple[PlanStatus, str]  # there is no plan, if there is none
 _NO_PATH = "the lattice has no path to a goal: every node that can be reached was looked at"
 
 
@@ -72,16 +73,11 @@ class OnStateLattice(PlanningStep):
         found.likeness = POLISHED
         found.offer_nearly_met()
         found.counts.update(expansions=0, collision_queries=0)
-        lattice = graph
-        if problem.search.backwards:
-            graph = graph.backwards() or graph
         relaxed = lasting is not problem
         part = budget.stage(RELAXED_SHARE) if relaxed else budget
-        least, why, ended.nodes, wider = _search(found, graph, part, relaxed)
+        graph, least, why = _search(found, graph, part, relaxed)
         if relaxed and why[0] is not PlanStatus.UNREACHABLE and not part.is_over:
-            for _ in range(wider):
-                lattice = lattice.widened()
-            least, why = _in_time(found, lattice, least, part)
+            least, why = _in_time(found, graph, least, part)
         ended.is_complete = not relaxed or why[0] is not PlanStatus.OUT_OF_BUDGET
         ended.why = why if ended.is_complete else None
         if not problem.search.improve:  # A* with a weight is off by that factor at most
@@ -105,29 +101,27 @@ def _lasting(problem: Problem) -> Problem:
 
 def _search(
     found: Incumbents, graph: Graph, budget: Budget, relaxed: bool
-) -> tuple[float, tuple[PlanStatus, str], Array | None, int]:
-    """Search a lattice to the end; least cost of a plan, why there is none, nodes if asked for.
-
-    And how often its window was widened.
+) -> tuple[Graph, float, _Why]:
+    """Search a lattice to the end: it in its last window, least cost of a plan, why there is none.
 
     A `relaxed` graph leaves out conditions that its cheapest path may not meet.
     """
-    least, wider, why, nodes = math.inf, 0, (PlanStatus.UNREACHABLE, _NO_PATH), None
+    least, wider, why = math.inf, 0, (PlanStatus.UNREACHABLE, _NO_PATH)
     while True:
         exact = _best(found, graph, budget, relaxed)
         if found.problem.search.show_nodes:
-            nodes = in_frame_of_problem(graph.query, exact.nodes)
+            found.ended.nodes = in_frame_of_problem(graph.query, exact.nodes)
         if exact.alive:  # the time, or the number of expansions, is over
             spent = f"{found.budget.seconds:.4g} s and {found.counts['expansions']} expansions"
             late = found.why_unchecked or f"no plan within {spent}"
-            return min(least, exact.least_open), (PlanStatus.OUT_OF_BUDGET, late), nodes, wider
+            return graph, min(least, exact.least_open), (PlanStatus.OUT_OF_BUDGET, late)
         least = min(least, exact.cost, found.cost)
         refused = exact.cost < found.cost * (1.0 - ROUNDING)
         beyond = exact.cut < exact.cost and wider < MOST_WIDER  # a cheaper one may leave the window
         if refused and (not beyond if relaxed else graph.fine is not graph.coarse):
             if relaxed or budget.is_over:
                 least = min(least, exact.cut)
-                return least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked), nodes, wider
+                return graph, least, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
             graph = replace(graph, fine=graph.coarse)  # it was refused: keep away from obstacles
         elif exact.cut < min(found.cost, least) * (1.0 - ROUNDING):
             if not found.plans and wider == MOST_WIDER:
@@ -139,12 +133,10 @@ def _search(
             break
     if found.why_refused:
         why = PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
-    return least, why, nodes, wider
+    return graph, least, why
 
 
-def _in_time(
-    found: Incumbents, graph: Graph, least: float, budget: Budget
-) -> tuple[float, tuple[PlanStatus, str]]:
+def _in_time(found: Incumbents, graph: Graph, least: float, budget: Budget) -> tuple[float, _Why]:
     """Search in time, where the cheapest path among all that stands was refused.
 
     Least cost of a plan, and why there is none, as in `_search`.
@@ -153,7 +145,8 @@ def _in_time(
     longest, late = problem.horizon.max_time, (PlanStatus.OUT_OF_BUDGET, found.why_unchecked)
     soon, proven = FREELY, least
     if longest is not None:
-        quickest = GraphSearch.of(by_time(graph), weight=1.0, budget=budget)
+        hurried = by_time(graph)
+        quickest = GraphSearch.of(hurried, weight=1.0, budget=budget)
         while quickest.alive and not (budget.is_over or quickest.is_late):
             quickest.run(MOST_CHUNK, math.inf)
         if quickest.alive:
@@ -162,7 +155,7 @@ def _in_time(
         if takes > longest * (1.0 + LONGER):
             why = f"the quickest way takes {takes:.6g} s, at most {longest:g} s are admitted"
             return least, (PlanStatus.UNREACHABLE, why)
-        known = costs_to_go(by_time(graph), longest * (1.0 + LONGER), budget)
+        known = costs_to_go(hurried, longest * (1.0 + LONGER), budget)
         if known is None:
             return least, late
         soon = known[0]
@@ -208,6 +201,8 @@ def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> Gra
     """
     settings = found.problem.search
     weight = settings.weight or WEIGHT
+    if settings.backwards:
+        graph = graph.backwards() or graph
     exact = GraphSearch.of(graph, weight=1.0 if settings.improve else weight, budget=budget)
     closing, chunk, turns = None, FIRST_CHUNK, [(exact, 1)]
     while exact.alive and not (budget.is_over or exact.is_late):
@@ -218,7 +213,7 @@ def _best(found: Incumbents, graph: Graph, budget: Budget, relaxed: bool) -> Gra
                 return one
         chunk = min(2 * chunk, MOST_CHUNK)
         if len(turns) == 1 and (back := graph.backwards()):
-            closing = GraphSearch.of(back, weight=1.0, budget=budget, looks_ahead=False)
+            closing = GraphSearch.of(back, weight=1.0, budget=budget)
             turns.insert(0, (closing, BACK))
         greedy = settings.improve and not found.plans and exact.expansions >= ALONE
         if greedy and turns[-1][1] != GREEDY:

@@ -5,7 +5,8 @@ changes of it have a price. The arrays of a search, `GraphArrays`:
 
     table (4 p, 2)     hash table of places, as in `_kernels_nodes`: key, 1 << 31 and the place
     node, least (p, S) of each state at a place: the node, or UNKNOWN, REFUSED (a motion to it hits
-                       something) or SOLID (its pose does); cost of the cheapest motion to it
+                       something) or SOLID (its pose does); what a motion to it has to cost less
+                       than to be listed, -inf where none has to be, inf where all have to
     cost, clearance,   (n,), (n,), (n, 5) of each node that was expanded: the cost from a root, the
     links              clearance of its pose; COLUMN, ROW, STATE, PARENT (-1 for a root), and EDGE,
                        the number of the root for a root
@@ -13,6 +14,7 @@ changes of it have a price. The arrays of a search, `GraphArrays`:
                        2^32, and their edge; -1 - r for root r
     state, found       the numbers named below; `found` holds the least cost of a plan that leaves
                        the window
+    places, costs      (e,) where the edges of a node lead, and `least` there
 
 The search is lazy: the open list holds motions that were not tested, by the cost to where they end
 and the weighted bound of the cost to go. What is taken from it is tested, and gives a node if it is
@@ -25,7 +27,8 @@ the first aim that is expanded the least of all plans. What rests on more than t
 tested is kept in `found`.
 
 Source: Cohen, Phillips, Likhachev (2014), *Planning single-arm manipulations with n-arm robots*,
-RSS, for lazy A*; Likhachev, Ferguson (2009) for costs without obstacles as a bound.
+RSS, for lazy A*; Irnich, Desaulniers (2005), *Shortest path problems with resource constraints*,
+for prices of a resource, here the displacement, as a bound of the cost to go.
 """
 
 from __future__ import annotations
@@ -39,15 +42,7 @@ from maneuver_automaton.collision._kernels_layers import layer_world
 from maneuver_automaton.search._kernels_connection import edge_inside, edge_proven
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_nodes import node_in, slot_of
-from maneuver_automaton.search.arrays import (
-    Aims,
-    CostQueue,
-    FreeCosts,
-    GraphArrays,
-    GraphQuery,
-    StateLattice,
-    Tested,
-)
+from maneuver_automaton.search.arrays import Aims, GraphArrays, GraphQuery, StateLattice, Tested
 
 ROW_BITS = 32  # of the number of a place; its column is above them
 ITEM_BITS = 32  # of an entry of the open list: its edge; above them its node
@@ -89,26 +84,44 @@ def place_of(search: GraphArrays, column: int, row: int) -> int:
 
 
 @bare_inner_kernel
-def least_to_go(
-    aims: Aims, free: FreeCosts, cell: float, column: int, row: int, state: int
-) -> float:
+def least_to_go(aims: Aims, cell: float, column: int, row: int, state: int) -> float:
     """Lower bound of the cost from a node to the nearest aim.
 
-    It is the least cost without obstacles where that is known, which is all below `free.most`. Else
-    each edge costs its displacement at the least price, and a surplus: the least sum of surpluses
-    from state to state adds to the straight line. So no edge lowers the bound by more than it
-    costs.
+    By each slope an edge costs the price of its displacement and what is left, whose least sum from
+    state to state is the offset. So no edge lowers the bound by more than it costs.
     """
-    i, j = column - free.column, row - free.row
-    if 0 <= i < free.value.shape[0] and 0 <= j < free.value.shape[1]:
-        known = free.value[i, j, state]
-        if known <= free.most:
-            return float(known)
     x, y, least = column * cell, row * cell, math.inf
+    slope, offset = aims.slope, aims.offset
     for g in range(aims.place.shape[0]):
         d_x, d_y = aims.place[g, 0] - x, aims.place[g, 1] - y
-        least = min(least, math.sqrt(d_x * d_x + d_y * d_y) - aims.within[g])
-    return float(max(max(least, 0.0) * aims.per_metre + aims.surplus[state], free.most))
+        a = b = c = d = 0.0  # four at a time, none of which waits for the others
+        for k in range(0, slope.shape[1], 4):
+            a = max(a, slope[0, k] * d_x + slope[1, k] * d_y + offset[g, state, k])
+            b = max(b, slope[0, k + 1] * d_x + slope[1, k + 1] * d_y + offset[g, state, k + 1])
+            c = max(c, slope[0, k + 2] * d_x + slope[1, k + 2] * d_y + offset[g, state, k + 2])
+            d = max(d, slope[0, k + 3] * d_x + slope[1, k + 3] * d_y + offset[g, state, k + 3])
+        least = min(least, max(max(a, b), max(c, d)))
+    return least
+
+
+@bare_kernel
+def lower_offsets(lattice: StateLattice, slope: Array, offset: Array, steady: IntArray) -> None:
+    """Lower offsets (S, K) until no edge leads to a lower one, by the Bellman-Ford algorithm.
+
+    `steady` (K,) becomes 1, or 0 for a slope by which a cycle of edges costs less than nothing.
+    """
+    n, cell = offset.shape[0], lattice.cell
+    for k in range(slope.shape[1]):
+        steady[k] = 0
+        for _ in range(n + 1):
+            steady[k] = 1
+            for e in range(lattice.cost.shape[0]):
+                price = slope[0, k] * lattice.step[e, 0] + slope[1, k] * lattice.step[e, 1]
+                through = lattice.cost[e] - cell * price + offset[lattice.target[e], k]
+                if through < offset[lattice.source[e], k]:
+                    offset[lattice.source[e], k], steady[k] = through, 0
+            if steady[k] == 1:
+                break
 
 
 @bare_inner_kernel
@@ -215,14 +228,13 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
     plan cheaper than `upper_bound`.
     """
     search, lattice = query.arrays, query.lattice
-    aims, free = query.aims, query.free
-    coarse, fine, weight = query.coarse, query.fine, query.weight
+    aims, coarse, fine, weight = query.aims, query.coarse, query.fine, query.weight
     links, state, cell = search.links, search.state, lattice.cell
     if state[BEGUN] == 0:
         state[BEGUN] = 1
         for r in range(lattice.roots.shape[0]):
             column, row, at = lattice.roots[r, 0], lattice.roots[r, 1], lattice.roots[r, 2]
-            ahead = least_to_go(aims, free, cell, column, row, at)
+            ahead = least_to_go(aims, cell, column, row, at)
             place = place_of(search, column, row)
             if ahead < math.inf and search.least[place, at] == math.inf:
                 search.least[place, at] = 0.0
@@ -251,7 +263,7 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
             there = pose_in(lattice.frame, lattice, column, row, at)
             clearance = clearance_at(fine, there)
             if clearance <= fine.scene.margin:
-                search.node[place, at] = SOLID
+                search.node[place, at], search.least[place, at] = SOLID, -math.inf
                 continue
             # No point of the body moves farther than `edge_reach`: where it has moved by t of that,
             # its clearance is at least the first less t, and the last less the rest.
@@ -270,16 +282,16 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
             state[QUERIES] += 1
             met = met_along(coarse, fine, edge, begin, near, lattice.travel[e])
             if met != FREE:
-                ahead = least_to_go(aims, free, cell, column, row, at)
+                ahead = least_to_go(aims, cell, column, row, at)
                 if met == RIM:
                     search.found[0] = min(search.found[0], cost + ahead)
                 if known == UNKNOWN:
-                    search.node[place, at] = REFUSED
+                    search.node[place, at], search.least[place, at] = REFUSED, math.inf
                     push_others(search, lattice, item, (column, row, at), weight * ahead)
                 continue
         node = state[N_NODES]
         state[N_NODES] += 1
-        search.node[place, at] = node
+        search.node[place, at], search.least[place, at] = node, -math.inf
         search.cost[node], search.clearance[node] = cost, clearance
         links[node, COLUMN], links[node, ROW], links[node, STATE] = column, row, at
         links[node, PARENT], links[node, EDGE] = parent, e
@@ -287,19 +299,25 @@ def expand_lattice(query: GraphQuery, n: int, upper_bound: float) -> int:
         if aim >= 0:
             state[FOUND], state[AIM] = 1, aim
             return 0
-        for e in range(lattice.first[at], lattice.first[at + 1]):
-            n_cost, target = cost + lattice.cost[e], lattice.target[e]
+        # What each edge needs lies anywhere in memory, and is asked for at once: to wait for one
+        # after the other would take longer than all the rest.
+        begin, end = lattice.first[at], lattice.first[at + 1]
+        for e in range(begin, end):
             n_column, n_row = column + lattice.step[e, 0], row + lattice.step[e, 1]
-            place = place_of(search, n_column, n_row)
-            known = search.node[place, target]
-            if known >= 0 or known == SOLID:
+            search.places[e - begin] = place_of(search, n_column, n_row)
+        for e in range(begin, end):
+            search.costs[e - begin] = search.least[search.places[e - begin], lattice.target[e]]
+        for e in range(begin, end):
+            n_cost, target = cost + lattice.cost[e], lattice.target[e]
+            if n_cost >= search.costs[e - begin]:
                 continue
-            if known == UNKNOWN and n_cost >= search.least[place, target]:
-                continue
-            ahead = least_to_go(aims, free, cell, n_column, n_row, target)
+            n_column, n_row = column + lattice.step[e, 0], row + lattice.step[e, 1]
+            ahead = least_to_go(aims, cell, n_column, n_row, target)
             if n_cost + ahead >= upper_bound:
                 continue
-            search.least[place, target] = n_cost
+            place = search.places[e - begin]
+            if search.node[place, target] == UNKNOWN:
+                search.least[place, target] = n_cost
             key = n_cost + weight * ahead
             push(search.heap_key, search.heap_item, state[HEAP], key, (node << ITEM_BITS) | e)
             state[HEAP] += 1
@@ -325,56 +343,9 @@ def push_others(
         place, _, _ = place_in(search.table, column - lattice.step[e, 0], row - lattice.step[e, 1])
         if place < 0:
             continue
-        before = search.node[place, lattice.source[e]]
+        before = int(search.node[place, lattice.source[e]])  # a number of 32 bits has no room
         other = (before << ITEM_BITS) | e
         if before >= 0 and other != item:
             key = search.cost[before] + lattice.cost[e] + ahead
             push(search.heap_key, search.heap_item, search.state[HEAP], key, other)
             search.state[HEAP] += 1
-
-
-@bare_kernel
-def rank_anew(query: GraphQuery) -> None:
-    """Order the open list by another bound of the cost to go."""
-    search, lattice = query.arrays, query.lattice
-    # What was expanded has its least cost by the former bound, which was consistent too.
-    for k in range(search.state[HEAP]):
-        item = search.heap_item[k]
-        _, _, column, row, at, cost = end_of(search, lattice, item)
-        ahead = least_to_go(query.aims, query.free, lattice.cell, column, row, at)
-        key = cost + query.weight * ahead
-        push(search.heap_key, search.heap_item, k, key, item)  # the first k are in order
-
-
-@bare_kernel
-def grow_free_costs(
-    lattice: StateLattice, free: FreeCosts, queue: CostQueue, most: float, n: int
-) -> None:
-    """Settle up to `n` nodes whose least cost to the sources without obstacles is at most `most`.
-
-    Dijkstra against the edges. Entries of the queue are places in `free.value`. The caller widens
-    one that is full.
-    """
-    heap_key, heap_item, state = queue.keys, queue.items, queue.state
-    columns, rows, states = free.value.shape
-    for _ in range(n):
-        if state[0] == 0 or heap_key[0] > most or state[0] + lattice.most_links > len(heap_key):
-            return
-        spent = heap_key[0]
-        item = pop(heap_key, heap_item, state[0])
-        state[0] -= 1
-        at, place = item % states, item // states
-        i, j = place // rows, place % rows
-        if spent > free.value[i, j, at]:
-            continue
-        state[1] += 1
-        for k in range(lattice.into_first[at], lattice.into_first[at + 1]):
-            e = lattice.into_edge[k]
-            a, b = i - lattice.step[e, 0], j - lattice.step[e, 1]
-            if not (0 <= a < columns and 0 <= b < rows):
-                continue
-            source, cost = lattice.source[e], spent + lattice.cost[e]
-            if cost < free.value[a, b, source]:
-                free.value[a, b, source] = cost
-                push(heap_key, heap_item, state[0], cost, (a * rows + b) * states + source)
-                state[0] += 1

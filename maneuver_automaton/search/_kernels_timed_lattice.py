@@ -34,12 +34,11 @@ from maneuver_automaton.search._kernels_state_lattice import (
     FREE,
     SEARCH,
     aim_at,
-    least_to_go,
     met_along,
     place_in,
     pose_in,
 )
-from maneuver_automaton.search.arrays import TimedQuery
+from maneuver_automaton.search.arrays import KnownCosts, TimedQuery
 
 EDGE_BITS, WAIT_BITS = 16, 20  # of an entry of the open list; above them its label
 MOST_WAITS = (1 << WAIT_BITS) - 1
@@ -48,6 +47,15 @@ SAME = 1e-9  # [s] between times that count as one, and share of costs that do
 COLUMN, ROW, STATE, PARENT, EDGE, BEFORE = range(6)
 ARRIVAL, UNTIL, WAITED = range(3)
 N_LABELS, N_PLACES, HEAP, QUERIES, FOUND, AIM, BEGUN = range(7)
+
+
+@bare_inner_kernel
+def cost_in(known: KnownCosts, column: int, row: int, state: int) -> float:
+    """The cost to go from a node."""
+    i, j = column - known.column, row - known.row
+    if 0 <= i < known.value.shape[0] and 0 <= j < known.value.shape[1]:
+        return float(known.value[i, j, state])
+    return math.inf
 
 
 @bare_inner_kernel
@@ -108,10 +116,9 @@ def list_motion(query: TimedQuery, label: int, e: int, ticks: int, upper_bound: 
     if ticks > 0:
         key += query.timing.pause
     arrival = leave + query.moving.lib.edges.time[lattice.edge[e]]
-    ahead = least_to_go(query.aims, query.soon, lattice.cell, column, row, target)
-    if arrival + ahead > query.timing.most_time:
+    if arrival + cost_in(query.soon, column, row, target) > query.timing.most_time:
         return
-    key += least_to_go(query.aims, query.free, lattice.cell, column, row, target)
+    key += cost_in(query.free, column, row, target)
     if key < upper_bound and ticks <= MOST_WAITS:
         item = (((label << EDGE_BITS) | e) << WAIT_BITS) | ticks
         push(search.heap_key, search.heap_item, search.state[HEAP], key, item)
@@ -167,7 +174,7 @@ def try_motion(query: TimedQuery, item: int, key: float, upper_bound: float) -> 
     links[new, PARENT], links[new, EDGE] = label, e
     search.times[new, ARRIVAL], search.times[new, WAITED] = leave + takes, leave - begun
     search.cost[new] = paid + query.timing.rate * (leave - begun)
-    ahead = least_to_go(query.aims, query.free, lattice.cell, node[0], node[1], node[2])
+    ahead = cost_in(query.free, node[0], node[1], node[2])
     push(search.heap_key, search.heap_item, search.state[HEAP], search.cost[new] + ahead, -1 - new)
     search.state[HEAP] += 1
 

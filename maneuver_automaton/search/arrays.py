@@ -378,13 +378,12 @@ class PathSearch(NamedTuple):
 # A library on a lattice, which is a graph of S states and E edges.
 
 
-class FreeCosts(NamedTuple):
-    """Least costs to the aims of a query without obstacles, as far as they are known."""
+class KnownCosts(NamedTuple):
+    """Costs to go, or times; those outside are inf."""
 
     value: Array  # (columns, rows, S)
     column: int  # of the first entry
     row: int
-    most: float  # costs above it are not known, and no less
 
 
 class StateLattice(NamedTuple):
@@ -420,6 +419,8 @@ class GraphArrays(NamedTuple):
     heap_item: IntArray  # (m,)
     state: IntArray  # (7,)
     found: Array  # (1,)
+    places: IntArray  # (most_links,)
+    costs: Array  # (most_links,)
 
 
 class Aims(NamedTuple):
@@ -428,8 +429,8 @@ class Aims(NamedTuple):
     place: Array  # (G, 2) [m] in the frame of the lattice
     within: Array  # (G,) [m]
     admits: NDArray[np.bool_]  # (G, S)
-    per_metre: float  # least cost of a displacement
-    surplus: Array  # (S,) least cost beyond that of the displacement, from a state to an aim's
+    slope: Array  # (2, K) prices of a displacement [1/m], K a multiple of 4
+    offset: Array  # (G, S, K) least cost beyond that price, from a state to one of the aim
 
 
 class Tested(NamedTuple):
@@ -448,7 +449,6 @@ class GraphQuery(NamedTuple):
     arrays: GraphArrays
     lattice: StateLattice
     aims: Aims
-    free: FreeCosts
     coarse: Tested
     fine: Tested
     weight: float  # of the bound of the cost to go
@@ -487,19 +487,11 @@ class TimedQuery(NamedTuple):
     arrays: TimedArrays
     lattice: StateLattice
     aims: Aims
-    free: FreeCosts  # costs to go among all that stands
-    soon: FreeCosts  # times to go [s]
+    free: KnownCosts  # costs to go among all that stands
+    soon: KnownCosts  # times to go [s]
     coarse: Tested
     fine: Tested
     moving: Tested  # all that moves, and what stands, in another frame
     frame: tuple[float, float, float, float, float]  # of the lattice, seen from there
     directed: int  # states of a heading
     timing: Timing
-
-
-class CostQueue(NamedTuple):
-    """A binary heap of places in a table of costs."""
-
-    keys: Array
-    items: IntArray
-    state: IntArray  # (2,) entries, and nodes that are settled

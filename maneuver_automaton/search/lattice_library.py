@@ -143,7 +143,8 @@ def lattice_library(
     if automaton.is_kinematic:
         return _library_on(problem.setting, automaton, prepared)
     first = automaton.index_of(problem.first_trim.name)
-    ends = [automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals]
+    lasts = {automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals}
+    ends = tuple(sorted(lasts))
     return _library_on(problem.setting, part_between(automaton, first, ends), prepared)
 
 

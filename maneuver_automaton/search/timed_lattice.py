@@ -18,12 +18,19 @@ from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search import _kernels_timed_lattice as kernels
 from maneuver_automaton.search._kernels_state_lattice import SEARCH
-from maneuver_automaton.search.arrays import FreeCosts, Tested, TimedArrays, TimedQuery, Timing
+from maneuver_automaton.search.arrays import KnownCosts, Tested, TimedArrays, TimedQuery, Timing
 from maneuver_automaton.search.lattice_library import LatticeLibrary, library_of_trims
 from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.lattice_trims import trims_of
 from maneuver_automaton.search.scene import for_library
-from maneuver_automaton.search.state_lattice import CLOSE, MARGIN, Graph, GraphSearch, priced
+from maneuver_automaton.search.state_lattice import (
+    CLOSE,
+    MARGIN,
+    Graph,
+    GraphSearch,
+    priced,
+    slopes,
+)
 from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
@@ -31,10 +38,10 @@ TICK = 0.02  # [s] between departures that are tried
 FINER = 4  # times shorter ticks for a bound
 CHUNK = 1 << 12  # labels and motions between two looks at the clock
 FIRST_ROOM = 1 << 12  # labels and places, and eight times as many motions
-FREELY = FreeCosts(np.zeros((0, 0, 0)), 0, 0, 0.0)  # no time to go is known, so each is 0
+FREELY = KnownCosts(np.zeros((0, 0, 0)), 0, 0)  # of times, where none is too long
 
 
-def costs_to_go(graph: Graph, most: float, budget: Budget) -> tuple[FreeCosts, float] | None:
+def costs_to_go(graph: Graph, most: float, budget: Budget) -> tuple[KnownCosts, float] | None:
     """Costs to go from all nodes that plans of less than `most` pass among what stands.
 
     And what a plan costs at least that leaves the window. None if the time is over before, or the
@@ -54,15 +61,15 @@ def costs_to_go(graph: Graph, most: float, budget: Budget) -> tuple[FreeCosts, f
     size = np.array([column.max(initial=0), row.max(initial=0)]) - low + 1
     value = np.full((*size.tolist(), len(graph.lattice.heading)), np.inf)
     value[column - low[0], row - low[1], state] = one.arrays.cost[: one.expansions]
-    return FreeCosts(value, int(low[0]), int(low[1]), math.inf), one.cut
+    return KnownCosts(value, int(low[0]), int(low[1])), one.cut
 
 
 def by_time(graph: Graph) -> Graph:
     """The same graph, where an edge costs its duration."""
     time = graph.query.library.arrays.edges.time[graph.lattice.edge]
     lattice, aims = graph.lattice._replace(cost=time), graph.aims
-    aims = priced(aims.place, aims.within, aims.admits, lattice)
-    return replace(graph, lattice=lattice, aims=aims, least=time, tables={}, surcharge=0.0)
+    aims = priced(aims.place, aims.within, aims.admits, lattice, slopes(lattice))
+    return replace(graph, lattice=lattice, aims=aims, surcharge=0.0)
 
 
 @dataclass(slots=True, eq=False)
@@ -78,8 +85,8 @@ class TimedSearch:
         cls,
         graph: Graph,
         problem: Problem,
-        free: FreeCosts,
-        soon: FreeCosts,
+        free: KnownCosts,
+        soon: KnownCosts,
         prepared: Prepared,
         *,
         bounds: bool = False,

@@ -45,7 +45,7 @@ def test_trims_between_are_those_of_the_graph(pairs, start, goals):
     back = set().union(*(networkx.ancestors(graph, str(goal)) | {str(goal)} for goal in goals))
     expected = sorted(int(name) for name in ahead & back)
     assert trims_between(library, start, goals).tolist() == expected
-    part = part_between(library, start, goals)
+    part = part_between(library, start, tuple(goals))
     kept = sorted({*expected, start, *goals})
     assert [int(name) for name in part.trim_names] == kept
     assert all(part[name] is library[name] for name in part.trim_names)
