@@ -1,7 +1,7 @@
 """Problems of CL-CBS and CSDO: a YAML file with agents, each with a start and a goal, and discs.
 
 The pose is that of the rear axle. It stays within `map.dimensions`, from 0; the body may stick out.
-Which vehicle drives is not in the file but in the planner's own `config.yaml`: the same one in both.
+Which vehicle drives is not in the file but in the planner's own `config.yaml`, the same in both.
 
 CL-CBS counts yaw clockwise: it moves by (cos(-yaw), sin(-yaw)), so the heading is -yaw. Its
 obstacles `[x, y]` are discs of one radius; [-1, -1] stands for none. CSDO moves by (cos(yaw),
