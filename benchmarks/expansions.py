@@ -69,7 +69,14 @@ def measured(problem: Problem, resolution: Resolution, n: int, repeats: int) -> 
     """How many were expanded, and the time of the first search and of those after it [s]."""
     query = lattice_query(problem, tuple(range(len(problem.goals))))
     table = cost_to_go_table(problem) if resolution.guided else NO_TABLE
-    grid = distance_grid(query.plane, query.box, query.goals, query.start, coarse=resolution.coarse)
+    grid = distance_grid(
+        query.plane,
+        query.box,
+        query.window,
+        query.goals,
+        query.start,
+        coarse=resolution.coarse,
+    )
     passes = [pass_of(query, resolution, grid=grid, table=table) for _ in range(repeats + 1)]
     times = [seconds(one, n) for one in passes]
     return [passes[0].expansions, times[0], median(times[1:])]

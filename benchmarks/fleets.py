@@ -5,18 +5,26 @@
 plan, the sum of their arrivals alone and together, when the last arrives, processor time to the
 first feasible fleet and in all, the least distance of two bodies by shapely at 5 ms, and the least
 published sum (as reported, or of arrivals on the planner's clock).
+
+``python benchmarks/fleets.py --folder FOLDER [--limits 1,5,20] [--draw N] [--cpu]``: the share
+that is solved within limits of time, and the medians of what solved ones cost over the sum alone,
+for every folder of files below FOLDER, as CSDO's benchmark has them; with --draw N of each kind are
+drawn there first. Who is solved within one limit counts as solved within the longer ones. --cpu
+counts processor time, which other programs on the machine disturb less.
 """
 
 from __future__ import annotations
 
 import argparse
 import csv
+import functools
 import itertools
 import math
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -25,11 +33,13 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import shapely
 
 from benchmarks import cases
-from benchmarks.tables import show
+from benchmarks.drawn_fleets import draw
+from benchmarks.tables import median, show
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import carried
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.surroundings import ShapePart, parts_of
-from maneuver_automaton.fleet import FleetProblem, FleetResult, plan_fleet
+from maneuver_automaton.fleet import FleetProblem, FleetResult, plan_fleet, planning
 from maneuver_automaton.scenario import load_scenario
 
 DATA = cases.DATA / "fleet"
@@ -93,13 +103,55 @@ def least_distance(fleet: FleetProblem, result: FleetResult) -> float:
     return least
 
 
+def solved_shares(folder: Path, limits: list[float], *, seed: int, jobs: int) -> None:
+    """A table of the kinds of instances below a folder, and of limits of time [s]."""
+    rows, warm = [], False
+    for kind in sorted({path.parent for path in folder.rglob("*.yaml")}):
+        paths = sorted(kind.glob("*.yaml"))
+        every = len(paths)
+        for limit in limits:
+            unsolved, excess, firsts, least = [], [], [], math.inf
+            for path in paths:
+                fleet = load_scenario(path).fleet
+                if not warm:
+                    plan_fleet(fleet, time_limit=limit, seed=seed, jobs=jobs)
+                    warm = True
+                result = plan_fleet(fleet, time_limit=limit, seed=seed, jobs=jobs)
+                least = min(least, least_distance(fleet, result))
+                if len(result.plans) < len(fleet):
+                    unsolved.append(path)
+                    continue
+                firsts.append(result.timing_s["first_plan"])
+                excess.append(100.0 * (result.sum_s / result.alone_cost - 1.0))
+            done = f"{every - len(unsolved)}/{every}"
+            name = str(kind.relative_to(folder))
+            rows.append([name, limit, done, median(firsts), median(excess), least])
+            print(*rows[-1], flush=True)
+            paths = unsolved
+    print()
+    show(["kind", "limit [s]", "solved", "first [s]", "over alone [%]", "least [m]"], rows)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("words", nargs="*")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--limits", default="1,5,20")
+    parser.add_argument("--draw", type=int, default=0)
+    parser.add_argument("--cpu", action="store_true")
     given = parser.parse_args()
+    if given.folder is not None:
+        if given.cpu:
+            begin = functools.partial(Budget.from_now, clock=time.process_time)
+            planning.Budget = SimpleNamespace(from_now=begin)
+        if given.draw:
+            draw(given.folder, given.draw, given.seed)
+        limits = [float(one) for one in given.limits.split(",")]
+        solved_shares(given.folder, limits, seed=given.seed, jobs=given.jobs)
+        return
     if not cases.present("fleet"):
         return
     best, rows = published(), []

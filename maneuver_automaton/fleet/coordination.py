@@ -38,19 +38,34 @@ from maneuver_automaton.collision.shapes import Obstacle
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import Meeting, meetings
-from maneuver_automaton.fleet.vehicle import LONG, QUICK, FleetMember, OwnPlan, courses_of
+from maneuver_automaton.fleet.vehicle import (
+    AT_ONCE,
+    LONG,
+    QUICK,
+    FleetMember,
+    OwnPlan,
+    courses_of,
+)
 from maneuver_automaton.problem import Goal
+from maneuver_automaton.refinement.improve import WordSchedule
 
 HeldPlans: TypeAlias = dict[int, OwnPlan]
 """Plans by the numbers of their vehicles."""
 
 MOST_EVICTED = 8  # times that plans are given up for one vehicle
 MOST_QUERIES = 30  # searches for one vehicle, of one tree
+EACH = 0.05  # [s] for one vehicle: with less its first plan is taken as it is found
+AS_LONG = 20  # vehicles whose first plans take as long as one thorough search
 LOOKS = 400  # at a conflict, to see how long it lasts
 WORTH = 1e-6  # share of the value that another leaf has to save
 MOST_ASIDE = 3  # times that one vehicle makes room for others
 MOST_PLACES = 8  # aside, of which one with a way home from there is looked for
 BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
+
+
+def is_short(budget: Budget, count: int) -> bool:
+    """Whether the time hardly suffices for the first plans of so many vehicles."""
+    return budget.left < EACH * count
 
 
 @dataclass(slots=True, eq=False)
@@ -60,20 +75,28 @@ class Turns:
     vehicles: Sequence[FleetMember]
     margin: float  # [m] that any two bodies keep
     budget: Budget
-    patiently: bool = False  # whether words are improved for longer
+    schedule: WordSchedule = AT_ONCE  # by which words are improved
     queries: int = 0
 
     def one_after_another(self, order: Sequence[int], held: HeldPlans) -> HeldPlans:
-        """Plans in an order, past those that are held; who fails goes before those it hits."""
+        """Plans in an order, past those that are held; who fails goes before those it hits.
+
+        Where the time is short, plans are taken as they are found, and who fails is not searched
+        for thoroughly first: the others hardly take longer to be planned again.
+        """
         held, waiting, evicted = dict(held), list(order), 0
         failed: set[int] = set()
+        hurried = False
         while waiting and not self.budget.is_over:
             k = waiting.pop(0)
             to_come = [*waiting, *self.without_plan(held, {k, *waiting})]
-            found = self.past(k, held, to_come)
-            if found is None:
+            hurried = hurried or is_short(self.budget, 1 + len(waiting))
+            found = self.past(k, held, to_come, hurried=hurried)
+            may_evict = evicted < MOST_EVICTED and k not in failed
+            hurried = hurried or (found is None and is_short(self.budget, AS_LONG + len(waiting)))
+            if found is None and not (hurried and may_evict):
                 found = self.past(k, held, self.without_plan(held, {k, *waiting}), most=LONG)
-            if found is None and evicted < MOST_EVICTED and k not in failed:
+            if found is None and may_evict:
                 failed.add(k)
                 found, out = self._before_those_it_hits(k, held)
                 for other in out:
@@ -121,17 +144,21 @@ class Turns:
         *,
         most: int = QUICK,
         again: bool = False,
+        hurried: bool = False,
         besides: Sequence[Obstacle] = (),
     ) -> OwnPlan | None:
-        """A way of one vehicle past plans, others at their starts, and more; better `again`."""
+        """A way of one vehicle past plans, others at their starts, and more; better `again`.
+
+        `hurried` takes the first that is found.
+        """
         self.queries += 1
         others: list[Obstacle] = []
         for other in sorted({*held, *standing} - {k}):
             course = held[other].course if other in held else self.vehicles[other].standing
             others += course.obstacles
         others += besides
-        one = self.vehicles[k]
-        return one.past(others, self.budget, most=most, again=again, patiently=self.patiently)
+        schedule = None if hurried else self.schedule
+        return self.vehicles[k].past(others, self.budget, most=most, again=again, schedule=schedule)
 
 
 def by_priorities(

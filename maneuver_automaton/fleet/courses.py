@@ -212,6 +212,7 @@ def _during(band: HeightBand, shape: Shape, motion: Motion) -> Obstacle:
     )
 
 
+@functools.lru_cache(maxsize=8192)
 def where_it_stays(body: Obstacle) -> Obstacle:
     """What stands where a moving body ends."""
     assert body.motion is not None

@@ -21,7 +21,7 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.fleet.coordination import HeldPlans, one_at_a_time
+from maneuver_automaton.fleet.coordination import HeldPlans, is_short, one_at_a_time
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -199,7 +199,8 @@ class _FleetSearch:
         if not rest:
             self.order = sorted(able)
             return
-        until = self.budget.stage(ORDERS_SHARE)
+        short = is_short(self.budget, len(rest))  # to drive by turns takes longer than one order
+        until = self.budget if short else self.budget.stage(ORDERS_SHARE)
         rng = np.random.default_rng(self.seed)
         drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
         best, to_come, n_th = self._in_orders(drawn[:1], until), drawn[1:], 0

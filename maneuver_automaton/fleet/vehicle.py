@@ -242,29 +242,32 @@ class FleetMember:
             if one.height is None or (one.height[0] <= high + keep and one.height[1] >= low - keep)
         ]
 
-    def plan_alone(self, budget: Budget, *, bounded: bool = True) -> None:
+    def plan_alone(self, budget: Budget, *, bounded: bool = True, hurried: bool = False) -> None:
         """Find its way past past obstacles, by itself, and a few others beside it.
 
-        And below which cost there is none, if that is wanted.
+        And below which cost there is none, if that is wanted; `hurried` takes it as it is found.
         """
         blocked = blocked_ends(self.aimed)
         if blocked is not None:
             self.why_none = blocked.reason
         elif self.at_will:
-            self._plan_words(budget, bounded=bounded)
+            self._plan_words(budget, bounded=bounded, hurried=hurried)
         else:
             result = self._planned(self.problem, budget, improve=False)
             self.alone, self.why_none = self._found(result), result.reason
             self.bound = result.bound
 
-    def _plan_words(self, budget: Budget, *, bounded: bool) -> None:
+    def _plan_words(self, budget: Budget, *, bounded: bool, hurried: bool) -> None:
         """The same for one whose plans are words of the lattice."""
         query = self._query(self.aimed)
         first = self._first(query, budget, LONGEST)
         if first.word is None:
             self.why_none = first.enclosed or "no path was found"
             return
-        self._keep_ways(query, first.word, budget, AT_ONCE)
+        if hurried:
+            self._keep(query, [first.word])
+        else:
+            self._keep_ways(query, first.word, budget, AT_ONCE)
         if bounded:
             exact = self.aimed is self.problem
             self.bound = lattice_bound(query) if exact else formula_bound(self.problem)
@@ -283,7 +286,10 @@ class FleetMember:
     ) -> None:
         better = words_of(query, budget=budget, schedule=schedule, known=word).to_the_end()
         self.expansions += better.expansions
-        words = [better.word, word, *better.others, *self.ways]
+        self._keep(query, [better.word, word, *better.others, *self.ways])
+
+    def _keep(self, query: LatticeQuery, words: Sequence[Word]) -> None:
+        """Keep the cheapest of some words as its ways."""
         words = sorted(words, key=lambda one: one.cost)
         distinct = {tuple(one.trims.tolist()): one for one in reversed(words)}
         self.ways = list(distinct.values())[::-1][:WAYS]
@@ -315,11 +321,12 @@ class FleetMember:
         most: int = QUICK,
         known: float = math.inf,
         again: bool = False,
-        patiently: bool = False,
+        schedule: WordSchedule | None = AT_ONCE,
     ) -> OwnPlan | None:
         """The cheapest way found past what the others do; None if there is none below a cost.
 
-        A word is improved for longer if `patiently`, any other plan if searched for `again`.
+        A word is improved by the `schedule`, any other plan if searched for `again`; without a
+        schedule the first word that is found is taken.
         """
         others = [standing_still(one) for one in self.beside(others)]
         if not others:
@@ -353,7 +360,7 @@ class FleetMember:
             if blocked_ends(past) is None:
                 word = self._first(self._query(past), budget, QUICK).word
                 best = None if word is None else with_waits(query, word)
-        if best is None or best.cost > NEARLY * self.ways[0].cost:
+        if best is None or (schedule is not None and best.cost > NEARLY * self.ways[0].cost):
             word = self._first(query, budget, most).word
             if word is not None and word.cost < (best.cost if best else math.inf):
                 best = word
@@ -361,8 +368,8 @@ class FleetMember:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
-        schedule = WITH_TIME if patiently else AT_ONCE
-        best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
+        if schedule is not None:
+            best = words_of(query, budget=budget, schedule=schedule, known=best).to_the_end().word
         if not best.cost < known:
             return None
         return self._word_found(query, best, aims)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import SearchSettings
 
 NEAR = 1.0  # [m] beyond the margin: pairs that come so near are measured
+KnownPairs: TypeAlias = dict[tuple[FleetCourse, FleetCourse], Least]
 CONTACT = 1e-9  # [m] what is closer touches
 IN_SPACE = UserModel(
     name="at will in space",
@@ -55,9 +57,10 @@ def verified(
         if result.plan is not None:
             passed[one.number] = held[one.number].course
     names = [one.name for one in vehicles]
+    known: KnownPairs = {}
     while True:
         courses = {one.number: passed.get(one.number, one.standing) for one in vehicles}
-        closest = measured(courses, names, keep=fleet.margin)
+        closest = measured(courses, names, keep=fleet.margin, known=known)
         driving = {names[k] for k in passed}
         near = [row for row in closest if row.distance_m <= enough_for(fleet.margin)]
         pairs = [(row, [name for name in row.pair if name in driving]) for row in near]
@@ -133,15 +136,23 @@ def _checked(
 
 
 def measured(
-    courses: Mapping[int, FleetCourse], names: Sequence[str], *, keep: float
+    courses: Mapping[int, FleetCourse],
+    names: Sequence[str],
+    *,
+    keep: float,
+    known: KnownPairs | None = None,
 ) -> tuple[Closest, ...]:
     """Pairs of vehicles that come near each other, the nearest first, by the audit's bounds.
 
-    Those that are left out keep a metre more than the distance to keep, for all times.
+    Those that are left out keep a metre more than the distance to keep, for all times. What is
+    `known` of a pair is not measured again, and added to if it is not.
     """
-    rows = []
+    rows, known = [], {} if known is None else known
     for meeting in meetings(courses, keep=keep + NEAR):
-        least = nearest(courses[meeting.one], courses[meeting.other], enough=enough_for(keep))
+        both = courses[meeting.one], courses[meeting.other]
+        least = known.get(both)
+        if least is None:
+            least = known[both] = nearest(*both, enough=enough_for(keep))
         pair = names[meeting.one], names[meeting.other]
         rows.append(Closest(pair, least.time, least.distance))
     return tuple(sorted(rows, key=lambda row: row.distance_m))

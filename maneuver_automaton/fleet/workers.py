@@ -18,11 +18,19 @@ from maneuver_automaton._parallel import Gathered
 from maneuver_automaton.automaton.pieces import packed, unpacked
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision.shapes import Obstacle
-from maneuver_automaton.fleet.coordination import HeldPlans, Turns, by_conflicts, by_priorities
+from maneuver_automaton.fleet.coordination import (
+    HeldPlans,
+    Turns,
+    by_conflicts,
+    by_priorities,
+    is_short,
+)
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.vehicle import (
+    AT_ONCE,
+    WITH_TIME,
     FleetMember,
     OwnPlan,
     load_vehicles,
@@ -317,12 +325,15 @@ def done(turns: Turns, task: PoolTask) -> Done:
     if task.how in ("alone", "better alone"):
         for k in numbers:
             one = turns.vehicles[k]
-            look = one.plan_alone if task.how == "alone" else one.look_for_better_ways
-            look(turns.budget)
+            if task.how == "better alone":
+                one.look_for_better_ways(turns.budget)
+            else:  # half the work of a plan past others
+                short = is_short(turns.budget, len(turns.vehicles) // 2)
+                one.plan_alone(turns.budget, hurried=short)
         return Done(None)
     if task.how == "in order":
         return Done(turns.one_after_another(numbers, held), turns.queries)
-    turns.patiently = task.how == "with time"
+    turns.schedule = WITH_TIME if task.how == "with time" else AT_ONCE
     if task.how in ("in turn", "with time"):
         return Done(turns.anew(numbers, held), turns.queries)
     search = by_priorities if task.how == "by priorities" else by_conflicts

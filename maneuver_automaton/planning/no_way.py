@@ -229,7 +229,13 @@ class _Following:
                 box=np.append(ends.min(axis=0) - around, ends.max(axis=0) + around),
             )
             grid = distance_grid(
-                leg.plane, leg.box, leg.goals, leg.start, coarse=True, prepared=leg.prepared
+                leg.plane,
+                leg.box,
+                leg.window,
+                leg.goals,
+                leg.start,
+                coarse=True,
+                prepared=leg.prepared,
             )
             search = pass_of(leg, STEP, grid=grid, table=self.table)
             word = search.run(min(EXPANSIONS, most), math.inf, budget=budget)

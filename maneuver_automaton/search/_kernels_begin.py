@@ -151,7 +151,15 @@ def set_grid(
     layout = GridLayout(x, y, cell, columns, rows, stride, i * stride, j * stride, aim_i, aim_j)
     beside = GridWalls(walls.inflation, walls.wanted, walls.cut, detour_of(columns, rows))
     laid = DistanceGrid(
-        grid.value, grid.rank, grid.mark, grid.state, grid.queue, layout, beside, grid.prices
+        grid.value,
+        grid.rank,
+        grid.mark,
+        grid.state,
+        grid.queue,
+        layout,
+        beside,
+        grid.prices,
+        scene.window,
     )
     if n > 0:
         sow(laid, aims)

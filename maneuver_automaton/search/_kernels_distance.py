@@ -78,8 +78,19 @@ def pop(keys: Array, items: IntArray, size: int) -> int:
 
 @bare_inner_kernel
 def centre_clearance(grid: DistanceGrid, field: Field, i: int, j: int) -> float:
-    """Clearance of a point in the middle of a cell [m], negative inside a solid."""
-    at = grid.layout
+    """Clearance of a point in the middle of a cell [m], negative inside a solid.
+
+    -inf where no point of the cell is inside the window: no wall stands there, but a bound.
+    """
+    at, window = grid.layout, grid.window
+    x = at.origin_x + (i + 0.5) * at.cell - window[4]
+    y = at.origin_y + (j + 0.5) * at.cell - window[5]
+    c, s, half_diagonal = window[6], window[7], math.sqrt(0.5) * at.cell + window[8]
+    along, aside = c * x - s * y, s * x + c * y
+    if along < window[0] - half_diagonal or along > window[2] + half_diagonal:
+        return -math.inf
+    if aside < window[1] - half_diagonal or aside > window[3] + half_diagonal:
+        return -math.inf
     f_i, f_j = i * at.stride + at.shift_x, j * at.stride + at.shift_y
     if 0 <= f_i < field.distance.shape[1] and 0 <= f_j < field.distance.shape[0]:
         return field.distance[f_j, f_i]

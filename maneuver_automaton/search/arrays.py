@@ -190,6 +190,7 @@ class DistanceGrid(NamedTuple):
     layout: GridLayout
     walls: GridWalls
     prices: LeastPrices
+    window: Array  # (9,) as in `_kernels_coast.inside_window`, outside of which no pose may be
 
 
 class CostTable(NamedTuple):

@@ -76,7 +76,9 @@ class Begun:
         call, search = self.call, self.call.search
         if not self.is_found:
             coarse, grid = call.resolution.coarse, search.grid
-            grid = laid_grid(query.plane, query.box, query.start, coarse=coarse, like=grid)
+            grid = laid_grid(
+                query.plane, query.box, query.window, query.start, coarse=coarse, like=grid
+            )
             task = task_of(query, call.resolution)
             search = search._replace(task=task, scene=query.scene(), grid=grid)
         return Pass(
@@ -158,7 +160,7 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
     if not (plain and query.plane.arrays.field.distance.size):
         return None
     task = task_of(query, first)
-    grid = laid_grid(query.plane, query.box, query.start, coarse=first.coarse)
+    grid = laid_grid(query.plane, query.box, query.window, query.start, coarse=first.coarse)
     cells = int(SPARE * grid.layout.columns * grid.layout.rows)
     if cells > MOST_CELLS:
         return None

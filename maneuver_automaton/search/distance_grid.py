@@ -40,12 +40,14 @@ NO_GRID = DistanceGrid(
     layout=GridLayout(0.0, 0.0, 1.0, 0, 0, 1, 0, 0, 0, 0),
     walls=GridWalls(0.0, 0.0, -math.inf, 0),
     prices=NO_PRICES,
+    window=np.zeros(9),
 )
 
 
 def distance_grid(
     world: World,
     box: Array,
+    window: Array,
     seeds: Array,
     aim: Array,
     *,
@@ -54,6 +56,9 @@ def distance_grid(
     prepared: Prepared = RECENT,
 ) -> DistanceGrid:
     """Distances from `seeds` (n, 2 or more) inside `box` (4,), grown towards `aim` (2 or more,).
+
+    Outside of the `window` (9,), as in `_kernels_coast.inside_window`, no pose may be: its sides
+    are walls too, which the box around it need not follow.
 
     Where places cost something, `prices` says what they cost at least in cells of a grid.
 
@@ -65,13 +70,13 @@ def distance_grid(
     neighbours is at most half a diagonal from one of them, which is blocked if the radius is a
     whole diagonal.
 
-    A blocked cell rests on no more than that: static obstacles of the world, whatever their number
-    and shape; the part of the vehicle whose frame is the pose, and of it a disc around the pose. A
-    pose outside its body blocks no cell. Where the field is capped nothing is blocked.
+    A blocked cell rests on no more than that: the window; static obstacles of the world, whatever
+    their number and shape; the part of the vehicle whose frame is the pose, and of it a disc around
+    the pose. A pose outside its body blocks no cell. Where the field is capped nothing is blocked.
     """
     if not world.arrays.field.distance.size:
         return NO_GRID
-    grid = laid_grid(world, box, aim, coarse=coarse)
+    grid = laid_grid(world, box, window, aim, coarse=coarse)
     grid = grid if prices is None else grid._replace(prices=prices(grid))
     n = grid.layout.columns * grid.layout.rows
     most = 8 * n + 8  # each cell is reached once from each of its neighbours at most
@@ -89,7 +94,13 @@ def distance_grid(
 
 
 def laid_grid(
-    world: World, box: Array, aim: Array, *, coarse: bool = False, like: DistanceGrid | None = None
+    world: World,
+    box: Array,
+    window: Array,
+    aim: Array,
+    *,
+    coarse: bool = False,
+    like: DistanceGrid | None = None,
 ) -> DistanceGrid:
     """The grid of `distance_grid` without its arrays, or with those of another one."""
     field = world.arrays.field
@@ -124,6 +135,7 @@ def laid_grid(
             cut=min(half_diagonal, field.outside) if inscribed < 2.0 * half_diagonal else -math.inf,
             detour=plain(_kernels_distance.detour_of)(columns, rows),
         ),
+        window=window,
     )
 
 

@@ -246,6 +246,7 @@ def _grid(query: LatticeQuery, sign: float, *, coarse: bool) -> DistanceGrid:
     return distance_grid(
         query.plane,
         query.box,
+        query.window,
         seeds,
         aim,
         coarse=coarse,
@@ -302,7 +303,9 @@ def plane_bound(query: LatticeQuery) -> float:
     Source: Bailey, Tovey, Uras, Koenig, Nash (2015), *Path planning on grids: the effect of vertex
     placement on path length*.
     """
-    grid = distance_grid(query.plane, query.box, query.goals, query.start, prepared=query.prepared)
+    grid = distance_grid(
+        query.plane, query.box, query.window, query.goals, query.start, prepared=query.prepared
+    )
     if not grid.layout.columns:
         return 0.0
     length: float = corner_path(

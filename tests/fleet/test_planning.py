@@ -13,11 +13,11 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import FleetProblem, FleetStatus, plan_fleet, verify_fleet
-from maneuver_automaton.fleet.coordination import one_at_a_time
+from maneuver_automaton.fleet.coordination import Turns, one_at_a_time
 from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.planning import _FleetSearch
-from maneuver_automaton.fleet.vehicle import vehicles_of
-from maneuver_automaton.fleet.workers import WorkerPool
+from maneuver_automaton.fleet.vehicle import courses_of, vehicles_of
+from maneuver_automaton.fleet.workers import PoolTask, WorkerPool, done
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
@@ -259,12 +259,22 @@ def test_by_turns_everybody_has_a_plan_without_a_search_in_time():
     assert all(held[k].cost == pytest.approx(held[k].arrival) for k in held)
 
 
-def test_a_short_limit_still_has_plans_for_all():
-    """Orders get a share of the time; then one drives at a time."""
-    fleet = fleets.random_fleet(8, 5)
-    result = plan_fleet(fleet, time_limit=3.0, max_rounds=0, orders=1)
-    assert result.status is FleetStatus.FOUND
-    assert fleets.least_distances(result)[0] > 0.0
+def test_where_time_is_short_plans_are_taken_as_they_are_found():
+    """By a clock that stands still: with little time, of which nothing passes, and with plenty."""
+    fleet, costs, spent = fleets.random_fleet(8, 5), [], []
+    for seconds in (0.2, 1e6):
+        budget = Budget(began=0.0, deadline=seconds, clock=lambda: 0.0)
+        turns = Turns(vehicles_of(fleet), fleet.margin, budget)
+        everybody = tuple(range(8))
+        done(turns, PoolTask(everybody, {}, "alone"))
+        held = done(turns, PoolTask(everybody, {}, "in order")).held
+        assert held.keys() == set(everybody)
+        courses = courses_of(turns.vehicles, held)
+        assert not meetings(courses, keep=fleet.margin)
+        costs.append(sum(one.cost for one in held.values()))
+        spent.append(sum(one.expansions for one in turns.vehicles))
+    assert costs[0] > costs[1]
+    assert spent[0] < spent[1]
 
 
 def test_an_obstacle_of_its_own_may_pass_its_goal_later():

@@ -1,4 +1,4 @@
-"""Problems of CL-CBS: agents, map, the car; headings that turn the other way; what is wrong."""
+"""Problems of CL-CBS and CSDO: agents, map, the car; which way headings turn; what is wrong."""
 
 from __future__ import annotations
 
@@ -136,7 +136,16 @@ def test_a_scenario_beside_it_with_a_fixed_time(path):
         ("name: agent1", "name: 7", ":3: agents[1].name: got 7, need a name"),
         ("[50, 40]", "[50, 0]", ":7: map.dimensions[1]: got 0, need a positive number"),
         ("[50, 40]", "50", ":7: map.dimensions: got 50, need [width, height]"),
-        ("    - [36.75, 18.5]", "    - 36.75", ":9: map.obstacles[0]: got 36.75, need [x, y]"),
+        ("    - [36.75, 18.5]", "    - 36.75",
+         ":9: map.obstacles[0]: got 36.75, need [x, y] or [x, y, r]"),
+        ("[36.75, 18.5]", "[36.75]",
+         ":9: map.obstacles[0]: got 1 numbers, need [x, y] or [x, y, r]"),
+        ("[36.75, 18.5]", "[36.75, 18.5, 1, 2]",
+         ":9: map.obstacles[0]: got 4 numbers, need [x, y] or [x, y, r]"),
+        ("[36.75, 18.5]", "[36.75, 18.5, 0]",
+         ":9: map.obstacles[0][2]: got 0, need a positive number"),
+        ("[36.75, 18.5]", "[36.75, 18.5, wide]",
+         ":9: map.obstacles[0][2]: got 'wide', need a finite number"),
         ("  dimensions: [50, 40]\n", "", ":6: map.dimensions: is missing, need [width, height]"),
     ],
 )  # fmt: skip
@@ -152,6 +161,22 @@ def test_files_that_state_no_problem(path):
     assert message_of(load_scenario, path, text) == (
         ":1: is a solution of CL-CBS, need the problem (agents, map)"
     )
+
+
+def test_a_file_of_csdo(path):
+    """Discs that state their radii, and yaw counter-clockwise: CSDO steps by (cos yaw, sin yaw)."""
+    rows = PROBLEM[PROBLEM.index("    - [36.75") :]
+    path.write_text(PROBLEM.replace(rows, "    - [36.75, 18.5, 0.50]\n    - [7.0, 26.5]\n"))
+    case = read(path)
+    discs = [(one.shape.center.tolist(), one.shape.radius) for one in case.obstacles]
+    assert discs == [([36.75, 18.5], 0.5), ([7.0, 26.5], 0.8)]
+    assert case.fleet[1].start.tolist() == [25.0, 3.0, 1.57]
+    assert case.fleet[1].goal.tolist() == [9.0, 3.0, -1.57]
+    path.write_text(PROBLEM.replace(rows, ""))
+    case = read(path)
+    assert case.obstacles == ()
+    assert case.fleet[1].start.tolist() == [25.0, 3.0, 1.57]
+    assert load_scenario(path).fleet.problems[1].footprint[0].size.tolist() == [3.0, 2.0]
 
 
 @needs_data

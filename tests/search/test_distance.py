@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
+from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search._kernels_distance import NARROW, distances
 from maneuver_automaton.search.distance_grid import MOST_CELLS, distance_grid, stride_of
@@ -26,7 +27,13 @@ def grid_and_world(footprint, obstacles, seeds, aim, *, pad=3.0):
     ends = np.vstack([seeds, aim])[:, :2]
     low = np.minimum(world.box[:2], ends.min(axis=0)) - pad
     high = np.maximum(world.box[2:], ends.max(axis=0)) + pad
-    return distance_grid(world, np.concatenate([low, high]), seeds, aim), world, seeds
+    box = np.concatenate([low, high])
+    return distance_grid(world, box, window_along(box), seeds, aim), world, seeds
+
+
+def window_along(box, turn=0.0):
+    """A box (4,) seen from a frame that is turned as a window (9,)."""
+    return np.array([*box, 0.0, 0.0, math.cos(turn), math.sin(turn), 0.0])
 
 
 def centres(grid):
@@ -144,9 +151,27 @@ def test_on_the_rim_of_what_is_searched():
     world = world_around((Box([2.0, 2.0]),), [Obstacle(Box([1.0, 4.0], [5.5, 0.0]))])
     goal, start = world.into(np.array([10.0, 0.0, 0.0])), world.into(np.array([0.0, 0.0, 0.0]))
     box = np.array([start[0], -9.0, goal[0], 9.0])
-    grid = distance_grid(world, box, goal[None], start)
+    grid = distance_grid(world, box, window_along(box), goal[None], start)
     ends = np.ascontiguousarray(np.vstack([start, goal])[:, :2])
     assert np.isfinite(distances(grid, world.arrays.field, ends)).all()
+
+
+def test_no_path_leads_around_outside_of_a_turned_window():
+    # The window is 20 m x 20 m, turned by 0.6 rad; a wall across it leaves 4 m at its left end.
+    # Around the right end, in a corner of the box around the window, it would be nearer.
+    turn = 0.6
+    frame = SE2([0.0, 0.0, -turn])  # in which the window lies along the axes, seen from the world
+    wall = Obstacle(Box([17.0, 1.0], frame.act([2.5, 0.0]), -turn))
+    ends = frame.act([[9.0, -4.0], [9.0, 4.0]])
+    world = world_of((wall,), (Disc(0.6),), (0.0, 0.0, 0.0))
+    goal, start = np.column_stack([ends, np.zeros(2)])
+    half = 10.0 * (math.cos(turn) + math.sin(turn))
+    box = np.array([-half, -half, half, half])
+    window = window_along([-10.0, -10.0, 10.0, 10.0], turn)
+    for inside, least, most in ((window, 30.0, 40.0), (window_along(box), 8.0, 16.0)):
+        grid = distance_grid(world, box, inside, goal[None], start)
+        (length,) = distances(grid, world.arrays.field, start[None, :2].copy())
+        assert least < length < most
 
 
 # --- walls thinner than a cell ---
