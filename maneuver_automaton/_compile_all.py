@@ -233,8 +233,10 @@ def _left_in(group: Path) -> float:
 
 
 def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:
+    # This package, and not the clone in whose folder an installed one is called.
+    where = f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})"
     return subprocess.Popen(
-        [sys.executable, "-c", f"from {__name__} import work; work()"],
+        [sys.executable, "-c", f"{where}; from {__name__} import work; work()"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

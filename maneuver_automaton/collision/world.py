@@ -226,8 +226,8 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     # allows. The inscribed disc is told by the field, so the cap is no less.
     cap = keep + max(4.0 * body.half_width, body.inscribed, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
-    distance = np.full((rows, columns), cap)
-    where = (distance, float(low[0] - cap), float(low[1] - cap), cell, cap)
+    left, below = (low - cap).tolist()
+    where = (np.full((rows, columns), cap), left, below, cell, cap)
     _kernels_field.write_pieces(*where, solids.edges, solids.first, solids.plates, listed)
     for one in maps:
         x, y, heading = one.origin.tolist()
