@@ -193,3 +193,12 @@ def test_a_matrix_of_another_size_than_the_controls():
     with pytest.raises(ValueError) as error:
         cost.rates(np.zeros((1, 2)), np.zeros((1, 3)))
     assert str(error.value) == "cost: effort_matrix has shape (3, 3), need (2, 2) for 2 controls"
+
+
+def test_costs_of_the_same_weights_are_equal():
+    one, other = (Cost(effort=1.0, effort_matrix=[[2.0, 0.0], [0.0, k]]) for k in (1.0, 3.0))
+    same = Cost(effort=1.0, effort_matrix=np.diag([2.0, 1.0]))
+    assert one == same
+    assert hash(one) == hash(same)
+    assert one != other
+    assert Cost(time=1.0) == Cost(time=1)

@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from maneuver_automaton.audit import clearance, closest_to, pairs, passages
+from maneuver_automaton.audit import clearance, closest_to, outlines, pairs, passages
+from maneuver_automaton.audit._kernels_edges import distances
 from maneuver_automaton.audit._kernels_still import Found
 from maneuver_automaton.audit.judge import audit_plan
 from maneuver_automaton.automaton import Plan
@@ -17,7 +18,13 @@ from maneuver_automaton.models import UserModel
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
 from tests.audit.test_guarantee import ANY
-from tests.collision.scenes import FOOTPRINTS, random_pose, random_scene, random_traffic
+from tests.collision.scenes import (
+    FOOTPRINTS,
+    random_pose,
+    random_scene,
+    random_traffic,
+    slow_distance,
+)
 from tests.quickly import quick_are
 
 FLYER = UserModel(
@@ -26,6 +33,7 @@ FLYER = UserModel(
     control_names=("ahead", "turn", "climb"),
     velocity=lambda z, u: [u[0], 0.0, u[1], u[2]],
 )
+TOUCHES = Found(0.0, 0.0, 0, 0.0, True)  # what has arrays take over from the compiled call
 
 
 def random_plan(rng, n):
@@ -42,6 +50,8 @@ def test_what_is_left_out_changes_nothing(seed, monkeypatch):
     rng = np.random.default_rng([21, seed])
     body = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
     plan, obstacles = random_plan(rng, 3), random_scene(rng, moving=seed % 2)
+
+    monkeypatch.setattr(clearance, "nearest_still", lambda *_: TOUCHES)
 
     def found(*, many, at_once, within):
         monkeypatch.setattr(pairs, "MANY", many)
@@ -88,8 +98,7 @@ def test_compiled_bounds_are_those_of_arrays(seed, monkeypatch):
         return closest_to(plan, ANY, obstacles, footprint=body, enough=enough)
 
     one = found()
-    touches = Found(0.0, 0.0, 0, 0.0, True)
-    monkeypatch.setattr(clearance, "nearest_still", lambda *_: touches)
+    monkeypatch.setattr(clearance, "nearest_still", lambda *_: TOUCHES)
     other = found()
     sharp = max(1e-3, 0.011 * other.measured)
     assert one.measured == pytest.approx(other.measured, abs=sharp)
@@ -163,3 +172,19 @@ def test_many_edges_of_what_is_flown_over_count():
     )
     assert found.min_clearance_m == pytest.approx(0.5, abs=5e-3)
     assert found.passed
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_distances_to_edges_are_those_of_shapely(seed):
+    rng = np.random.default_rng([24, seed])
+    body = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
+    obstacles, within = random_scene(rng), float(rng.uniform(0.5, 3.0))
+    poses = np.array([random_pose(rng) for _ in range(40)])
+    around = outlines.surroundings_around(obstacles, (0.0, 0.0))
+    reach = np.multiply.outer([-math.inf, math.inf], np.ones(len(poses)))
+    edges = around.outline, around.heights, around.index
+    found = distances(outlines.body_outline(body), poses, reach, *edges, within)
+    for pose, one in zip(poses, found, strict=True):
+        slow = slow_distance(body, obstacles, pose)
+        if slow > 0.0:  # inside an obstacle, edges may be far
+            assert one == pytest.approx(min(slow, within), abs=1e-9)

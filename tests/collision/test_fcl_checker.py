@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision.fcl_checker import Course, FclChecker
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker, _coasted_within
 from maneuver_automaton.groups import SE2
 from tests.collision.scenes import (
     CAR,
@@ -452,3 +452,16 @@ def test_a_course_of_one_coast_is_that_coast(seed):
             assert least <= PROVEN + slack
         answers.add(found is None)
     assert answers
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_coasts_stay_in_their_boxes(seed):
+    rng = np.random.default_rng([31, seed])
+    starts = np.array([random_pose(rng) for _ in range(20)])
+    twists = rng.uniform(-2.0, 2.0, (20, 3)) * (rng.random((20, 3)) < 0.7)
+    durations = rng.uniform(0.0, 9.0, 20)
+    low, high = _coasted_within(starts, twists, durations)
+    for k in range(20):
+        _, poses = poses_of(starts[k], twists[k], durations[k], 200)
+        assert (poses[:, :2] >= low[k] - PROVEN).all()
+        assert (poses[:, :2] <= high[k] + PROVEN).all()
