@@ -315,8 +315,7 @@ def guesses_along_paths(problem: Problem, budget: Budget) -> Iterator[Aimed]:
         return timed(plan, along.pace).duration + places / float(simpler.rates.max())
 
     for drive in gear_sequences(simpler, along.libraries, estimate, budget=budget):
-        if drive.plan.duration > 0.0:
-            yield guess_along(problem, along, drive.plan)
+        yield guess_along(problem, along, drive.plan)
 
 
 def guess_along(problem: Problem, along: PathGuesses, path: Plan) -> Aimed:

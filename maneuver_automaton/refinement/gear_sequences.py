@@ -125,7 +125,7 @@ def gear_sequences(
             unit = second * (1.0 / float(np.abs(library.body_velocities[:, 2]).max()))
             cost = Cost(time=second, direction_change=turning * unit, switch=switching * unit)
             variant = replace(problem, automaton=library, cost=cost)
-            for plan in _plans(variant, budget):
+            for plan in (one for one in _plans(variant, budget) if one.duration > 0.0):
                 drive = TimedDrive(plan=plan, estimate=estimate(plan), strokes=_strokes(plan))
                 alike = [other for other in found if drive.resembles(other)]
                 if not any(drive.estimate >= other.estimate for other in alike):

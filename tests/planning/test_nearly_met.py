@@ -80,3 +80,12 @@ def test_an_obstacle_in_the_way_counts_as_ever():
     result = ma.plan(problem, time_limit=1.0)
     assert result.cost > 2.05
     assert result.audit.passed
+
+
+def test_with_inertia_a_goal_a_few_nanometres_ahead_is_polished_to_a_moment():
+    """Kinematic paths to it do not move: they are no guesses, and broke off the call."""
+    library = ma.load_stock_library("second_order_unicycle")
+    search = ma.SearchSettings(max_expansions=300)
+    result = ma.plan(ma.Problem(library, [0, 0, 0], [4e-9, 0, 0], search=search), time_limit=60)
+    assert result.plan is not None, result.reason
+    assert result.cost < 0.1
