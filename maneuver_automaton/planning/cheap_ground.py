@@ -74,7 +74,7 @@ def _rates_ahead(query: LatticeQuery) -> Array:
             for along, n in ((y, far.shape[0]), (x, far.shape[1]))
         )
         rates += FORBIDDEN * (far[np.ix_(i, j)] < query.plane.body.inscribed)
-    return rates
+    return np.asarray(rates)
 
 
 def _cheapest_way(rates: Array, ends: IntArray) -> IntArray:
