@@ -78,7 +78,7 @@ def noted() -> Iterator[Noted]:
     from numba.core.dispatcher import Dispatcher
 
     module = importlib.import_module("maneuver_automaton.planning.plan")
-    note, compile_one, load = Noted(), Dispatcher.compile, module._load
+    note, compile_one, load = Noted(), Dispatcher.compile, module.load
 
     def compiled(dispatcher: Any, signature: Any) -> Any:
         began, note.depth = time.process_time(), note.depth + 1
@@ -96,12 +96,12 @@ def noted() -> Iterator[Noted]:
         note.loading += time.process_time() - began
         note.kernel_seconds, note.kernels, note.garbage = 0.0, [], 0.0
 
-    Dispatcher.compile, module._load = compiled, loaded
+    Dispatcher.compile, module.load = compiled, loaded
     gc.callbacks.append(note.collects)
     try:
         yield note
     finally:
-        Dispatcher.compile, module._load = compile_one, load
+        Dispatcher.compile, module.load = compile_one, load
         gc.callbacks.remove(note.collects)
 
 

@@ -8,7 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import plain
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.problem import SearchSettings
@@ -91,12 +90,18 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
     cells = cells._replace(frame=(x, y, heading, math.cos(heading), math.sin(heading)))
     least, most = query.interval
     back_off = float(max(back_off_of(query.library), 2.0 * query.margin))
+    # of each trim, and of none, the least surplus of maneuvers from there to an aim's trim
+    numbered = query.library.arrays.library
+    surplus = np.zeros(1 + numbered.n_trims)
+    if query.library.surplus.any():
+        to_aims = query.library.surplus[:, numbered.class_of[aims.trims]].min(axis=1)
+        surplus[:] = np.append(to_aims[numbered.class_of[: numbered.n_trims]], to_aims[0])
     return known._replace(
         sign=sign,
         roots=roots,
         aims=aims,
         cells=cells._replace(radix=_radix(query, cells, layers)),
-        estimates=known.estimates._replace(surplus=_surplus(query.library, aims.trims)),
+        estimates=known.estimates._replace(surplus=surplus),
         connecting=known.connecting._replace(least_interval=least, most_interval=most),
         truncation=known.truncation._replace(back_off=back_off),
         limits=limits._replace(least_coast=limits.least_coast * (1.0 - ROUNDING)),
@@ -198,16 +203,6 @@ def goal_roots(query: LatticeQuery) -> EndArrays:
         numbers += [int(trim)] * len(turns)
     none = np.zeros(len(rows), dtype=np.bool_)
     return EndArrays(np.array(rows), np.array(numbers, dtype=np.int64), none)
-
-
-def _surplus(library: LatticeLibrary, aim_trims: IntArray) -> Array:
-    """Least surplus (m + 1,) of maneuvers from each trim, and from none, to an aim's trim."""
-    numbered = library.arrays.library
-    classes = numbered.class_of
-    if not library.surplus.any():
-        return np.zeros(1 + numbered.n_trims)
-    to_aims = library.surplus[:, classes[aim_trims]].min(axis=1)
-    return np.append(to_aims[classes[: numbered.n_trims]], to_aims[0])
 
 
 def _slack(library: LatticeLibrary) -> float:

@@ -35,7 +35,7 @@ from maneuver_automaton.words.library import SWITCH
 from maneuver_automaton.words.word import Word
 
 TICK = 0.02  # [s] between departures that are tried
-FINER = 4  # times shorter ticks for a bound
+FINER = 16  # times shorter ticks for a bound, which is that much closer and takes as long
 CHUNK = 1 << 12  # labels and motions between two looks at the clock
 FIRST_ROOM = 1 << 12  # labels and places, and eight times as many motions
 FREELY = KnownCosts(np.zeros((0, 0, 0)), 0, 0)  # of times, where none is too long
