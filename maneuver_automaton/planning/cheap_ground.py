@@ -27,8 +27,9 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
 
     The way leads over cells of a grid, each at what its place costs under the heading of a step,
     and at the invariant cost of a metre. What costs more than the way beside it is closed, too, but
-    for around the ends: in the second problem from a length scale on, in the last not at all. There
-    is none where no place is sampled: near obstacles nothing costs more than elsewhere.
+    for around the ends: in the second problem from a length scale on, in the last not at all. In
+    the first nothing has a price for a vehicle with maneuvers. There is none where none is sampled:
+    near obstacles nothing costs more than elsewhere.
     """
     from scipy import ndimage
 
@@ -52,7 +53,9 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     for off in (0.0, near, half):
         closed = (far > half) | (dearer & (far > off))
         walls = OccupancyMap(closed, resolution=cell, origin=corner.pose, name="beside the way")
-        problem = replace(query.problem, obstacles=(*query.problem.obstacles, walls))
+        costs = query.problem.place_costs if off or library.at_will else ()
+        obstacles = (*query.problem.obstacles, walls)
+        problem = replace(query.problem, obstacles=obstacles, place_costs=costs)
         if blocked_ends(problem) is None:
             yield problem
 
