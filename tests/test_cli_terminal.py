@@ -88,7 +88,7 @@ with announced(), progress_bar("files", 2, quiet=False), waiting("planning", qui
 def test_two_bars_are_never_shown_at_once(tmp_path):
     text = on_a_terminal(cwd=tmp_path, run=("-c", COMPILES))
     assert "planning" not in text  # a bar is there already
-    before, after = text.split("compiling kernels, once after", 1)
+    before, after = text.split("compiling kernels, once, at", 1)
     meanwhile = after[after.index("compiling") : after.rindex("compiling")]
     assert "files" in before
     assert "files" not in meanwhile

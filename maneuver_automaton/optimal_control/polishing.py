@@ -44,6 +44,7 @@ from maneuver_automaton.optimal_control.polish_program import (
 )
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, TimeGrid, resampled
 from maneuver_automaton.optimal_control.scene import (
+    DIGITS,
     MotionEnds,
     NodeOnTheWay,
     PartPose,
@@ -605,7 +606,7 @@ def _point_of(guess: Guess, count: int) -> Point:
     return Point(
         settled(resampled(guess.state, count + 1)),
         settled(held(guess.control, count)),
-        settled(np.full(count, guess.duration / count)),
+        np.full(count, float(f"{guess.duration / count:.{DIGITS}g}")),
     )
 
 
