@@ -468,7 +468,9 @@ class Raster:
         turned = poses[..., 2] - self.origin[2]
         cosine, sine = np.cos(turned), np.sin(turned)
         ahead, left = velocities[..., 0], velocities[..., 1]
-        x, y = (self.at(one, poses[..., :2]) for one in self.slopes)
+        places = poses[..., :2]
+        alike = places.ndim > 2 and bool((places == places[:1]).all())  # the same at every heading
+        x, y = (self.at(one, places[:1] if alike else places) for one in self.slopes)
         gained = x * (cosine * ahead - sine * left) + y * (sine * ahead + cosine * left)
         return np.asarray(gained), np.asarray(np.hypot(ahead, left))
 
