@@ -51,9 +51,7 @@ class Cost:
     effort: float = 0.0  # c1
     norm: float = 0.0  # c2
     time: float = 0.0  # c3 [1/s]
-    effort_matrix: Array | None = field(
-        default=None, compare=False
-    )  # R (n_u, n_u), identity if None
+    effort_matrix: Array | None = field(default=None, compare=False)  # R (n_u, n_u), None: identity
     norm_order: float = 2.0  # 1, 2 or inf
     length: float = 0.0  # [1/m]
     switch: float = 0.0  # per switch of trims

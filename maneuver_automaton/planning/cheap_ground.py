@@ -19,7 +19,7 @@ from maneuver_automaton.search.place_arrays import FORBIDDEN
 MOST_CELLS = 20_000  # of the grid that a way is found on
 STEPS = [(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1]  # 16 ways on
 WIDE = 3.0  # half widths of a corridor, in length scales of the vehicle
-DEARER = 1.1  # times what a metre costs on the way
+COSTLIER = 1.1  # times what a metre costs on the way
 
 
 def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
@@ -48,10 +48,10 @@ def with_cheapest_way_left(query: LatticeQuery) -> Iterator[Problem]:
     far, (i, j) = ndimage.distance_transform_edt(aside, return_indices=True)
     near = max(library.radius, query.world.body.reach) / cell
     half = WIDE * near + 1.0
-    dearer = (least > DEARER * least[i, j]) & (ndimage.distance_transform_edt(out) > half)
+    costlier = (least > COSTLIER * least[i, j]) & (ndimage.distance_transform_edt(out) > half)
     corner = SE2(query.world.frame) @ SE2(np.array([*(low - 0.5 * cell), 0.0]))
     for off in (0.0, near, half):
-        closed = (far > half) | (dearer & (far > off))
+        closed = (far > half) | (costlier & (far > off))
         walls = OccupancyMap(closed, resolution=cell, origin=corner.pose, name="beside the way")
         costs = query.problem.place_costs if off or library.at_will else ()
         obstacles = (*query.problem.obstacles, walls)
