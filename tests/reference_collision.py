@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import shapely
 
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Obstacle
@@ -74,18 +73,6 @@ def free_times_and_clearances(
     _free_times_and_clearances(world.arrays, world.body, np.array(poses), twists, speeds, durations,
                          keep, margin, clocks, out)  # fmt: skip
     return out
-
-
-def solid_polygons(solids_) -> list[tuple[shapely.Geometry, float]]:
-    """Shapely geometries and roundings of the pieces that kernels see."""
-    pieces = []
-    for p, (a, b) in enumerate(zip(solids_.first[:-1], solids_.first[1:], strict=True)):
-        ring = solids_.edges[a:b, :2]
-        kind = (
-            shapely.Point if b - a == 1 else shapely.LineString if b - a == 2 else shapely.Polygon
-        )
-        pieces.append((kind(ring[0] if b - a == 1 else ring), float(solids_.plates[p, 4])))
-    return pieces
 
 
 def still(obstacles):

@@ -205,6 +205,8 @@ def test_obstacles_are_told_of(folder, capsys):
     assert "turning points:" in printed
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_check_says_what_is_touched(folder, capsys):
     Path("x.yaml").write_text(AMONG.replace("[2.0, 0.0, 0.0]", "[1.0, 0.2, 0.0]"))
     assert run(["check", "x.yaml"]) == 1
@@ -213,6 +215,8 @@ def test_check_says_what_is_touched(folder, capsys):
     assert "the vehicle touches obstacle 'obstacle 1'" in rows[1]
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_check_says_how_far_the_body_reaches(folder, capsys):
     body = "{rectangle_m: [4.0, 2.0], reference_m: [-1.5, 0.25]}"
     Path("x.yaml").write_text(

@@ -204,6 +204,8 @@ def test_kernels_work_without_a_home_folder(monkeypatch):
     assert _kernel_folders.kernel_folder.__wrapped__() is None
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_kernels_of_an_interactive_session_work(tmp_path):
     code = "from maneuver_automaton._compile import kernel\nexec(compile('def f(x): return 2 * x', "
     code += "'<stdin>', 'exec'))\nprint(kernel(f)(1.5))"

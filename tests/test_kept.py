@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from maneuver_automaton import Automaton, Unicycle, _kept
+from maneuver_automaton import Automaton, Unicycle
 from maneuver_automaton._kept import Prepared, kept_by_first
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.words.library import moving_trims
@@ -42,22 +42,6 @@ def test_many_owners_in_turn_do_not_evict_each_other(worked):
     assert len(done) == 50
 
 
-def test_each_argument_has_a_result_of_its_own(worked):
-    _, work = worked
-    owner = Owner()
-    assert work(owner, 1) is not work(owner, 2)
-    assert work(owner, 2, sign=-1) == [-2]
-
-
-def test_the_oldest_result_is_forgotten(worked, monkeypatch):
-    done, work = worked
-    monkeypatch.setattr(_kept, "MOST", 2)
-    owner = Owner()
-    for number in (1, 2, 3, 1):
-        work(owner, number)
-    assert [number for _, number in done] == [1, 2, 3, 1]
-
-
 def test_results_go_with_their_owner(worked):
     done, work = worked
     owner = Owner()
@@ -80,45 +64,6 @@ def test_a_library_of_another_process_works_them_out_again():
 
 
 # -- what searches share, kept by whoever holds it
-
-
-@pytest.fixture
-def made(monkeypatch):
-    """A list of what was made, by callers that remember two values of each kind."""
-    monkeypatch.setattr(_kept, "MOST", 2)
-    monkeypatch.setattr(_kept, "RECENT", Prepared())
-    return []
-
-
-def maker(made):
-    def make(number, *, sign=1):
-        made.append(sign * number)
-        return [sign * number]
-
-    return make
-
-
-def test_each_keeps_its_own(made):
-    make = maker(made)
-    holders = [Prepared() for _ in range(5)]
-    first = [one.once(make, k) for k, one in enumerate(holders)]
-    assert [one.once(make, k) for k, one in enumerate(holders)] == first
-    assert made == [0, 1, 2, 3, 4]
-
-
-def test_what_was_made_last_is_shared(made):
-    make = maker(made)
-    assert Prepared().once(make, 1) is Prepared().once(make, 1)
-    assert _kept.RECENT.once(make, 1, sign=-1) == [-1]
-    assert made == [1, -1]
-
-
-def test_the_oldest_of_a_holder_is_forgotten(made):
-    make = maker(made)
-    holder = Prepared()
-    for number in (1, 2, 3, 1):
-        holder.once(make, number)
-    assert made == [1, 2, 3, 1]
 
 
 def test_memory_in_use_is_nobody_elses():

@@ -188,7 +188,10 @@ def compiled_anew(name: str, seeds: range) -> set[str]:
     "name",
     [
         *(one.__name__ for one in QUICK),
-        *(pytest.param(one.__name__, marks=pytest.mark.slow) for one in OTHERS),
+        *(
+            pytest.param(one.__name__, marks=[pytest.mark.slow, pytest.mark.exhaustive])
+            for one in OTHERS
+        ),
     ],
 )
 def test_no_kernel_is_compiled_for_numbers_as_people_write_them(name):

@@ -67,7 +67,7 @@ LONG = {  # pages whose code, and words in commands that, take seconds
     "turn_on_the_spot",
     "why_no_plan",
 }
-LONGEST = {"gear_changes", "replanning", "tight_aisle"}
+LONGEST = {"gear_changes", "primitives", "replanning", "tight_aisle", "wind"}
 
 
 def blocks(language: str, text: str = TEXT) -> list[str]:

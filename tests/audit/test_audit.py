@@ -332,7 +332,6 @@ def test_moving_obstacles_count_at_their_time():
     [
         pytest.param((), marks=pytest.mark.slow),
         pytest.param((Disc(0.5),), marks=pytest.mark.slow),
-        (Box([1.0, 0.5]), Disc(0.3, center=[1.0, 0.5])),
         (Polygon([[0, 0], [2, 0], [2, 0.5], [0.5, 0.5], [0.5, 2], [0, 2]]),),
     ],
 )

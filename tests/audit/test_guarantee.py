@@ -54,7 +54,7 @@ def least(distance, times):
     return found
 
 
-@pytest.mark.parametrize("seed", quick_are(range(8), range(24)))
+@pytest.mark.parametrize("seed", quick_are(range(5), range(24)))
 def test_no_instant_has_less_clearance(seed):
     rng = np.random.default_rng([11, seed])
     n = rng.integers(1, 5)
@@ -74,7 +74,7 @@ def test_no_instant_has_less_clearance(seed):
         assert audit.passed == (audit.min_clearance_m > 0.0)
 
 
-@pytest.mark.parametrize("seed", quick_are(range(4), range(12)))
+@pytest.mark.parametrize("seed", quick_are(range(2), range(12)))
 def test_heights_part_what_the_plane_does_not(seed):
     rng = np.random.default_rng([12, seed])
     controls = rng.uniform([0.5, -1.0, -1.0], [2.0, 1.0, 1.0], (3, 3))
@@ -148,7 +148,7 @@ def trailer_poses(plan, controls, durations):
     return np.array(poses)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_trailer_is_where_it_rolls(seed):
     plan, controls, durations = hauled(seed)
     poses = trailer_poses(plan, controls, durations)

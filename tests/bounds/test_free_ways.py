@@ -20,7 +20,7 @@ FIELD = Path(__file__).parents[3] / "shared" / "data" / "field"
 ROBOT = Automaton.of_controls(
     Unicycle(), {"ahead": (0.4, 0.0), "left": (0.3, 0.6), "right": (0.3, -0.6), "spin": (0.0, 0.6)}
 )
-QUICKLY = [150, *range(0, 5000, 334)]  # the first: a goal that something comes to later
+QUICKLY = [150, *range(0, 5000, 1002)]  # the first: a goal that something comes to later
 
 
 def batches(all_of_them, *, quick):

@@ -77,9 +77,8 @@ def poses_in(rng, box, n):
     return box[:3] + np.concatenate([corners, inside]) * box[3:]
 
 
-@pytest.mark.parametrize("margin", [0.0, 0.3])
+@pytest.mark.parametrize(("margin", "frame"), [(0.0, None), (0.3, (3.0, -2.0, 0.7))])
 @pytest.mark.parametrize("body", BODIES)
-@pytest.mark.parametrize("frame", [None, (3.0, -2.0, 0.7)])
 def test_states_hold_for_every_pose_of_a_box(body, margin, frame):
     problem = problem_with(body, margin)
     scene = pose_scene(problem, frame=None if frame is None else np.array(frame))

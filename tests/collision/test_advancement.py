@@ -105,7 +105,7 @@ def test_free_motions_are_free(name):
     check_random(name, seed=1, moving=0, keep=0.0, margin=0.005)
 
 
-@pytest.mark.parametrize("name", scenes.FOOTPRINTS)
+@pytest.mark.parametrize("name", quick_are(["angle", "truck", "point"], scenes.FOOTPRINTS))
 def test_free_motions_are_free_of_what_moves(name):
     check_random(name, seed=2, moving=2, keep=0.0, margin=0.005)
 
@@ -114,12 +114,6 @@ def test_free_motions_are_free_of_what_moves(name):
 def test_a_distance_is_kept_and_no_more(name):
     for moving in (0, 1, 2):
         check_random(name, seed=3, moving=moving, keep=0.3, margin=0.002)
-
-
-@pytest.mark.parametrize("name", ["car", "disc"])
-def test_a_distance_is_kept(name):
-    for moving in (0, 1, 2):
-        check_random(name, seed=3, moving=moving, keep=0.3, margin=0.002, short=math.inf)
 
 
 def test_by_hand_a_distance_is_kept_between_two_corners():
@@ -256,9 +250,7 @@ def test_by_hand_what_is_not_there_is_not_met(present, clock, duration, free):
     assert got == pytest.approx(free, abs=2e-3)
 
 
-@pytest.mark.parametrize(
-    "name", quick_are(["car", "disc"], ["car", "truck", "disc"], exhaustive=True)
-)
+@pytest.mark.parametrize("name", quick_are(["disc"], ["disc", "car", "truck"], exhaustive=True))
 def test_free_motions_are_free_of_what_is_there(name):
     rng = np.random.default_rng([6, *name.encode()])
     footprint, met = scenes.FOOTPRINTS[name], 0
@@ -309,7 +301,7 @@ def test_a_spin_in_place_is_free_for_ever_where_its_circle_is():
     assert tight < 7.0
 
 
-@pytest.mark.parametrize("turn", [0.0, 1e-17, 5.6e-17, -1e-14, 1e-12, 1e-9, 1e-6, 1e-4])
+@pytest.mark.parametrize("turn", [5.6e-17, -1e-14, 1e-9, 1e-4])
 def test_hardly_turning_is_driving_straight(turn):
     obstacles = [Obstacle(Box([1.0, 4.0], [5.0, 0.0], 0.3)), Obstacle(Disc(0.7, [3.0, 3.0]))]
     footprint = (Box([2.0, 1.0]),)

@@ -6,19 +6,16 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, corner_time, stays_above
+from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
 from tests.quickly import draws
 from tests.reference_collision import moved, shapely_world, world_around
-
-one_stays_above = getattr(stays_above, "py_func", stays_above)
-one_corner_time = getattr(corner_time, "py_func", corner_time)
 
 ROUNDED = 1e-8  # [m] coordinates are rounded to 1e-9
 
@@ -180,35 +177,3 @@ def test_a_clearance_to_a_flat_tail_is_not_cut_off():
     world = world_around((), tail)
     got = clearances(world, world.into(np.array([[-2.0, 0.05, 0.0], [-3.1, 0.0, 0.0]])))
     assert got == pytest.approx([0.05, 0.1])
-
-
-@settings(max_examples=draws(300))
-@given(
-    place=st.tuples(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0)),
-    turn=st.floats(-2.0, 2.0).filter(lambda turn: abs(turn) > 1e-6),
-    ahead=st.floats(-5.0, 5.0),
-    drop=st.floats(1e-6, 3.0),
-    most=st.floats(1e-3, 4.0),
-)
-@example(place=(0.0, 1e-3), turn=0.5, ahead=1.0, drop=1e-3, most=1.0)  # down to its lowest place
-def test_a_corner_that_is_passed_over_would_not_have_come_down_in_time(
-    place, turn, ahead, drop, most
-):
-    a, b = place
-    limit = ahead + a - drop  # below where it is now
-    if one_stays_above(a, b, ahead, turn, limit, most):
-        assert one_corner_time(a, b, ahead, turn, limit) >= most
-        angles = turn * np.linspace(0.0, most, 200)
-        assert (ahead + a * np.cos(angles) - b * np.sin(angles) > limit).all()
-
-
-def test_most_corners_of_a_short_turn_are_passed_over():
-    rng = np.random.default_rng(4)
-    a, b = rng.uniform(-6.0, 6.0, (2, 400))
-    drop, angles = rng.uniform(0.0, 3.0, 400), 0.5 * np.linspace(0.0, 1.0, 100)
-    heights = a[:, None] * np.cos(angles) - b[:, None] * np.sin(angles)
-    above = heights.min(axis=1) > a - drop
-    passed = [
-        one_stays_above(p, q, 0.0, 0.5, p - d, 1.0) for p, q, d in zip(a, b, drop, strict=True)
-    ]
-    assert np.mean(passed) > 0.8 * above.mean()

@@ -10,9 +10,9 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon, convex
+from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.collision.advancement import clearances
-from maneuver_automaton.collision.convex import convex_pieces, pieces_seen_from, solids_of
+from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.collision.outline import outlines
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
@@ -89,13 +89,6 @@ def test_corners_on_a_line_and_repeated_corners():
     assert len(assert_pieces_are(Polygon(square))) == 1
 
 
-def test_pieces_are_counted_from_a_frame():
-    far = np.array([1e9, -1e9])
-    shape = Polygon(np.array([[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]]) + far)
-    pieces = pieces_seen_from([shape], np.append(far, 0.0))
-    assert np.abs(np.concatenate([ring for ring, _ in pieces])).max() == 2.0
-
-
 def test_a_spiral_keeps_its_gap():
     turns = np.linspace(0.0, 6.0 * math.pi, 90)
     ray = np.stack([np.cos(turns), np.sin(turns)], 1)
@@ -103,15 +96,6 @@ def test_a_spiral_keeps_its_gap():
         np.concatenate([ray * (1 + turns[:, None]), (ray * (1.3 + turns[:, None]))[::-1]])
     )
     assert_pieces_are(wall, atol=1e-7)
-
-
-def test_normals_and_plates_of_solids():
-    solids = solids_of([(Box([4.0, 2.0]).corners, 0.0), (np.array([[5.0, 1.0]]), 0.5)])
-    assert solids.first.tolist() == [0, 4, 5]
-    assert solids.plates.tolist() == [[-2, -1, 2, 1, 0], [4.5, 0.5, 5.5, 1.5, 0.5]]
-    # rows: corner, outward normal of the edge that ends there, its offset
-    assert solids.edges[:4, 2:].tolist() == [[-1, 0, 2], [0, -1, 1], [1, 0, 2], [0, 1, 1]]
-    assert solids_of([]).plates.shape == (0, 5)
 
 
 @pytest.mark.parametrize("off", [1e-16, 1e-12, 3e-10])
@@ -168,14 +152,3 @@ def world_clearances(obstacles):
 def assert_below(found, obstacles, *, atol):
     exact = shapely_world((Box([1.0, 0.5]),), obstacles).clearance(PLACES)
     assert (found <= np.maximum(exact, 0.0) + atol).all()
-
-
-@pytest.mark.parametrize("n", [20, 58])
-def test_pieces_are_joined_in_few_tries(monkeypatch, n):
-    """Neighbours that are not convex together are not tried again for every union."""
-    angles = 2.0 * math.pi * np.arange(n) / n
-    radii = np.where(np.arange(n) % 2, 1.0, 0.6)
-    tries, union = [], convex._union
-    monkeypatch.setattr(convex, "_union", lambda *one: tries.append(0) or union(*one))
-    convex_pieces(Polygon(radii[:, None] * np.stack([np.cos(angles), np.sin(angles)], axis=1)))
-    assert n / 2 < len(tries) < 6 * n

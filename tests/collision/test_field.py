@@ -13,7 +13,7 @@ from maneuver_automaton.collision._kernels_field import write_map
 from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
-from tests.reference_collision import shapely_world, solid_polygons, still, world_around
+from tests.reference_collision import shapely_world, still, world_around
 
 
 def centres(field):
@@ -84,20 +84,6 @@ def test_deep_inside_it_is_as_deep_as_it_is():
         assert -values[values < 0.0] == pytest.approx(depth[values < 0.0], abs=1e-3)
 
 
-@pytest.mark.parametrize("name", ["car", "disc", "point"])
-def test_outside_the_field_all_is_far(name):
-    rng = np.random.default_rng(3)
-    for obstacles, world in random_worlds(4, scenes.FOOTPRINTS[name], 5):
-        field = world.arrays.field
-        rows, columns = field.distance.shape
-        size = field.cell * np.array([columns, rows])
-        origin = np.array([field.origin_x, field.origin_y])
-        places = origin + size * rng.uniform(-1.0, 2.0, (400, 2))
-        away = ((places < origin) | (places > origin + size)).any(axis=1)
-        exact = shapely_world((), still(obstacles)).clearance(out_of(world, places[away]))
-        assert exact.min() >= field.outside - 1e-8
-
-
 @pytest.mark.parametrize("yaw", [0.0, 0.7, -2.4])
 def test_a_map_is_as_far_as_its_cells(yaw):
     rng = np.random.default_rng(5)
@@ -117,38 +103,6 @@ def test_a_map_is_as_far_as_its_cells(yaw):
         assert_distances(distance.ravel(), exact, depth, most=2.5)
         inside = distance.ravel() < -1e-9
         assert -distance.ravel()[inside] == pytest.approx(depth[inside], abs=1e-6)
-
-
-def test_a_map_lowers_what_is_there_and_no_more():
-    distance = np.full((20, 20), 0.3)
-    distance[:, 10:] = 9.0
-    blocked = np.zeros((2, 2), dtype=bool)
-    write_map(distance, 0.0, 0.0, 0.5, 9.0, blocked, 1.0, 4.0, 4.0, 1.0, 0.0)
-    assert distance.max() == 9.0
-    blocked[0, 0] = True
-    write_map(distance, 0.0, 0.0, 0.5, 9.0, blocked, 1.0, 4.0, 4.0, 1.0, 0.0)
-    assert distance[8, 8] == pytest.approx(-0.25)
-    assert distance[9, 9] == pytest.approx(-0.25)
-    assert distance[0, 0] == 0.3
-    assert distance[8, 19] == pytest.approx(9.75 - 5.0)
-
-
-@pytest.mark.parametrize("name", ["car", "truck", "disc", "point"])
-def test_every_solid_within_reach_is_in_the_bucket(name):
-    rng = np.random.default_rng(6)
-    for _, world in random_worlds(7, scenes.FOOTPRINTS[name], 6):
-        buckets, solids = world.arrays.buckets, solid_polygons(world.arrays.solids)
-        low = np.array([buckets.origin_x, buckets.origin_y])
-        size = buckets.cell * np.array([buckets.columns, buckets.rows])
-        places = low + size * rng.uniform(-0.1, 1.1, (300, 2))
-        reach = world.body.reach + buckets.reach
-        for place in places:
-            i, j = np.floor((place - low) / buckets.cell).astype(int)
-            inside = 0 <= i < buckets.columns and 0 <= j < buckets.rows
-            k = j * buckets.columns + i
-            held = buckets.items[buckets.start[k] : buckets.start[k + 1]] if inside else []
-            away = [shape.distance(shapely.Point(place)) - r for shape, r in solids]
-            assert set(np.flatnonzero(np.array(away) < reach)) <= set(np.asarray(held).tolist())
 
 
 def test_a_world_of_one_needle_or_of_far_corners_has_a_small_field():

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton._compile import kernel
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
+from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.collision._kernels_moving import obstacle_pose
 from maneuver_automaton.collision.world import own_frame, world_of
 from maneuver_automaton.groups import SE2
@@ -64,41 +63,6 @@ def test_a_shifted_world_is_the_same_to_the_last_bit(seeds, far):
     )
     for one, other in zip(arrays_of(here), arrays_of(there), strict=True):
         assert np.array_equal(one, other)
-
-
-@given(seeds=st.lists(st.integers(0, 10**6), min_size=1, max_size=4), turn=st.floats(-3.0, 3.0))
-@settings(max_examples=draws(40))
-def test_a_turned_world_is_the_same(seeds, turn):
-    obstacles = tuple(shape_on_a_raster(seed) for seed in seeds)
-    by = SE2([3.0, -2.0, turn])
-    start = np.array([0.5, 0.25, 0.0])
-    here = world_of(obstacles, BODY, own_frame(obstacles, start))
-    there = world_of(
-        moved(obstacles, by), BODY, own_frame(moved(obstacles, by), (by @ SE2(start)).pose)
-    )
-    for one, other in zip(arrays_of(here), arrays_of(there), strict=True):
-        assert one == pytest.approx(other, abs=3e-9)
-
-
-def test_by_hand_a_world_from_its_own_frame():
-    wall = Obstacle(Box([4.0, 2.0], [10.0, 5.0], math.pi / 2))
-    world = world_around(BODY, [wall])
-    assert world.frame == pytest.approx([10.0, 5.0, math.pi / 2])
-    assert world.arrays.solids.plates[0] == pytest.approx([-2, -1, 2, 1, 0])
-    assert world.box == pytest.approx([-2, -1, 2, 1])
-    assert world.into(np.array([10.0, 6.0, math.pi / 2])) == pytest.approx([1.0, 0.0, 0.0])
-    assert world.last_event == -math.inf
-
-
-def test_which_frame_is_taken():
-    other = np.array([1.0, 2.0, 0.5])
-    disc, moving = Obstacle(Disc(1.0)), Obstacle(Box([1, 1]), motion=Motion([0], [[5, 5, 1]]))
-    cells = OccupancyMap([[1]], resolution=1.0, origin=[3.0, 4.0, 0.2])
-    assert own_frame((disc, moving), other) == (1.0, 2.0, 0.5)
-    assert own_frame((disc, moving, cells), other) == (3.0, 4.0, 0.2)
-    assert own_frame((Obstacle(Box([1, 1], [7, 7], 0.3)), cells), other) == (7.0, 7.0, 0.3)
-    ring = Obstacle(Polygon([[1, 1], [1, 4], [0, 1]]))
-    assert own_frame((ring,), other) == pytest.approx((1.0, 1.0, math.atan2(-3, -1)))
 
 
 def test_moving_obstacles_are_where_they_are_said_to_be():

@@ -52,6 +52,8 @@ def test_words_of_five_trims_lose_nothing_and_words_of_four_little():
     assert four.words.least == pytest.approx(0.5 * CAR.turning_radius)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_what_does_not_hold_is_handed_over_all_the_same():
     designed = ma.design_library(LEVELS, max_trims=3, radius=8.0, tolerance=0.1)
     assert not designed.holds

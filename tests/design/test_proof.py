@@ -56,6 +56,8 @@ def test_a_larger_car_in_a_larger_disc_is_the_same():
     assert (again.factor, again.boxes, *again.worst) == (small.factor, small.boxes, *small.worst)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_what_is_cut_short_is_still_proven():
     early, late = proof(4, most_boxes=2000), proof(4)
     assert not early.finished

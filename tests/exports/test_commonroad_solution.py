@@ -35,7 +35,7 @@ def states_of(path):
 
 
 @quiet
-@pytest.mark.parametrize("step", [0.1, 0.25])
+@pytest.mark.parametrize("step", [0.1])
 def test_states_are_those_of_the_middle_at_the_steps_of_the_scenario(step, tmp_path):
     pytest.importorskip("commonroad.common.solution")
     recorded = car(7, x=60.0, y=2.0, speed=8.0, steps=40, step=step)

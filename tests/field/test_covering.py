@@ -94,7 +94,7 @@ def test_many_swaths_are_near_a_bound_and_each_driven_once():
     assert found == bound == 6.0 * (n - 1)
 
 
-@pytest.mark.parametrize("by", [[30.0, -8.0, 0.7], [-5.0, 3.0, 2.5]])
+@pytest.mark.parametrize("by", [[-5.0, 3.0, 2.5]])
 def test_a_moved_field_has_the_moved_plan(by):
     here, by = oblong(), ma.SE2(by)
     there = ma.cover(here.problem.moved(by), time_limit=10.0)
@@ -113,6 +113,7 @@ def test_swaths_keep_away_from_what_stands_in_the_field():
     assert problem.inner.distance(shapely.Point(20.0, 17.0)) > 6.0
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_with_inertia_swaths_are_driven_at_speed():
     car = ma.SecondOrderCar(wheelbase=2.0, max_speed=2.0, max_acceleration=1.0, max_steering=0.6,

@@ -111,7 +111,7 @@ def test_what_is_wrong_is_told_in_one_line(text, said, tmp_path, capsys):
 def test_a_field_without_room_has_no_plan(tmp_path, capsys):
     path = written(tmp_path, FIELD.replace("headland_m: 12.0", "headland_m: 2.0"))
     asked = ["cover", str(path), "--out", str(tmp_path / "out"), "--no-plot"]
-    assert run([*asked, "--time-limit", "0.5"]) == 1
+    assert run([*asked, "--time-limit", "0.1"]) == 1
     assert "no_plan: no turn was found from the end of a swath at (" in capsys.readouterr().err
     assert json.loads((tmp_path / "out" / "plan.json").read_text())["status"] == "no_plan"
 

@@ -34,7 +34,7 @@ def problem_of(kind: str) -> Problem:
     return Problem(automaton, [0, 0, 0], end, start_trim=begin, footprint=Disc(0.3), margin=TUBE)
 
 
-@pytest.fixture(scope="module", params=["robot", "moving", "car", "trailer"])
+@pytest.fixture(scope="module", params=["moving", "trailer"])
 def driving(request):
     """A vehicle with inertia, and a plan of it."""
     (vehicle,) = vehicles_of(FleetProblem([problem_of(request.param)]))

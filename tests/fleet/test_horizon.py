@@ -270,7 +270,7 @@ def test_known():
     assert broken_by(now) == [(FleetGuarantee.KNOWN, ("a",))]
 
 
-@pytest.mark.parametrize("seed", quick_are([0, 1], range(3), exhaustive=True))
+@pytest.mark.parametrize("seed", quick_are([0], range(3), exhaustive=True))
 def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
     fleet = scattered(2 + 3 * seed, seed)
     steps = loop_of(fleet, steps=60).steps

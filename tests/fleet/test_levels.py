@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.automaton import Automaton, Plan
@@ -26,9 +26,7 @@ from maneuver_automaton.fleet import (
     verify_fleet,
 )
 from maneuver_automaton.fleet.courses import BANDS, FleetCourse, Levels
-from maneuver_automaton.fleet.held import distance_to_obstacles, why_not_free
 from maneuver_automaton.fleet.meetings import meetings
-from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
@@ -40,6 +38,7 @@ from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import car
 from tests.matrix.vehicles import VEHICLES
+from tests.quickly import draws
 from tests.scenario.test_vehicles import SCENARIOS
 
 DRONE = UserModel(
@@ -122,19 +121,7 @@ def test_stages_hold_the_body_at_all_times(rows, high):
     assert all(one.high - one.low <= most + high + 0.5 + 1e-3 for one in bands)
 
 
-def test_stages_rise_with_the_altitude():
-    low = Levels([0.0, 4.0, 6.0], [1.0, 9.0, 9.0], (0.0, 1.0))
-    high = Levels(low.time, low.altitude + 100.0, low.body)
-    for one, other in zip(low.bands, high.bands, strict=True):
-        assert (other.begin, other.end) == pytest.approx((one.begin, one.end), rel=1e-9)
-        assert (other.low, other.high) == pytest.approx((one.low + 100.0, one.high + 100.0))
-
-
-def test_a_level_flight_is_one_stage():
-    levels = Levels([0.0, 4.0, 6.0], [7.0, 7.0, 7.0], (-1.0, 1.0))
-    assert len(levels.bands) == 1
-
-
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_who_flies_high_enough_costs_as_alone():
     result = plan_fleet(over_a_truck(2.5), time_limit=30.0, max_rounds=0)
@@ -168,6 +155,7 @@ def test_nobody_assumes_that_a_body_is_flat():
     assert least_in_space(tall, result.plans) > 0.1
 
 
+@settings(max_examples=draws(40))
 @given(st.floats(0.1, 2.0), st.floats(1e-4, 0.05), st.floats(-3.0, 3.0), st.floats(-50.0, 50.0))
 def test_what_keeps_the_margin_in_height_by_a_hair_passes(margin, more, turned, rise):
     by = SE2xR([5.0, -3.0, turned, rise])
@@ -196,14 +184,6 @@ def test_who_climbs_is_met_at_the_height_of_the_other():
             assert nearest(rising, climbing(level, level)).distance == 0.0
         else:
             assert nearest(rising, climbing(level, level)).distance == pytest.approx(4.0, abs=0.05)
-
-
-def test_two_that_climb_are_judged_each_as_it_is():
-    """In bands of one height both overlap; one as it is, past the other in bands, does not."""
-    one, other = climbing(0.0, 80.0), climbing(14.0, 94.0)
-    assert len(one.bands) > 1
-    assert 0.5 < nearest(one, other).distance <= 13.0 + 1e-5
-    assert nearest(other, one).distance == nearest(one, other).distance
 
 
 def test_pictures_show_the_distance_in_space():
@@ -280,14 +260,3 @@ def test_in_closed_loop_one_flies_over_what_is_low_and_round_what_is_high(top):
         over |= bool((aside < 0.0).any())
     assert verdict.clearance_m == pytest.approx(least, abs=0.02)
     assert over == (top < 0.0)
-
-
-def test_what_is_held_is_free_at_its_own_heights():
-    problem = VEHICLES["helicopter"].problem(body_height=(-1.0, 1.0))
-    x, y, _, z = problem.start
-    for top, free in ((z - 1.5, True), (z - 0.5, False)):
-        house = Obstacle(Box([6.0, 6.0], [x, y]), height=(z - 40.0, top))
-        (vehicle,) = vehicles_of(FleetProblem([replace(problem, obstacles=(house,))]))
-        assert bool(why_not_free(vehicle, vehicle.standing)) != free
-        gap = distance_to_obstacles(vehicle, vehicle.standing)
-        assert gap == pytest.approx(max(z - 1.0 - top, 0.0), abs=1e-3)

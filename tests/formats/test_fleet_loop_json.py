@@ -28,12 +28,8 @@ KEYS = [
     "broken_guarantees", "counts", "vehicles", "steps",
 ]  # fmt: skip
 LOOPS = {
-    "calm": {},
-    "noise": {"disturbance": Disturbance(position_m=0.003, heading_rad=0.003)},
-    "another vehicle": {"disturbance": Disturbance(twist_scale=(1.02, 1.0, 0.98))},
     "a push": {"disturbance": {"a": Disturbance(pushes={3: (0.5, 0.2, 0.1)})}},
-    "breaks down": {"breaks_s": {"a": 2.0}},
-    "joins": {"joins_s": {"b": 1.0}},
+    "breaks down, joins": {"breaks_s": {"a": 2.0}, "joins_s": {"b": 1.0}},
 }
 
 

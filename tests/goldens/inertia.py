@@ -79,10 +79,9 @@ def slot() -> Problem:
 
 def _inertia() -> Iterator[Scene]:
     of = functools.partial
-    quick = {"hovercraft"}
     for name in SIZES:
         for seed in range(2):
-            yield _scene(f"{name}/free/{seed}", of(sent, name, seed), name in quick and not seed)
+            yield _scene(f"{name}/free/{seed}", of(sent, name, seed))
         for seed in range(2):
             yield _scene(f"{name}/box/{seed}", of(sent, name, seed, blocked=True))
     effort = Cost(time=1.0, effort=0.3)

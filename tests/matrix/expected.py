@@ -77,7 +77,8 @@ SLOW = {
         )
     ),
     ("switch_price", "grid"),
-    *((feature, QUICK_VEHICLE) for feature in ("clearance", "loop_clearance", "via_free_heading")),
+    *((row, QUICK_VEHICLE) for row in ("clearance", "ground_round")),
+    *((row, QUICK_VEHICLE) for row in ("loop_clearance", "via_free_heading")),
 }
 ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     *(("car", feature) for feature in ("polygons", "max_time", "moving_obstacles")),
@@ -86,11 +87,11 @@ ONE_BY_ONE = {  # so that every feature is tried with a few vehicles
     ("boat", "loop_noise"),
     *(("stage", feature) for feature in ("discs", "moving_obstacles", "loop_obstacles")),
     ("stage", "moved_problem_among_obstacles"),
-    *(("user", feature) for feature in ("loop", "polishing")),
+    ("user", "polishing"),
 }
 LONG_ONE_BY_ONE = {  # with -m slow
     *(("car", feature) for feature in ("discs", "zones", "margin", "bounds", "min_coast")),
-    *(("car", feature) for feature in ("planner_with_all", "free_heading_among_obstacles")),
+    ("car", "free_heading_among_obstacles"),
     ("car_with_trailer", "planner_with_all"),
     ("glider", "heights"),
     ("car", "several_parts"),
@@ -104,7 +105,7 @@ LONG_ONE_BY_ONE = {  # with -m slow
     ("hovercraft", "max_trims"),
     ("second_order_unicycle", "loop_obstacles"),
     ("second_order_car", "resume"),
-    *((QUICK_VEHICLE, row) for row in ("clearance", "loop_clearance", "via_free_heading")),
+    *((QUICK_VEHICLE, row) for row in ("ground_round", "loop_clearance", "via_free_heading")),
     ("user", "off_library_start"),
 }
 

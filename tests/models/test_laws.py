@@ -34,6 +34,7 @@ from maneuver_automaton.models import (
     rollout,
     vector_field,
 )
+from tests.quickly import quick_are
 
 
 def boat_velocity(z, u):
@@ -116,7 +117,12 @@ MODELS = [
     BALLOON,
 ]
 KINEMATIC = [model for model in MODELS if not model.reduced_names]
-every_model = pytest.mark.parametrize("model", MODELS, ids=lambda model: model.name)
+QUICK = ("balloon", "car", "car_with_trailer", "helicopter", "single_track")  # of every kind
+every_model = pytest.mark.parametrize(
+    "model",
+    quick_are([model for model in MODELS if model.name in QUICK], MODELS),
+    ids=lambda model: model.name,
+)
 SHARES = st.floats(-1.0, 1.0)
 
 

@@ -13,12 +13,9 @@ from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
     TransferSettings,
-    drawn_in,
-    duration_guess,
     solve_transfer,
     transfer_program,
 )
-from maneuver_automaton.optimal_control.problem import control_scale
 
 CAR = SecondOrderCar(
     wheelbase=2.5, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
@@ -112,13 +109,6 @@ def test_a_coupled_model_slows_down_in_its_own_way():
     )
     exact = 2.0 * np.log(2.0)  # v' = 2 - v / 2
     assert found.duration == pytest.approx(exact, rel=1e-4)
-
-
-def test_sizes_and_guesses():
-    assert control_scale(Car(wheelbase=2.0, max_speed=3.0, max_steering=0.5)).tolist() == [3.0, 0.5]
-    assert drawn_in(np.array([[-2.0, 2.0]]), 0.25).tolist() == [[-1.0, 1.0]]
-    assert duration_guess(CAR, np.zeros(2), np.array([2.0, 0.1])) == pytest.approx(3.0)
-    assert duration_guess(CAR, np.zeros(2), np.zeros(2)) == 0.1
 
 
 @pytest.mark.parametrize(

@@ -11,21 +11,12 @@ import shapely
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
-from maneuver_automaton.optimal_control.polishing import intervals_for, polish
+from maneuver_automaton.optimal_control.polishing import polish
 from maneuver_automaton.optimal_control.scene import (
     BodyPart,
     MotionEnds,
     PolishScene,
     PolishSettings,
-)
-from maneuver_automaton.optimal_control.separation import (
-    Facing,
-    Lines,
-    SolidPairs,
-    first_lines,
-    near_pairs,
-    reaches,
-    shared_lines,
 )
 from tests.reference_dynamics import trailer_pose
 
@@ -41,12 +32,6 @@ def moved(x: float, y: float) -> np.ndarray:
     return SQUARE + np.array([x, y])
 
 
-def standing(x: float, y: float = 0.0) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Control points of the unit square that stands at a place for one interval."""
-    ring = moved(x, y)
-    return [(np.tile(ring[:, :1], (4, 1)), np.tile(ring[:, 1:], (4, 1)))]
-
-
 def guess(n: int = 40, *, aside: float = 0.0, length: float = 4.0, duration: float = 6.0) -> Guess:
     """Straight ahead, bulging to the left."""
     share = np.linspace(0.0, 1.0, n + 1)
@@ -59,38 +44,6 @@ def guess(n: int = 40, *, aside: float = 0.0, length: float = 4.0, duration: flo
 
 def at_rest(x: float, y: float = 0.0, heading: float | None = 0.0) -> MotionEnds:
     return MotionEnds((0.0,) * 5, (x, y, heading, 0.0, 0.0))
-
-
-def test_a_line_lies_midway_between_nearest_points() -> None:
-    body, pieces = [(SQUARE, 0.0)], [(moved(3.0, 0.0), 0.0)]
-    pairs = near_pairs(standing(0.0), body, pieces, within=2.5)
-    lines = first_lines(standing(0.0), body, pieces, pairs)
-    assert [column.tolist() for column in pairs] == [[0], [0], [0]]
-    assert lines.angle == pytest.approx([0.0])
-    assert lines.anchor[:, 0] == pytest.approx([1.5])
-
-
-def test_where_solids_overlap_the_line_shows_the_shortest_way_out() -> None:
-    body, pieces = [(SQUARE, 0.0)], [(moved(0.1, 0.8), 0.0)]
-    pairs = near_pairs(standing(0.0), body, pieces, within=0.1)
-    lines = first_lines(standing(0.0), body, pieces, pairs)
-    assert lines.angle == pytest.approx([np.pi / 2])
-    assert reaches(standing(0.0), (body, pieces), pairs, lines).nodes == pytest.approx([0.1])
-
-
-def test_rounding_counts_on_both_sides() -> None:
-    disc = [(np.array([[2.0, 0.0]]), 0.5)]
-    body = [(SQUARE, 0.25)]
-    assert len(near_pairs(standing(0.0), body, disc, within=0.74).interval) == 0
-    assert len(near_pairs(standing(0.0), body, disc, within=0.76).interval) == 1
-    pairs = SolidPairs(*(np.zeros(1, dtype=np.int64) for _ in range(3)))
-    reach = reaches(standing(0.0), (body, disc), pairs, Lines(np.zeros(1), np.zeros((1, 2))))
-    assert (reach.nodes, reach.piece) == (pytest.approx([0.75]), pytest.approx([1.5]))
-
-
-def test_the_number_of_intervals_follows_the_duration_between_its_limits() -> None:
-    settings = PolishSettings()
-    assert [intervals_for(s, settings) for s in (0.1, 12.0, 900.0)] == [40, 100, 300]
 
 
 def test_without_obstacles_full_ahead_and_full_back() -> None:
@@ -258,26 +211,6 @@ def test_a_solve_that_is_cut_short_hands_on_its_best_iterate() -> None:
     poses = simulated(cut.state, cut.control, cut.durations)
     assert poses[-1] == pytest.approx([4.0, 0.0, 0.0], abs=1e-3)
     assert whole.objective <= cut.objective < 1.001 * whole.objective
-
-
-def test_pieces_behind_one_another_share_a_line() -> None:
-    body = [(SQUARE, 0.0)]
-    pieces = [(moved(x, y), 0.0) for x, y in ((2.0, 0.0), (3.0, 0.5), (0.0, 2.0))]
-    pairs = near_pairs(standing(0.0), body, pieces, within=3.0)
-    lines = first_lines(standing(0.0), body, pieces, pairs)
-    reach = reaches(standing(0.0), (body, pieces), pairs, lines)
-    owner = shared_lines(pieces, pairs, lines, reach)
-    near = {int(piece): int(pairs.piece[k]) for piece, k in zip(pairs.piece, owner, strict=True)}
-    assert near == {0: 0, 1: 0, 2: 2}
-
-
-@pytest.mark.parametrize("known", [0, 1])
-def test_pieces_of_more_corners_join_those_of_fewer(known: int) -> None:
-    """Beside discs, or beside nothing at all, a box comes near once the motion has changed."""
-    before = Facing(np.ones((known, 2, 4), dtype=bool), np.ones((known, known), dtype=bool))
-    now = Facing(np.zeros((2, 2, 4), dtype=bool), np.zeros((2, 4), dtype=bool))
-    assert now.joined(before).piece.sum() == known
-    assert now.joined(before).body.sum() == 8 * known
 
 
 def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:

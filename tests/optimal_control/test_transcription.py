@@ -20,10 +20,8 @@ from maneuver_automaton.optimal_control import (
     TimeGrid,
     moving_frame,
     solve,
-    straight_guess,
     transcribe,
 )
-from maneuver_automaton.optimal_control.ipopt import load_casadi, numpy_on_symbols
 from tests.reference_dynamics import dynamics_defect
 
 RULES = ("trapezoidal", "rk4")
@@ -212,29 +210,6 @@ def test_success_of_the_solver_is_not_believed():
     found = solve(cart(dynamics=liar), TimeGrid(n_nodes=20))
     assert found.status is SolveStatus.FAILED
     assert found.reason.startswith("Solve_Succeeded, but the numbers do not hold: defect 0.01")
-
-
-def test_the_program_starts_with_the_defects():
-    program = transcribe(unicycle_problem(), TimeGrid(n_nodes=11, rule="rk4"))
-    assert program.constraints.shape == (30, 1)
-    assert program.limits.shape == (30, 2)
-    assert program.bounds.shape == (11 * 3 + 10 * 2 + 1, 2)
-    np.testing.assert_array_equal(program.bounds[0], [0.0, 0.0])
-    np.testing.assert_array_equal(program.bounds[-1], [8.0, 8.0])
-
-
-def test_a_straight_guess_holds_free_components():
-    guess = straight_guess(cart(end=(None, 1.0), duration=(1.0, 4.0)))
-    np.testing.assert_array_equal(guess.state, [[0.0, 0.0], [0.0, 1.0]])
-    assert guess.duration == 2.5
-
-
-def test_numpy_on_symbols_leaves_no_trace():
-    options = load_casadi().GlobalOptions
-    before = options.getNumpyMode() if hasattr(options, "getNumpyMode") else None
-    with pytest.raises(RuntimeError), numpy_on_symbols(casadi):
-        raise RuntimeError
-    assert (options.getNumpyMode() if hasattr(options, "getNumpyMode") else None) == before
 
 
 def test_without_casadi_it_is_named(monkeypatch):

@@ -72,6 +72,7 @@ def cheapest(places, goal, *, count=720):
     return costs[0], firsts[0]
 
 
+@pytest.mark.slow
 def test_the_best_heading_at_the_first_depends_on_the_third():
     """One search, not pieces glued together: beside it all headings of half a degree."""
     found = {}

@@ -31,10 +31,9 @@ def is_outside(problem, pose):
     )
 
 
-@pytest.mark.parametrize("first", quick_are([0], range(0, 300, 50)))
-def test_verdicts_agree_with_shapely(first):
+def test_verdicts_agree_with_shapely():
     met = set()
-    for seed in range(first, first + 50):
+    for seed in range(20):
         problem = scenes.random_scene(seed)
         said = blocked_ends(problem)
         clearance = clearance_at(problem, problem.start)
@@ -160,7 +159,7 @@ def test_a_goal_of_any_heading_with_room_for_none(count, blocked):
         )
 
 
-@pytest.mark.parametrize("seed", quick_are(range(10), range(120)))
+@pytest.mark.parametrize("seed", quick_are(range(3), range(24)))
 def test_touched_all_round_is_touched_at_each_heading(seed):
     """Against headings one by one, with shapely; moved it is the same."""
     rng = np.random.default_rng([7, seed])

@@ -61,14 +61,14 @@ def is_driven(found):
     )
 
 
-@pytest.mark.parametrize("width", [3.2, 3.12])
-def test_a_bend_hardly_wider_than_it_has_to_be(width):
+def test_a_bend_hardly_wider_than_it_has_to_be():
     """At 3.005 m there is no path; the lattice alone finds none up to 3.3 m."""
-    found = plan(with_library(bend(width)), time_limit=300.0)
+    found = plan(with_library(bend(3.12)), time_limit=300.0)
     assert found.status is PlanStatus.FOUND
     assert is_driven(found)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_path_that_was_broken_off_is_followed_to_its_end(monkeypatch):
     """Where the time is short the search gets its share first; then the path has what is left."""
@@ -77,6 +77,8 @@ def test_a_path_that_was_broken_off_is_followed_to_its_end(monkeypatch):
     assert is_driven(plan(problem, time_limit=300.0))
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_a_bend_beside_which_something_moves():
     """Far away, and across the way: the path is followed all the same."""
     for way in ([[0, -5, 0], [10, -5, 0]], [[14.4, 3, 0], [14.4, 30, 0]]):

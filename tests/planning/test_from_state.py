@@ -13,13 +13,7 @@ from maneuver_automaton.automaton.cutting import begin_state
 from maneuver_automaton.formats.plan_json import load_plan, save_plan
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.checking import check_plan
-from maneuver_automaton.primitives.connecting import maneuver_defect
-from maneuver_automaton.primitives.on_the_spot import (
-    maneuvers_between,
-    prepare_maneuvers,
-    seconds_between,
-    trim_at,
-)
+from tests.quickly import quick_are
 
 BODY = {  # length and width [m], and a state beside the trims
     "second_order_car": ((4.0, 1.8), [1.37, 0.12]),
@@ -45,7 +39,7 @@ def problem_of(name: str, **more: object) -> ma.Problem:
     return ma.Problem(library, np.zeros(end.size), goal, **(given | more))
 
 
-@pytest.mark.parametrize("name", BODY)
+@pytest.mark.parametrize("name", quick_are(["second_order_car", "hovercraft", "helicopter"], BODY))
 def test_starts_in_its_state_among_obstacles(name: str) -> None:
     problem = problem_of(name)
     result = ma.plan(problem, time_limit=10.0)
@@ -57,9 +51,8 @@ def test_starts_in_its_state_among_obstacles(name: str) -> None:
     assert result.lower_bound <= result.cost
 
 
-@pytest.mark.parametrize("name", ["second_order_car", "hovercraft"])
-def test_ends_in_a_state(name: str) -> None:
-    problem = problem_of(name)
+def test_ends_in_a_state() -> None:
+    problem = problem_of("second_order_car")
     end = ma.Goal(problem.goals[0].pose, state=problem.start_state)
     there = replace(problem, goals=(end,), start_state=None)
     result = ma.plan(there, time_limit=10.0)
@@ -79,6 +72,8 @@ def test_moved_problem_has_the_moved_plan() -> None:
     np.testing.assert_allclose((by @ SE2(here.plan.end)).pose, there.plan.end, atol=1e-8)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_polished_is_no_costlier_and_keeps_its_ends() -> None:
     problem = problem_of("second_order_car")
     alone = ma.plan(problem, time_limit=5.0)
@@ -151,21 +146,6 @@ def test_a_first_maneuver_that_hits_is_no_plan() -> None:
     result = ma.plan(problem_of("second_order_car", obstacles=wall), time_limit=2.0)
     assert result.plan is None
     assert result.reason.startswith("no first maneuver")
-
-
-@pytest.mark.parametrize("name", BODY)
-def test_maneuvers_meet_their_ends(name: str) -> None:
-    """Against an ODE solver, which shares no code with what drives them."""
-    library, state = ma.load_stock_library(name), np.array(BODY[name][1])
-    model = library.model
-    prepare_maneuvers(model)
-    here = trim_at(model, state, "here")
-    seconds = seconds_between(model, state, np.array([t.reduced_state for t in library.trims]))
-    target = library.trims[int(np.argmin(seconds))]
-    made = maneuvers_between(model, here, target)
-    assert made
-    for one in made:
-        assert maneuver_defect(model, one, source=here, target=target) < 1e-6
 
 
 def test_a_fleet_starts_in_the_states_of_its_vehicles() -> None:

@@ -94,6 +94,7 @@ def angles_at_cusps(plan: ma.Plan) -> list[float]:
     return [float(angle) for angle in moving[turns, 1]]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_it_changes_how_a_car_parks() -> None:
     levels = {"speed": [-1.0, 0.0, 1.0], "steering": [-0.7, -0.35, 0.0, 0.35, 0.7]}

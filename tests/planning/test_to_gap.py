@@ -1,9 +1,7 @@
 """Plans with a proof beside the search: how near the optimum they are, and the same each time."""
 
-import itertools
 import json
 import math
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,14 +9,9 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.bounds import cell_proofs
-from maneuver_automaton.budget import Budget, Watch
+from maneuver_automaton.budget import Watch
 from maneuver_automaton.cli import run
-from maneuver_automaton.planning import PlanResult, PlanStatus, proving
-from maneuver_automaton.planning.no_way import with_proof
-from maneuver_automaton.planning.proving import plan_to_gap
 from tests import scenes
-from tests.bounds.scenes import gap
 from tests.bounds.test_cell_bound import WALL, among
 
 SLOT = replace(scenes.parallel_slot(6.5), cost=ma.Cost(length=1.0))
@@ -85,34 +78,8 @@ def test_a_planner_knows_at_once_what_it_has_proven_of_other_starts():
     assert second.lower_bound <= alone.cost
 
 
-def test_without_a_plan_all_time_is_for_the_search_and_the_proof_that_there_is_none(monkeypatch):
-    begun = []
-    monkeypatch.setattr(proving, "proofs_of", lambda *args, **more: iter(begun.append(args)))
-    narrow, left = gap(1.6), Budget.from_now(30.0)
-    late = replace(left, began=left.began - 50.0)  # most of the time has gone by
-
-    def search(budget):
-        time.sleep(0.05)
-        none = PlanResult(problem=narrow, status=PlanStatus.OUT_OF_BUDGET, reason="no plan")
-        return with_proof(none, budget)
-
-    result = plan_to_gap(narrow, search, late, Watch(gap=0.1, problem=narrow))
-    assert result.status is PlanStatus.UNREACHABLE
-    assert not begun
-
-
-def test_a_bound_is_polished_no_longer_than_there_is_time():
-    looks = itertools.count()
-    *_, last = cell_proofs(
-        SLOT,
-        incumbent=lambda: 12.0,
-        ends=lambda _work: True,
-        over=lambda: next(looks) >= 20,
-    )
-    assert next(looks) < 40  # of 250 sweeps over the cells
-    assert 0.0 <= last.value <= 12.0
-
-
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_a_bound_alone_is_as_good_as_beside_a_plan():
     """It looks for a plan first, and then only at poses that a cheaper one may visit."""
     problem = among(WALL, cost=ma.Cost(time=1.0))

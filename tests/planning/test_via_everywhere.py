@@ -85,7 +85,9 @@ def test_other_vehicles(name):
     planned(ma.Problem(library, start, goal, via=way))
 
 
-@pytest.mark.parametrize("free", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.exhaustive
+@pytest.mark.slow
+@pytest.mark.parametrize("free", [False, True])
 def test_with_inertia_it_passes_without_a_rest_and_rests_where_it_is_told_to(free):
     """A car that knows no trim but rest: without polishing it goes from rest to rest."""
     robot = resting(CAR)
@@ -119,6 +121,8 @@ def test_with_inertia_it_passes_without_a_rest_and_rests_where_it_is_told_to(fre
     assert moved.cost == pytest.approx(found.cost, rel=1e-5)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_a_trailer_whose_speed_is_a_control_stops_for_no_time():
     one = base(VEHICLES["car_with_trailer"]).problem
     via = ma.Via([3.7, 1.2, 0.2], stop=True)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maneuver_automaton.plotting.colors import trim_colors, twist_color
-from tests.plotting.cases import ROBOT, plan_of_trims
+from tests.plotting.cases import plan_of_trims
 
 speeds = st.floats(-30.0, 30.0) | st.just(0.0)
 
@@ -16,20 +16,6 @@ def test_every_twist_has_a_colour(twist):
     color = twist_color(np.array(twist))
     assert len(color) == 3
     assert all(0.0 <= channel <= 1.0 for channel in color)
-
-
-def test_the_same_trim_has_the_same_colour_in_every_company():
-    twists = {trim.name: trim.body_velocity for trim in ROBOT.trims}
-    together = trim_colors(twists)
-    for name, twist in twists.items():
-        assert trim_colors({name: twist})[name] == together[name]
-
-
-def test_the_order_of_the_trims_does_not_matter():
-    twists = {trim.name: trim.body_velocity for trim in plan_of_trims(12).trims}
-    backwards = dict(reversed(twists.items()))
-    assert trim_colors(backwards) == trim_colors(twists)
-    assert list(trim_colors(backwards)) == list(backwards)
 
 
 @pytest.mark.parametrize("count", [2, 12, 40, 200])

@@ -2,16 +2,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.plotting import draw_controls, draw_plane, figure_of
+from maneuver_automaton.plotting import draw_controls
 from maneuver_automaton.plotting.colors import INK
 from maneuver_automaton.plotting.controls import draw_over_time
 from maneuver_automaton.plotting.track import Track
 from maneuver_automaton.primitives import Trim
-from tests.plotting.cases import flight_plan, parking_plan, plan_of
+from tests.plotting.cases import parking_plan, plan_of
 
 
 def test_controls_are_steps_between_the_switching_times():
@@ -28,16 +27,6 @@ def test_controls_are_steps_between_the_switching_times():
     assert turn_rate.get_xlabel() == "time [s]"
 
 
-def test_the_colours_are_those_of_the_path():
-    plan = plan_of(["straight", "clockwise"], [1.0, 2.0])
-    axes = Figure().subplots(3, 1)
-    path = draw_plane(axes[0], plan)["path"]
-    for artists in draw_controls(axes[1:], plan):
-        assert [to_rgb(c) for c in artists.steps.get_colors()] == [
-            to_rgb(c) for c in path.get_colors()
-        ]
-
-
 def test_one_axes_takes_all_controls_in_different_styles():
     ax = Figure().add_subplot()
     drawn = draw_controls(ax, parking_plan(), labels=["speed", "turn rate"])
@@ -51,34 +40,6 @@ def test_one_axes_takes_all_controls_in_different_styles():
     low, high = ax.get_ylim()
     assert low < -0.25
     assert high > 1.5
-
-
-def test_all_values_are_in_view_with_zero_where_it_is_near():
-    axes = Figure().subplots(2, 1)
-    draw_controls(axes, plan_of(["straight", "clockwise"], [1.0, 1.0]))
-    assert axes[0].get_ylim()[0] < -0.25
-    assert axes[0].get_ylim()[1] > 1.5
-    assert axes[1].get_ylim()[0] < -1.0
-    assert axes[1].get_ylim()[1] > 0.0
-
-
-def test_a_plan_without_motion_leaves_empty_axes():
-    axes = Figure().subplots(2, 1)
-    drawn = draw_controls(axes, plan_of([], []))
-    assert [len(artists.steps.get_segments()) for artists in drawn] == [0, 0]
-    axes[0].figure.canvas.draw()
-
-
-def test_the_altitude_is_a_line_over_time():
-    figure = figure_of(flight_plan())
-    (lines,) = [
-        artist.get_segments()
-        for artist in figure.axes[-1].collections
-        if artist.get_linewidth()[0] == 2.4
-    ]
-    ends = np.array([segment[[0, -1]] for segment in lines])
-    np.testing.assert_allclose(ends, [[[0, 0], [3, 6]], [[3, 6], [7, 10]], [[7, 10], [12, 2.5]]])
-    assert figure.axes[-1].get_ylabel() == "z [m]"
 
 
 def test_axes_and_labels_must_match_the_controls():

@@ -15,6 +15,8 @@ def words():
     return ma.design_library(BOX, max_trims=3, radius=2.0, least=1.0, tolerance=0.1).words
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_no_place_is_worse_than_what_is_proven(words):
     ax = Figure().add_subplot()
     factors = draw_factor(ax, words).get_array()
@@ -23,6 +25,8 @@ def test_no_place_is_worse_than_what_is_proven(words):
     assert ax.get_aspect() == 1.0
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_left_and_right_are_alike(words):
     factors = np.ma.filled(draw_factor(Figure().add_subplot(), words).get_array(), 0.0)
     assert np.allclose(factors, factors[::-1], atol=1e-6)

@@ -15,11 +15,11 @@ from maneuver_automaton.fleet import simulate_fleet
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import film_of, save_film
 from maneuver_automaton.plotting import films as film
-from maneuver_automaton.plotting.films import MOST_FRAMES, OUTLINED, TRAIL_S, picture_times
+from maneuver_automaton.plotting.films import MOST_FRAMES, TRAIL_S, picture_times
 from maneuver_automaton.receding_horizon import Disturbance
 from tests.fleet import robots
 from tests.plotting.cases import parking_plan, result_of, slalom_problem
-from tests.plotting.fleets import crossing, row_of
+from tests.plotting.fleets import crossing
 from tests.plotting.loops import LOOPS, moments, parking_loop, pushed_loop, unfinished_loop
 
 NAMES = ("traffic", "old", "jumps", "ahead", "trails", "bodies", "dots", "clock")
@@ -56,13 +56,6 @@ class TestPlans:
             assert parts["clock"].get_text() == f"{time:.2f} s"
         last = parts["trails"].get_segments()[-1][-1]
         np.testing.assert_allclose(last, plan.pose_at(3.0)[:2], atol=1e-3)
-
-    def test_the_path_grows(self):
-        shown = film_of(parking_plan())
-        shown.show(0.5)
-        assert len(parts_of(shown)["trails"].get_segments()) == 1
-        shown.show(8.0)
-        assert len(parts_of(shown)["trails"].get_segments()) == 4
 
     @pytest.mark.exhaustive
     @pytest.mark.slow
@@ -108,27 +101,6 @@ class TestLoops:
         assert parts["ahead"].get_segments() == []
         assert parts["clock"].get_text() == "4.00 s · goal reached"
 
-    def test_old_plans_fade(self):
-        loop = pushed_loop()
-        shown = film_of(loop)
-        old = parts_of(shown)["old"]
-        shown.show(loop.times[0])
-        assert old.get_segments() == []
-        shown.show(loop.times[-2])
-        assert len(old.get_segments()) == 6
-        assert (np.diff(old.get_color()[:, 3]) > 0.0).all()
-
-    def test_nothing_is_cut_off(self):
-        loop = of_body(parking_loop(), Box([0.5, 0.3]))
-        shown = film_of(loop)
-        ax = shown.figure.axes[0]
-        (left, right), (low, high) = ax.get_xlim(), ax.get_ylim()
-        for time in moments(loop, 30):
-            shown.show(time)
-            corners = parts_of(shown)["bodies"].get_paths()[0].vertices
-            assert (corners > [left, low]).all()
-            assert (corners < [right, high]).all()
-
     def test_obstacles_stand_and_move_around_the_loop(self):
         bar, disc = Box([1.0, 0.2], [0.0, -0.6]), Disc(0.1)
         passing = Obstacle(disc, motion=Motion([0.0, 4.0], [[-1, -0.3, 0], [1, -0.3, 0]]))
@@ -166,13 +138,6 @@ class TestFleets:
         assert len(parts["bodies"].get_paths()) == 1  # the other has left
         cart, door = parts["traffic"].get_facecolor()[:, 3]
         assert door < 0.2 < cart
-
-    def test_many_have_no_outlines(self):
-        few, many = (
-            parts_of(film_of(row_of(count)))["bodies"] for count in (OUTLINED, OUTLINED + 1)
-        )
-        assert few.get_linewidth()[0] > 0.0
-        assert many.get_linewidth()[0] == 0.0
 
     def test_a_loop_shows_the_plans_ahead(self):
         noise = Disturbance(position_m=0.01, heading_rad=0.01)

@@ -54,16 +54,6 @@ def test_a_ring_that_crosses_itself_is_solid_in_all_its_faces():
     assert not path.contains_point((1.0, 0.2))
 
 
-def test_discs_and_boxes_have_their_size():
-    np.testing.assert_allclose(
-        shape_path(Disc(0.5, [1.0, 2.0])).get_extents().get_points(), [[0.5, 1.5], [1.5, 2.5]]
-    )
-    box = Box([2.0, 1.0], [1.0, 0.0], np.pi / 2)
-    np.testing.assert_allclose(
-        shape_path(box).get_extents().get_points(), [[0.5, -1.0], [1.5, 1.0]]
-    )
-
-
 @given(
     blocked=st.lists(st.lists(st.booleans(), min_size=4, max_size=4), min_size=1, max_size=6),
     origin=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-3.0, 3.0)),
@@ -75,19 +65,6 @@ def test_blocked_cells_are_where_the_origin_puts_them(blocked, origin):
     paths = map_paths(cells)
     inside = [any(path.contains_point(place) for path in paths) for place in middles.reshape(-1, 2)]
     assert inside == cells.blocked.ravel().tolist()
-
-
-def test_a_large_map_is_cut_into_paths_and_loses_nothing():
-    cells = OccupancyMap(np.indices((80, 80)).sum(axis=0) % 2, resolution=1.0)
-    paths = map_paths(cells)
-    assert len(paths) > 1
-    corners = np.concatenate([path.vertices.reshape(-1, 5, 2)[:, 0] for path in paths])
-    np.testing.assert_array_equal(corners, np.argwhere(cells.blocked)[:, ::-1])
-
-
-def test_a_map_without_blocked_cells_is_nothing():
-    _, artists = drawn(OccupancyMap(np.zeros((3, 3)), resolution=1.0))
-    assert artists.maps[0].get_paths() == []
 
 
 def test_thin_walls_of_a_fine_map_stay_visible():
@@ -140,14 +117,6 @@ def test_the_track_on_an_arc_is_the_arc():
     assert np.linalg.norm(np.diff(track, axis=0), axis=1).max() < 0.06
 
 
-def test_without_a_time_it_stands_where_the_motion_begins():
-    _, artists = drawn(Obstacle(Disc(0.2), motion=AROUND))
-    np.testing.assert_allclose(
-        artists.moving.get_paths()[0].get_extents().get_points(), [[-0.2, -0.2], [0.2, 0.2]]
-    )
-    np.testing.assert_allclose(artists.tracks.get_segments()[0][[0, -1]], AROUND.pose[:, :2])
-
-
 def test_what_stands_and_what_moves_have_different_colours():
     _, artists = drawn([Disc(1.0), Obstacle(Disc(0.2), motion=AROUND)])
     still, moving = (
@@ -155,17 +124,6 @@ def test_what_stands_and_what_moves_have_different_colours():
     )
     assert np.ptp(still) < 0.1
     assert np.ptp(moving) > 0.3
-
-
-def test_the_limits_stay_as_they_are():
-    ax, _ = drawn([Disc(50.0), OccupancyMap(np.ones((9, 9)), resolution=9.0)])
-    assert not np.isfinite(ax.dataLim.get_points()).all()
-
-
-def test_no_obstacle_is_no_artist():
-    _, artists = drawn(())
-    assert artists.static.get_paths() == artists.moving.get_paths() == []
-    assert artists.maps == ()
 
 
 def test_wrong_input_is_named():

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from maneuver_automaton.collision import Box, Disc
+from maneuver_automaton.collision import Box
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning import PlanResult, PlanStatus
@@ -76,15 +76,12 @@ def boxes_of(figure):
 
 
 class TestFiles:
-    @pytest.mark.parametrize("body", quick_are([CAR], [(), CAR, [Disc(0.2), CAR]]))
+    @pytest.mark.parametrize("body", [CAR])
     @pytest.mark.parametrize(
         "plan",
         [
             parking_plan(),
             plan_of([], []),
-            plan_of(["rest"], [8.0]),
-            plan_of(["spin"], [2.0]),
-            plan_of_trims(12),
             plan_of(["straight", "clockwise"] * 40, [0.5] * 80),
         ],
     )
@@ -103,15 +100,10 @@ class TestFiles:
         with pytest.raises(ValueError, match="holds no plan: no plan within 5 s"):
             save_picture(result, tmp_path / "alternatives.png", view="alternatives")
 
-    @pytest.mark.parametrize("goal", ["reached", "several", "free heading"])
-    def test_scenes_are_written(self, goal, tmp_path):
+    def test_scenes_are_written(self, tmp_path):
         plan = parking_plan()
-        goals = {
-            "reached": plan.end,
-            "several": [Goal(pose=plan.end, tolerance_m=0.1), Goal(pose=[2.0, 0.0, 1.0])],
-            "free heading": Goal(pose=plan.end, free_heading=True),
-        }
-        problem = slalom_problem(plan, goal=goals[goal])
+        goals = [Goal(pose=plan.end, tolerance_m=0.1), Goal(pose=[2, 0, 1], free_heading=True)]
+        problem = slalom_problem(plan, goal=goals)
         save_picture(result_of(plan, problem=problem), tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
 
@@ -123,7 +115,7 @@ class TestFiles:
         save_picture(result, tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
 
-    @pytest.mark.parametrize("name", quick_are(["parking", "empty", "straight"], LOOPS))
+    @pytest.mark.parametrize("name", quick_are(["parking", "empty"], LOOPS))
     def test_loops_are_written(self, name, tmp_path):
         save_picture(LOOPS[name](), tmp_path / "loop.png")
         assert_picture(tmp_path / "loop.png")
@@ -133,7 +125,7 @@ class TestFiles:
         save_picture(result, tmp_path / "fleet.png")
         assert_picture(tmp_path / "fleet.png")
 
-    @pytest.mark.parametrize("plan", [parking_plan(), plan_of_trims(50), flight_plan()])
+    @pytest.mark.parametrize("plan", [plan_of_trims(50), flight_plan()])
     def test_files_are_drawn_without_anything_else(self, plan, tmp_path):
         save_picture(stated(document_of(plan), plan), tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
@@ -207,9 +199,7 @@ class TestPages:
             ],
         ),
     )
-    @pytest.mark.parametrize(
-        "make", [lambda: result_of(parking_plan()), pushed_loop, crossing, lambda: row_of(20)]
-    )
+    @pytest.mark.parametrize("make", [pushed_loop, lambda: row_of(20)])
     def test_a_page_has_its_size_and_nothing_overlaps(self, make, look, tmp_path):
         save_picture(make(), tmp_path / "plan.png", look=look)
         assert_picture(tmp_path / "plan.png")

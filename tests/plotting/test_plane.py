@@ -16,16 +16,12 @@ from maneuver_automaton.plotting.colors import GREY, INK
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from tests.plotting.cases import (
     ROBOT,
-    flight_plan,
     parking_plan,
     plan_of,
     plan_of_trims,
     result_of,
     slalom_problem,
 )
-from tests.quickly import quick_are
-
-FOOTPRINT = Box([0.6, 0.4], [0.1, 0.0])
 
 
 def drawn(plan, *, problem=None, footprint=None, legend=True):
@@ -74,12 +70,6 @@ def test_the_legend_names_the_trims_of_the_plan_once():
     assert drawn(parking_plan(), legend=False)[0].get_legend() is None
 
 
-def test_twelve_trims_have_twelve_colours_and_names():
-    ax, artists = drawn(plan_of_trims(12))
-    assert len(np.unique(artists["path"].get_colors(), axis=0)) == 12
-    assert len(names(ax)) == 14
-
-
 def test_turns_on_the_spot_are_arcs_about_their_place():
     plan = plan_of(["straight", "spin", "spin"], [2.0, 1.0, 3.0])
     _, artists = drawn(plan)
@@ -93,28 +83,6 @@ def test_turns_on_the_spot_are_arcs_about_their_place():
     assert radii[1] > 1.2 * radii[0]  # they do not cover each other
 
 
-def test_rest_is_a_marker():
-    plan = parking_plan()
-    _, artists = drawn(plan)
-    np.testing.assert_allclose(artists["still o"].get_offsets(), [plan.end[:2]])
-
-
-def test_a_climb_on_the_spot_is_a_marker():
-    _, artists = drawn(flight_plan())
-    assert len(artists["still ^"].get_offsets()) == 1
-    assert len(artists["path"].get_segments()) == 2
-
-
-def test_the_body_is_drawn_at_every_switching_time():
-    plan = parking_plan()
-    _, artists = drawn(plan, footprint=FOOTPRINT)
-    bodies = outlines(artists["bodies"])
-    assert len(bodies) == len(plan.switching_times)
-    corners = SE2(plan.switching_poses[2]).act([[-0.2, -0.2], [0.4, -0.2], [0.4, 0.2], [-0.2, 0.2]])
-    np.testing.assert_allclose(bodies[2][:4], corners, atol=1e-12)
-    assert outlines(artists["darts"]) == []
-
-
 def test_without_a_footprint_a_dart_grows_with_the_path():
     sizes = []
     for duration in (1.0, 10.0):
@@ -123,35 +91,6 @@ def test_without_a_footprint_a_dart_grows_with_the_path():
         assert outlines(artists["bodies"]) == outlines(artists["swept"]) == []
         sizes.append(np.ptp(outlines(artists["darts"])[0], axis=0).max())
     assert sizes[1] > 5.0 * sizes[0]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("footprint", quick_are([None], [None, FOOTPRINT]))
-@settings(max_examples=30)
-@given(by=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-3.0, 3.0)))
-def test_a_moved_plan_has_moved_artists(footprint, by):
-    plan, move = parking_plan(), SE2(np.array(by))
-    _, here = drawn(plan, footprint=footprint)
-    _, there = drawn(plan.moved(move), footprint=footprint)
-    pairs = [
-        (here["path"].get_segments(), there["path"].get_segments()),
-        (here["spins"].get_segments(), there["spins"].get_segments()),
-        (outlines(here["darts"]), outlines(there["darts"])),
-        (outlines(here["bodies"]), outlines(there["bodies"])),
-        (outlines(here["spin_heads"]), outlines(there["spin_heads"])),
-        ([here["start"].get_offsets()], [there["start"].get_offsets()]),
-        ([here["goal 0"].get_offsets()], [there["goal 0"].get_offsets()]),
-    ]
-    for before, after in pairs:
-        assert len(before) == len(after)
-        for points, moved in zip(before, after, strict=True):
-            np.testing.assert_allclose(move.act(np.asarray(points)), moved, atol=1e-9)
-    np.testing.assert_array_equal(here["path"].get_colors(), there["path"].get_colors())
-    tips = [
-        np.stack([quiver.U, quiver.V], axis=-1) for quiver in (here["headings"], there["headings"])
-    ]
-    turn = SE2(np.array([0.0, 0.0, by[2]]))
-    np.testing.assert_allclose(turn.act(tips[0]), tips[1], atol=1e-9)
 
 
 @given(by=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-3.0, 3.0)))
@@ -248,13 +187,6 @@ def test_names_are_shown_as_they_are():
     ax, _ = drawn(type(plan)(plan.start, tuple(named), durations=plan.durations))
     ax.figure.canvas.draw()
     assert names(ax)[:2] == ["$x_1", "_hidden"]
-
-
-def test_axes_may_be_shared():
-    axes = Figure().subplots(1, 2, sharex=True, sharey=True)
-    for ax in axes:
-        draw_plane(ax, parking_plan())
-    axes[0].figure.canvas.draw()
 
 
 def test_the_legend_leaves_out_what_takes_next_to_no_time():

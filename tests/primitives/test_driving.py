@@ -45,7 +45,7 @@ def ride_of(model, seed, n=6):
 
 
 @every_model
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_every_sample_is_where_the_solver_is(model, seed):
     z, controls, durations = ride_of(model, seed)
     course = drive(model, z, control=controls, durations=durations)
@@ -150,7 +150,7 @@ def test_steering_at_rest_goes_nowhere():
     np.testing.assert_allclose(course.reduced_state[-1], [0.0, 0.5], atol=1e-15)
 
 
-@pytest.mark.parametrize("speed", [1.0, 8.0, 40.0])
+@pytest.mark.parametrize("speed", [8.0, 40.0])
 def test_fast_relaxation_is_followed(speed):
     car = SingleTrack(min_speed=0.5)
     z, controls, durations = (

@@ -40,7 +40,7 @@ def seeded(seed: int) -> Problem:
             return replace(problem, start=start)
 
 
-@pytest.mark.parametrize("seed", quick_are([6], range(12)))
+@pytest.mark.parametrize("seed", quick_are([6], range(7)))
 def test_undisturbed_all_that_is_promised_is_kept(seed):
     loop = simulate(seeded(seed), step=1.0)
     assert loop.reached
@@ -64,7 +64,7 @@ def test_undisturbed_all_that_is_promised_is_kept(seed):
     assert len(loop.steps) <= loop.steps_bound
 
 
-@pytest.mark.parametrize("seed", quick_are([4], [1, 2, 4]))
+@pytest.mark.parametrize("seed", [4])
 def test_a_margin_is_kept_and_what_is_promised_too(seed):
     problem = replace(seeded(seed), margin=0.05)
     loop = simulate(problem, step=1.0)
@@ -73,6 +73,7 @@ def test_a_margin_is_kept_and_what_is_promised_too(seed):
     assert clearances(loop).min() >= 0.05
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", quick_are([4], range(6)))
 def test_with_noise_it_arrives_free_and_says_what_the_noise_took(seed):

@@ -54,6 +54,7 @@ class TestWaitingAndEvading:
         assert (total[1:] <= total[:-1] + 1e-8).all()
         assert loop.cost < 7.0
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_a_door_that_opens_is_waited_for(self):
         problem = among(*door(), bounds=Bounds(x=(-2, 8), y=(-5, 5)))
@@ -111,6 +112,7 @@ class TestWaitingAndEvading:
         assert_free(loop)
         assert loop.times[-1] > 12.0
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     @pytest.mark.parametrize("seed", quick_are([0], range(4)))
     def test_a_scene_of_a_dozen(self, seed):
@@ -195,6 +197,7 @@ class TestCollisionMitigation:
         assert next(loop.collisions)[0] == 0
         assert decisions(loop)[-1] is not Decision.MITIGATED
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_it_is_put_off_as_long_as_can_be(self):
         faster = moving_obstacle([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))

@@ -67,8 +67,13 @@ def judged(loop):
     return loop
 
 
-def test_the_value_falls_past_all_that_is_on_the_way():
-    loop = judged(ma.simulate(PAST, step=1.0, time_limit=2.0))
+@pytest.fixture(scope="module")
+def whole():
+    return ma.simulate(PAST, step=1.0, time_limit=2.0)
+
+
+def test_the_value_falls_past_all_that_is_on_the_way(whole):
+    loop = judged(whole)
     values = [one.value for one in loop.steps]
     assert values[0] == pytest.approx(loop.cost)
     for one, then in zip(loop.steps, values[1:], strict=False):
@@ -100,8 +105,7 @@ def test_a_stay_that_a_push_interrupts_is_finished():
     assert loop.cost == pytest.approx(6.5)
 
 
-def test_going_on_after_a_break_knows_what_was_passed(tmp_path):
-    whole = ma.simulate(PAST, step=1.0, time_limit=2.0)
+def test_going_on_after_a_break_knows_what_was_passed(tmp_path, whole):
     half = ma.simulate(PAST, step=1.0, time_limit=2.0, steps=7)
     save_closed_loop(half, tmp_path / "closed_loop.json")
     steps, poses = load_steps(tmp_path / "closed_loop.json", ROBOT)

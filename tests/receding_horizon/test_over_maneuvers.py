@@ -91,7 +91,7 @@ def test_undisturbed_the_first_plan_is_what_it_costs(problem):
     ],
     ids=["unicycle", "car"],
 )
-@pytest.mark.parametrize("comes", [False, True], ids=["appears", "comes"])
+@pytest.mark.parametrize("comes", quick_are([False], [False, True], exhaustive=True))
 def test_it_comes_near_a_goal_that_becomes_occupied(automaton, body, far, comes):
     box = Box([0.6, 0.6])
     there = Motion([0.0, 2.0], [[far, far, 0.0], [far, 0.0, 0.0]])
@@ -177,6 +177,7 @@ def test_a_margin_keeps_the_known_word():
     assert not any(step.replanned for step in loop.steps)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_among_obstacles_only_free_plans_are_driven():
     problem = posed(
@@ -260,6 +261,7 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
         assert [step.decision for step in loop.steps[1:]] == [Decision.KEPT] * (len(loop.steps) - 1)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
     push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
@@ -322,25 +324,13 @@ def test_the_fail_safe_trajectory_looks_ahead_as_far_as_is_asked(look_ahead, sto
     assert step.plan.primitives[0].name == begun.plan.primitives[0].name  # is finished
 
 
-def plan_entries(path):
-    return [one for step in json.loads(path.read_text())["steps"] for one in step["plan"] or ()]
-
-
-def test_a_log_without_courses_still_loads(tmp_path):
-    """As earlier versions wrote it: names alone, of maneuvers that the library holds."""
-    begun = simulate(posed(), step=0.4, time_limit=5.0, steps=2)
-    save_closed_loop(begun, tmp_path / "loop.json")
-    assert not any("course" in one for one in plan_entries(tmp_path / "loop.json"))
-    steps, _ = load_steps(tmp_path / "loop.json", unicycle_automaton())
-    assert [step.plan.word for step in steps] == [step.plan.word for step in begun.steps]
-
-
 def crossing(begin=1.0, lasting=6.0, *, radius=0.4):
     """A disc that crosses the way of a robot from the origin to (5, 0)."""
     motion = Motion([begin, begin + lasting], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]])
     return Obstacle(Disc(radius), motion=motion)
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 @pytest.mark.parametrize("begin", [0.0, 1.5])
 def test_past_a_moving_obstacle_nothing_is_hit(begin):

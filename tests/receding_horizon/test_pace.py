@@ -7,64 +7,17 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Horizon
 from maneuver_automaton.receding_horizon import Guarantee, promises, simulate
 from maneuver_automaton.receding_horizon.candidates import (
     at_best_pace,
-    base_name,
     between_trims,
     is_uniform,
 )
 from tests.receding_horizon.loops import EFFORT, off_goal, parking_loop, straight, totals
-
-
-@pytest.mark.parametrize(
-    ("name", "base"),
-    [
-        ("spin", "spin"),
-        ("spin x0.5", "spin"),
-        ("spin x0.5 x1.25e-05", "spin"),
-        ("x2", "x2"),
-        ("a x b", "a x b"),
-        ("route x66", "route"),
-    ],
-)
-def test_base_name(name, base):
-    assert base_name(name) == base
-
-
-def test_the_same_path_with_uniform_effort_costs_less():
-    problem = parking_loop()
-    best = plan(problem).plan
-    better = at_best_pace(problem, best)
-    assert better.duration == pytest.approx(8.0)
-    assert better.end == pytest.approx(best.end, abs=1e-9)
-    assert problem.cost_of(better) < problem.cost_of(best)
-    assert is_uniform(better, EFFORT)
-    assert not is_uniform(best, EFFORT)
-    assert [base_name(name) for name in better.word] == ["cw", "straight", "spin"]
-    again = at_best_pace(problem, better)
-    assert problem.cost_of(again) == pytest.approx(problem.cost_of(better), rel=1e-12)
-
-
-def test_names_tell_the_pace():
-    problem = straight(2.0)
-    better = at_best_pace(problem, plan(problem).plan)
-    assert better.word == ("ahead x0.5",)
-    assert better.trims[0].control.tolist() == pytest.approx([0.5, 0.0])
-    assert better.durations.tolist() == pytest.approx([4.0])
-
-
-def test_what_does_not_move_or_is_uniform_already_is_left_alone():
-    problem = parking_loop()
-    nothing = Plan([0.0, 0.0, 0.0], (problem.automaton.trims[0],), durations=[8.0])
-    assert at_best_pace(problem, nothing) is nothing
-    uniform = at_best_pace(problem, plan(problem).plan)
-    assert problem.cost_of(at_best_pace(problem, uniform)) <= problem.cost_of(uniform) + 1e-12
-    assert not is_uniform(Plan([0.0, 0.0, 0.0], (), durations=[]), EFFORT)
 
 
 def test_in_closed_loop_the_value_falls_by_the_square_of_the_way():

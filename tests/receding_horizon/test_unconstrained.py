@@ -103,7 +103,7 @@ def test_depth_first_finds_the_best_of_all(pose, cost):
 @pytest.mark.parametrize("cost", [MIXED, QUADRATIC])
 def test_the_search_finds_what_is_proven(cost):
     rng = np.random.default_rng(3)
-    problem = problem_of(even(5), cost, intervals=5)
+    problem = problem_of(even(5), cost, intervals=4)
     for pose in rng.uniform(-1.0, 1.0, (6, 3)):
         best = exhausted(problem, pose)
         assert best.proven

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from dataclasses import replace
 from functools import cache
 
@@ -12,9 +11,7 @@ import pytest
 import shapely
 
 from maneuver_automaton._arrays import wrapped
-from maneuver_automaton.budget import Budget
-from maneuver_automaton.collision import Box, Motion, Obstacle
-from maneuver_automaton.errors import UnknownTrim
+from maneuver_automaton.collision import Box, Obstacle
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.search.lattice_pass import plan_of_word
@@ -22,9 +19,7 @@ from maneuver_automaton.search.lattice_query import lattice_query
 from maneuver_automaton.search.result import SearchStatus
 from tests.search.automata import (
     inertial_unicycle,
-    linked,
     truck_with_trailer,
-    with_straight_courses,
 )
 from tests.search.cases import compiled_only
 from tests.search.maneuver_searches import search_maneuvers, word_is_free
@@ -143,46 +138,6 @@ def test_the_goal_may_be_a_moving_trim():
     assert np.abs(state - [0.5, 0.0]).max() < 1e-9
 
 
-def test_a_straight_way_is_one_trim():
-    goal = [2 * math.cos(0.3), 2 * math.sin(0.3), 0.3]
-    here = posed(unicycle(), [0.0, 0.0, 0.3], goal, trims=("0 0", "0 0"))
-    result = search_maneuvers(here, first_only=True)
-    assert result.expansions == 1
-    assert plan_of_word(here, result.best).word == ("0 0 to 0.5 0", "0.5 0", "0.5 0 to 0 0")
-    assert result.best.cost == pytest.approx(2 / 0.5 + 2.0, abs=1e-9)
-
-
-def test_walls_all_around_exhaust_the_search():
-    ring = [Box([3.0, 0.1], [4.0, 2.5]), Box([3.0, 0.1], [4.0, -0.5]),
-            Box([0.1, 3.1], [2.5, 1.0]), Box([0.1, 3.1], [5.5, 1.0])]  # fmt: skip
-    closed = query(obstacles=tuple(Obstacle(box) for box in ring))
-    result = search_maneuvers(closed)
-    assert result.status is SearchStatus.EXHAUSTED
-    assert result.best is None
-
-
-def test_budgets_end_the_search():
-    assert search_maneuvers(query(), max_expansions=5).status is SearchStatus.OUT_OF_BUDGET
-    over = search_maneuvers(query(), budget=Budget(began=0.0, deadline=0.0))
-    assert over.status is SearchStatus.OUT_OF_BUDGET
-    assert over.expansions == 0
-
-
-@pytest.mark.slow
-def test_what_moves_is_let_pass():
-    crossing = Obstacle(
-        Box([0.4, 3.0]), motion=Motion([0.0, 20.0], [[2.0, -3.0, 0.0], [2.0, 7.0, 0.0]])
-    )
-    here = query(goal=[4.0, 0.0, 0.0], obstacles=(crossing,), bounds=Bounds())
-    result = search_maneuvers(here, max_expansions=2500)
-    assert result.status is SearchStatus.FOUND
-    for word in result.words:
-        plan = plan_of_word(here, word)
-        assert off_goal(plan, [4.0, 0.0, 0.0]) < 1e-12
-        assert word_is_free(here, word)
-        assert least_clearance(plan, (crossing,)) > 0.0
-
-
 @pytest.mark.slow
 def test_a_trailer_stays_free_too():
     automaton, trailer = truck_with_trailer(levels=3), Box([0.3, 0.25])
@@ -213,22 +168,6 @@ def test_a_trailer_wider_than_its_truck_does_not_close_the_way_of_the_truck():
     assert search_maneuvers(here, max_expansions=20, first_only=True).best is not None
 
 
-@pytest.mark.parametrize("height", [1.5, -0.5])
-def test_altitude_is_gained_on_the_way(height):
-    flying = [[0.0] * 4, [1.0, 0, 0, 0], [0.7, 0, 0.8, 0], [0.7, 0, -0.8, 0],
-              [0.8, 0, 0, 0.2], [0.0, 0, 0, 0.5], [0.0, 0, 0, -0.5]]  # fmt: skip
-    automaton = with_straight_courses(linked(flying, size=0.1))
-    towers = (Obstacle(Box([0.3, 3.0], [2.0, -0.8])), Obstacle(Box([0.3, 3.0], [4.0, 2.0])))
-    goal = np.array([6.0, 1.0, 1.0, height])
-    here = posed(automaton, np.zeros(4), goal, trims=("t0", "t0"), obstacles=towers)
-    result = search_maneuvers(here, max_expansions=8000, first_only=True)
-    assert result.status is SearchStatus.FOUND
-    for word in result.words:
-        plan = plan_of_word(here, word)
-        assert off_goal(plan, goal) < 1e-12
-        assert word_is_free(here, word)
-
-
 def test_a_limit_of_time_is_kept():
     free = search_maneuvers(query(), max_expansions=400).best
     short = replace(query(), most_time=free.duration * 1.1)
@@ -236,16 +175,6 @@ def test_a_limit_of_time_is_kept():
     assert all(word.duration <= free.duration * 1.1 for word in result.words)
     none = search_maneuvers(replace(query(), most_time=3.0), max_expansions=1500)
     assert none.best is None
-
-
-def test_wrong_queries_are_refused():
-    with pytest.raises(UnknownTrim):
-        query(trims=("rest", "0 0"))
-    with pytest.raises(ValueError) as error:
-        query(start=[0.0, 0.0])
-    assert str(error.value) == "start: got shape (2,), need 3 components last"
-    with pytest.raises(ValueError, match="has no course, so its cost is not known"):
-        posed(linked([[0.0] * 3, [1.0, 0, 0]]), START, GOAL, trims=("t0", "t0"))
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.scene import BodyPart, Polished, PolishSettings
@@ -29,10 +29,8 @@ from maneuver_automaton.refinement.gear_sequences import (
 )
 from maneuver_automaton.refinement.guesses import (
     car_guess,
-    course_guess,
     pace_of_car,
     timed,
-    unicycle_guess,
 )
 from maneuver_automaton.refinement.polish import PolishTask, polish_guesses
 
@@ -100,39 +98,6 @@ def test_it_stops_and_turns_the_wheel_where_the_gear_changes() -> None:
     assert run.pose[-1] == pytest.approx(plan((1.0, 0.35, 0.2), (-1.0, -0.35, 0.2)).end)
 
 
-def test_a_plan_that_stays_has_no_timing() -> None:
-    with pytest.raises(ValueError, match="does not move"):
-        timed(plan((0.0, 0.0, 1.0)), pace_of_car(CAR))
-
-
-def test_guesses_keep_their_limits_and_their_ends() -> None:
-    whole = plan((1.0, 0.3, 3.0), (-1.0, -0.3, 2.0), (1.0, 0.0, 4.0))
-    guess = car_guess(CAR, whole, intervals=STEPS)
-    assert guess.state[[0, -1], 3:].tolist() == [[0.0, 0.0], [0.0, 0.0]]
-    assert guess.state[-1, :3] == pytest.approx(whole.end, abs=1e-6)
-    assert (np.abs(guess.control) <= [1.0, 0.5]).all()
-    assert np.abs(guess.state[:, 4]).max() <= 0.75
-
-
-def test_the_unicycle_turns_on_the_spot_between_strokes() -> None:
-    robot = SecondOrderUnicycle(
-        max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
-    )
-    spin = Trim(name="spin", body_velocity=[0.0, 0.0, 0.5], control=[0.0, 0.5])
-    whole = Plan([0.0, 0.0, 0.0], (trim(0.5, 0.0, "ahead"), spin), durations=[2.0, 2.0])
-    guess = unicycle_guess(robot, whole, intervals=STEPS)
-    assert guess.state[-1, :3] == pytest.approx([1.0, 0.0, 1.0], abs=1e-6)
-    assert np.abs(guess.state[:, 3:]).max() <= 0.5
-
-
-def test_a_course_is_a_guess() -> None:
-    course = drive(CAR, [0.0, 0.0], control=[[1.0, 0.0], [-1.0, 0.0]], durations=[2.0, 2.0])
-    guess = course_guess(course, intervals=lambda duration: 8)
-    assert guess.state[:, 0] == pytest.approx(np.interp(np.linspace(0, 4, 9), course.time,
-                                                        course.pose[:, 0]))  # fmt: skip
-    assert guess.control[:, 0].tolist() == [1.0] * 4 + [-1.0] * 4
-
-
 def test_closure_brings_a_motion_to_its_end_within_the_limits() -> None:
     rng = np.random.default_rng(3)
     control = np.clip(rng.normal(size=(60, 2)) * [0.4, 0.2], [-1.0, -0.5], [1.0, 0.5])
@@ -184,15 +149,6 @@ def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
     assert motion.duration < around().duration * 1.2
     stroke = motion.maneuver("polished", source="rest", target="rest")
     assert stroke.duration == motion.duration
-
-
-def test_a_moved_problem_has_the_moved_solution() -> None:
-    here = polish_guesses(swerve(), [around()], budget=UNLIMITED).motion
-    there = polish_guesses(swerve(SE2([700.0, -300.0, 2.0])), [around()], budget=UNLIMITED).motion
-    assert here is not None
-    assert there is not None
-    assert there.duration == pytest.approx(here.duration, abs=1e-6)
-    assert there.course.pose[-1] == pytest.approx(here.course.pose[-1], abs=1e-9)
 
 
 def test_what_is_not_accepted_is_not_returned() -> None:

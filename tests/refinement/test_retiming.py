@@ -15,7 +15,7 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.refinement.retiming import retime, shared_time
+from maneuver_automaton.refinement.retiming import retime
 from tests.quickly import draws
 
 MATRIX = np.array([[4.0, -1.5], [-1.5, 1.0]])
@@ -242,10 +242,3 @@ def test_costs_and_limits_are_checked():
     assert str(error.value) == (
         "retime: trim 'straight' needs speed, whose limit is 0; need a wider one"
     )
-
-
-def test_time_is_shared_by_length():
-    np.testing.assert_allclose(shared_time(np.array([1.0, 3.0]), least=np.zeros(2), total=2.0),
-                               [0.5, 1.5])  # fmt: skip
-    with pytest.raises(ValueError, match="at least 2 s"):
-        shared_time(np.array([1.0, 1.0]), least=np.array([2.0, 0.0]), total=2.0)

@@ -337,11 +337,8 @@ def test_a_tight_junction_is_driven_with_the_steering_that_the_car_has():
 @pytest.mark.parametrize(
     "name",
     [
-        "DEU_A9-2_1_T-1",
-        "DEU_Ffb-1_6_T-1",
         "RUS_Bicycle-11_1_T-1",
         "USA_Peach-1_1_T-1",
-        "USA_US101-1_1_S-1",
         "ZAM_Urban-3_1",
     ],
 )

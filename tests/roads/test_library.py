@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.roads import RoadVehicle, _kernels_motion
-from maneuver_automaton.roads.plans import plan_of_controls
+from maneuver_automaton.roads import RoadVehicle
 from maneuver_automaton.roads.vehicle import road_library, tick_of
 
 VEHICLE = RoadVehicle()
@@ -20,28 +17,6 @@ TICK, TICKS = LIBRARY.limits.tick, LIBRARY.limits.ticks
 def sources():
     first = LIBRARY.maneuvers.first
     return np.repeat(np.arange(first.size - 1), np.diff(first))
-
-
-def test_maneuvers_lead_from_trim_to_trim_within_the_limits():
-    trims, maneuvers, source = LIBRARY.trims, LIBRARY.maneuvers, sources()
-    lasts = TICK * TICKS
-    gained = lasts * maneuvers.control
-    np.testing.assert_allclose(
-        trims.speed[source] + gained[:, 0], trims.speed[maneuvers.target], atol=1e-12
-    )
-    np.testing.assert_allclose(
-        trims.steering[source] + gained[:, 1], trims.steering[maneuvers.target], atol=1e-12
-    )
-    limits = VEHICLE.model.control_limits + np.array([-1e-9, 1e-9])
-    for k in range(2):
-        assert (limits[k, 0] <= maneuvers.control[:, k]).all()
-        assert (maneuvers.control[:, k] <= limits[k, 1]).all()
-
-
-def test_every_trim_can_be_held():
-    trims, maneuvers, source = LIBRARY.trims, LIBRARY.maneuvers, sources()
-    held = (maneuvers.target == source) & ~maneuvers.control.any(axis=1)
-    assert set(source[held]) == set(range(trims.speed.size))
 
 
 def test_displacements_are_those_of_the_model():
@@ -73,43 +48,6 @@ def test_the_automaton_says_what_the_arrays_do():
         assert automaton.index_of(one.target) == target
         np.testing.assert_allclose(one.course.pose_at(one.duration), one.displacement)
         np.testing.assert_allclose(one.displacement, small.maneuvers.pose[e, -1], atol=1e-6)
-
-
-def test_words_name_the_trims_of_the_automaton():
-    names = road_library(VEHICLE, top_speed=3.0).automaton(VEHICLE.model).trim_names
-    state, controls = np.array([0, 0, 0, 2.0, 0.0]), np.array([[2.0, 0.0]] * 5)
-    ramp = plan_of_controls(VEHICLE.model, state, controls, tick=TICK)
-    assert {trim.name for trim in ramp.trims} == {"speed 2, steering 0", "speed 3, steering 0"}
-    assert {trim.name for trim in ramp.trims} <= set(names)
-
-
-def test_a_state_beside_the_grid_has_maneuvers_too():
-    found = _kernels_motion.maneuvers_from(LIBRARY.limits, LIBRARY.trims, 7.37, 0.011)
-    assert found.target.size > 10
-    np.testing.assert_allclose(
-        7.37 + TICK * TICKS * found.control[:, 0], LIBRARY.trims.speed[found.target], atol=1e-12
-    )
-
-
-def test_the_library_has_a_mirror_image():
-    trims = LIBRARY.trims
-    rows = itertools.pairwise(trims.first.tolist())
-    mirrored = np.concatenate([np.arange(low, high)[::-1] for low, high in rows])
-    pairs = set(zip(sources().tolist(), LIBRARY.maneuvers.target.tolist(), strict=True))
-    assert {(mirrored[a], mirrored[b]) for a, b in pairs} == pairs
-
-
-def test_slow_driving_steers_as_far_as_the_car_can():
-    trims = LIBRARY.trims
-    slow = trims.steering[trims.first[1] : trims.first[2]]
-    assert slow[[0, -1]].tolist() == [-VEHICLE.model.max_steering, VEHICLE.model.max_steering]
-
-
-def test_neighbouring_angles_are_one_maneuver_apart():
-    trims, maneuvers, source = LIBRARY.trims, LIBRARY.maneuvers, sources()
-    pairs = set(zip(source.tolist(), maneuvers.target.tolist(), strict=True))
-    for low, high in itertools.pairwise(trims.first.tolist()):
-        assert {(k, k + 1) for k in range(low, high - 1)} <= pairs
 
 
 @pytest.mark.parametrize(

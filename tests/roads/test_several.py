@@ -196,13 +196,7 @@ class TestLoop:
         assert drive.status == "touched"
         assert drive.results["102"].reached
 
-    def test_alone_is_as_one_vehicle(self, scenes):
-        scene = scenes["100"]
-        several, alone = drive_roads({"100": scene}), ma.drive_road(scene)
-        assert several.distance_m == math.inf
-        assert several.reached
-        assert several.results["100"].driven.duration == alone.driven.duration
-
+    @pytest.mark.slow
     @pytest.mark.parametrize("seed", quick_are([1], range(4), exhaustive=True))
     def test_who_has_a_plan_at_first_reaches_its_goal(self, folder, seed):
         rng, starts = np.random.default_rng(seed), []
@@ -219,15 +213,6 @@ class TestLoop:
         assert {name for name, one in drive.results.items() if one.reached} >= planned
         assert all(drive.results[name].verdict.clean for name in planned)
         assert least_by_shapely([drive.plans[name] for name in planned]) > 0.1
-
-    def test_who_has_no_plan_does_not_make_others_collide(self, folder):
-        """Two at one place touch at the start; the third one keeps away from both."""
-        both = (problem(100, x=10.0), problem(101, x=11.0), problem(102, x=40.0, speed=14.0))
-        Path("road.xml").write_text(commonroad(*LANES, *both))
-        drive = drive_roads(scenes_of("road.xml"), time_limit=2.0)
-        assert drive.results["102"].reached
-        assert drive.results["102"].verdict.clean
-        assert {row.pair for row in drive.pairs if row.distance_m <= 0.0} == {("100", "101")}
 
     def test_one_that_begins_later_is_not_there_before(self, folder):
         later = problem(101, x=10.0, speed=12.0).replace(
@@ -256,13 +241,6 @@ class TestLoop:
         assert run(["check", loop]) == 1
         assert "NO" in capsys.readouterr().out
 
-    @quiet
-    def test_solutions_of_all_are_written(self, driven):
-        pytest.importorskip("commonroad.common.solution")
-        assert run(["export", "out/closed_loop.json", "--to", "commonroad"]) == 0
-        root = ElementTree.parse("out/closed_loop_commonroad.xml").getroot()
-        assert [one.get("planningProblem") for one in root] == ["100", "101", "102"]
-
 
 def test_nothing_to_plan():
     with pytest.raises(ValueError, match="there is no vehicle"):
@@ -284,12 +262,6 @@ class TestCommands:
             assert Path(f"out/plan.{ending}").stat().st_size > 10_000
         assert list(load_plans("out/plan.json")) == ["100", "101", "102"]
 
-    def test_one_of_them(self, folder):
-        assert run(["plan", "road.xml", "--case", "1", "--quiet", "--no-plot"]) == 0
-        document = json.loads(Path("out/plan.json").read_text())
-        assert "kind" not in document
-        assert document["name"].endswith("case 1")
-
     def test_mpc(self, driven, made):
         _, out, err = made("mpc")
         assert err == ""
@@ -305,6 +277,8 @@ class TestCommands:
         for ending in ("png", "gif"):
             assert Path(f"out/closed_loop.{ending}").stat().st_size > 10_000
 
+    @pytest.mark.exhaustive
+    @pytest.mark.slow
     @pytest.mark.parametrize(("command", "name"), [("mpc", "closed_loop")])
     def test_a_film_of_a_file(self, folder, made, command, name, monkeypatch):
         """Drawn again from what was saved: all bodies, and the traffic, where they are then."""
@@ -325,6 +299,8 @@ class TestCommands:
             (slow,) = (path.vertices[:4].mean(axis=0) for path in traffic.get_paths())
             np.testing.assert_allclose(slow, [60.0 + 6.0 * time, 2.0], atol=1e-9)
 
+    @pytest.mark.exhaustive
+    @pytest.mark.slow
     @pytest.mark.parametrize("command", ["mpc"])
     def test_a_page(self, made, command):
         file = made(command)[0] / "out" / f"{'plan' if command == 'plan' else 'closed_loop'}.html"

@@ -7,7 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.cli import run
@@ -24,6 +24,7 @@ from maneuver_automaton.scenario import (
 from maneuver_automaton.scenario.fleet import FleetPart, fleet_of_document
 from tests.formats.outside import message_of
 from tests.formats.test_cl_cbs import PROBLEM
+from tests.quickly import draws
 from tests.scenario.test_scenario import assert_same, scenarios
 
 FLEET = """\
@@ -231,6 +232,7 @@ def test_to_yaml_and_back():
     assert_same_fleet(read(to_yaml(scenario)), scenario)
 
 
+@settings(max_examples=draws(40))
 @given(
     st.lists(
         scenarios().filter(lambda one: one.problem.horizon.time is None), min_size=1, max_size=4

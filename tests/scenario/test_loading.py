@@ -266,7 +266,7 @@ def test_a_map_stays_a_reference_when_it_is_the_file(folder):
 
 
 @needs_data
-@pytest.mark.parametrize("name", ["tpcap/Case15.csv", "tpcap/Case18.csv",
+@pytest.mark.parametrize("name", ["tpcap/Case18.csv",
                                   "dynobench/envs/unicycle1_v0/bugtrap_0.yaml",
                                   "dynobench/envs/unicycle1_v2/wall_0.yaml"])  # fmt: skip
 def test_problems_go_to_yaml_and_back(name):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -12,7 +11,7 @@ from scipy.optimize import brentq
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, UserModel
-from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
+from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.closed_form import connect_bang_bang
 from maneuver_automaton.primitives.driving import drive
 
@@ -36,22 +35,6 @@ def linked(twists, *, rng: np.random.Generator | None = None, size: float = 0.3)
         for a, b in itertools.permutations(trims, 2)
     )
     return Automaton(model_of_kinds(dof), trims, maneuvers)
-
-
-def with_straight_courses(automaton: Automaton) -> Automaton:
-    """The automaton with the course of constant twist that leads to each displacement."""
-
-    def course(one: Maneuver) -> Trajectory:
-        ends = [automaton[name].reduced_state for name in (one.source, one.target)]
-        return Trajectory(
-            time=np.array([0.0, one.duration]),
-            pose=np.array([np.zeros_like(one.displacement), one.displacement]),
-            reduced_state=np.array(ends),
-            control=np.zeros((2, len(automaton.model.control_names))),
-        )
-
-    maneuvers = tuple(replace(one, course=course(one)) for one in automaton.maneuvers)
-    return replace(automaton, maneuvers=maneuvers)
 
 
 def joined_end(automaton: Automaton, library, start, word, durations, start_trim, goal_trim):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import subprocess
 import sys
@@ -11,18 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton._cache_files import read_checked, write_checked
+from maneuver_automaton._cache_files import write_checked
 from maneuver_automaton._kept import RECENT
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.scenario.automata import TABLE_2
 from maneuver_automaton.search import cost_to_go
 from maneuver_automaton.search._kernels_estimate import fill_table
-from maneuver_automaton.search.cost_to_go import NO_TABLE, cost_to_go_table
-from maneuver_automaton.search.lattice_library import lattice_library
-from maneuver_automaton.search.lattice_trims import is_mirrored
+from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from tests import scenes
 from tests.reference_lattice import cost_table
 
@@ -66,41 +62,6 @@ def controls(**trims):
     return Automaton.of_controls(Unicycle(), trims)
 
 
-@pytest.mark.parametrize(
-    ("automaton", "cost", "mirrored"),
-    [
-        (scenes.reeds_shepp(), Cost(time=1.0), True),
-        (scenes.differential_robot(), Cost(effort=1.0), True),
-        (controls(**TABLE_2), Cost(effort=1.0, norm=0.5), False),
-        (controls(on=(1.0, 0.0), left=(1.0, 1.0)), Cost(time=1.0), False),
-        (controls(left=(1.0, 1.0), right=(1.0, -0.99)), Cost(time=1.0), False),
-        (controls(left=(1.0, 1.0), right=(1.0, -1.0), slow=(0.5, 0.0)), Cost(time=1.0), True),
-    ],
-)
-def test_what_is_its_own_mirror_image(automaton, cost, mirrored):
-    library = lattice_library(Problem(automaton, [0, 0, 0], [1, 0, 0], cost=cost))
-    arrays = library.arrays.library
-    m = arrays.n_trims
-    assert is_mirrored(arrays.twists[:m, :3], arrays.rates[:m]) is mirrored
-
-
-@pytest.mark.slow
-def test_a_library_that_is_no_mirror_image_has_a_table_that_is_none():
-    table = cost_to_go_table(Problem(controls(**TABLE_2), [0, 0, 0], [1, 0, 0]), reach=1.0)
-    value = table.value
-    image = value[(len(value) - np.arange(len(value))) % len(value), ::-1]
-    assert np.abs(value - image)[np.isfinite(value) & np.isfinite(image)].max() > 0.5
-
-
-def test_reach_is_a_length():
-    problem = Problem(scenes.reeds_shepp(), [0, 0, 0], [1, 0, 0])
-    for reach in (0.0, -1.0, math.inf, math.nan):
-        with pytest.raises(ValueError) as caught:
-            cost_to_go_table(problem, reach=reach)
-        assert str(caught.value) == f"reach must be positive, got {reach} m"
-    assert NO_TABLE.value.size == 0
-
-
 # --- what is kept on disk ---
 
 SMALL = Problem(controls(on=(1.0, 0.0), left=(1.0, 1.0)), [0, 0, 0], [1, 0, 0])
@@ -110,17 +71,6 @@ def kept_in(folder):
     """A table as another process would get it: from the folder, or made anew."""
     RECENT.__dict__.pop("_kept", None)
     return cost_to_go_table(SMALL, reach=1.5, folder=folder).value
-
-
-def test_loading_gives_the_same_bits(tmp_path):
-    made = kept_in(tmp_path)
-    (path,) = tmp_path.iterdir()
-    assert read_checked(path) == made.tobytes()
-    write_checked(path, made.tobytes()[:-4] + np.float32(7.0).tobytes())  # to tell it from anew
-    loaded = kept_in(tmp_path)
-    assert loaded[-1, -1, -1] == 7.0
-    assert np.array_equal(loaded.ravel()[:-1], made.ravel()[:-1])
-    assert loaded.flags.writeable  # as the kernels were compiled for
 
 
 @pytest.mark.parametrize("damage", ["empty", "foreign", "short", "flipped", "another"])
@@ -159,18 +109,6 @@ def test_tables_used_least_recently_go(tmp_path, monkeypatch):
     assert [other.exists() for other in others] == [False, False, True]
 
 
-def test_where_nothing_can_be_written_it_works_without(tmp_path):
-    made = kept_in(tmp_path)
-    (tmp_path / "file").write_text("no folder")
-    assert np.array_equal(kept_in(tmp_path / "file" / "below"), made)
-    locked = tmp_path / "locked"
-    locked.mkdir()
-    locked.chmod(0o500)
-    assert np.array_equal(kept_in(locked), made)
-    locked.chmod(0o700)
-    assert os.geteuid() == 0 or not list(locked.iterdir())
-
-
 def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -193,14 +131,6 @@ def test_two_processes_at_once_keep_one_whole_table(tmp_path):
     assert [process.wait(120) for process in running] == [0, 0]
     assert len(list(tmp_path.iterdir())) == 1
     assert np.array_equal(kept_in(tmp_path), kept_in(tmp_path / "anew"))
-
-
-def test_costs_and_trims_have_tables_of_their_own(tmp_path):
-    for cost in (Cost(time=1.0), Cost(time=2.0), Cost(length=1.0, time=1.0)):
-        RECENT.__dict__.pop("_kept", None)
-        problem = Problem(SMALL.automaton, [0, 0, 0], [1, 0, 0], cost=cost)
-        cost_to_go_table(problem, reach=1.5, folder=tmp_path)
-    assert len(list(tmp_path.iterdir())) == 2  # the last two are the same at 1 m/s
 
 
 def test_a_free_heading_costs_the_least_of_all_headings():

@@ -11,11 +11,10 @@ from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.collision.world import world_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.search._kernels_distance import NARROW, distances
-from maneuver_automaton.search.distance_grid import MOST_CELLS, distance_grid, stride_of
+from maneuver_automaton.search.distance_grid import distance_grid
 from tests.collision import scenes
 from tests.reference_collision import shapely_world, still, world_around
 from tests.reference_lattice import cells_open, centre_clearances, grid_distances
-from tests.search.cases import compiled_only
 
 CAR, DISC = scenes.FOOTPRINTS["car"], (Disc(0.6),)
 RING = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -75,30 +74,6 @@ def test_asked_in_any_order_it_is_dijkstra(seed):
     assert in_order.tolist() == distances(grid, field, places).tolist()  # to the last bit
 
 
-@compiled_only
-def test_beside_a_wall_no_more_is_looked_at_and_the_value_is_that_of_all():
-    """Cells that a wall may cut come last, but what leads into one is known before."""
-    rng = np.random.default_rng(3)
-    walls = [Obstacle(Box([0.05, rng.uniform(1.0, 5.0)], rng.uniform(0.0, 15.0, 2), heading=k))
-             for k in range(25)]  # fmt: skip
-
-    def fresh():
-        return grid_and_world((Disc(0.02),), walls, [0.0, 0.0, 0.0], [15.0, 15.0, 0.0])
-
-    grid, world, _ = fresh()
-    field = world.arrays.field
-    cut = np.flatnonzero(centre_clearances(grid, field).ravel() < grid.walls.cut)
-    asked = rng.permutation(cut)[:40]
-    one_by_one, looked_at = [], []
-    for place in centres(grid)[asked]:
-        alone, _, _ = fresh()
-        one_by_one += distances(alone, field, np.ascontiguousarray(place[None])).tolist()
-        looked_at.append(alone.state[1])
-    every = distances(grid, field, centres(grid))
-    assert one_by_one == every[asked].tolist()  # to the last bit
-    assert np.median(looked_at) < 0.6 * grid.value.size
-
-
 @pytest.mark.parametrize("name", ["car", "disc", "truck"])
 def test_no_free_pose_is_in_a_blocked_cell(name):
     rng = np.random.default_rng([9, *name.encode()])
@@ -134,16 +109,6 @@ def test_a_closed_ring_lets_nothing_out_and_an_open_one_does():
     grid, world, _ = grid_and_world(CAR, opened, goal, start)
     outside = np.ascontiguousarray(world.into(start[None])[:, :2])
     assert distances(grid, world.arrays.field, outside)[0] < 16.0
-
-
-def test_the_size_of_cells_is_found_however_far_the_goal_is():
-    areas = MOST_CELLS * np.array([0.3, 1.0, 1.0 + 1e-12, 8.9, 9.0, 9.1, 1e5, 1e14])
-    for area in areas:
-        stride = stride_of(area, 1.0)
-        assert stride % 2 == 1
-        assert area / stride**2 <= MOST_CELLS
-        assert stride == 1 or area / (stride - 2) ** 2 > MOST_CELLS
-    assert stride_of(1e24, 1e-3) == 10**12 + 1  # by no loop: a goal may be 1e10 m away
 
 
 def test_on_the_rim_of_what_is_searched():

@@ -13,23 +13,17 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from maneuver_automaton.search import (
     SearchStatus,
-    free_insertion,
     search_insertion,
     search_words,
 )
-from maneuver_automaton.search._kernels_price import price_word
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.result import TimedWord, plan_of
-from maneuver_automaton.search.setup import insertion_library, search_setup
-from maneuver_automaton.search.shortening import shortened
-from maneuver_automaton.words._kernels_times import TimesProblem
+from maneuver_automaton.search.result import plan_of
 from tests import reference
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are
@@ -113,16 +107,6 @@ def test_dubins_by_hand():
     assert aside.cost == pytest.approx(np.pi + 2.0)
 
 
-@compiled_only
-def test_a_reversed_path_is_as_long():
-    rng = np.random.default_rng(0)
-    for _ in range(10):
-        goal = SE2(rng.uniform(-3.0, 3.0, 3))
-        there = best(shortest(REEDS_SHEPP, goal.pose))
-        back = best(shortest(REEDS_SHEPP, goal.inverse().pose))
-        assert back.cost == pytest.approx(there.cost, abs=1e-6)
-
-
 # Where exhaustive search is affordable.
 
 
@@ -153,15 +137,6 @@ def test_agrees_with_exhaustive_search(cost, horizon, least_equal):
 # Certificates.
 
 
-@compiled_only
-def test_a_certificate_where_nothing_pays():
-    problem = parking(max_trims=None)
-    solution = best(problem)
-    assert len(solution.trims) > 4
-    assert solution.certificate > -1e-9
-    assert certificate(problem, problem.goals[0], solution) > -1e-9
-
-
 def test_a_binding_number_of_trims_is_reported():
     problem = parking()
     solution = best(problem)
@@ -184,40 +159,6 @@ def test_the_certificate_is_the_smallest_reduced_cost(max_trims):
     reported = certificate(problem, problem.goals[0], solution)
     assert brute > reported - 1e-6
     assert brute == pytest.approx(reported, abs=5e-3)  # samples are coarse
-
-
-@pytest.mark.parametrize("seed", range(3 if INTERPRETED else 20))
-def test_a_library_is_priced_as_each_of_its_trims_alone(seed):
-    random = np.random.default_rng(seed)
-    axis = np.linspace(-2.0, 2.0, 5)
-    values = np.array([(v, 0.0, turn, 0.0) for v in axis for turn in axis])
-    rates = (values**2).sum(axis=1)
-    rows = np.ones((1, len(values)))
-    word, times = random.integers(len(values), size=4), random.uniform(0.0, 4.0, 4)
-    prices = random.normal(size=4)
-
-    def priced(order, n):
-        numbers = np.argsort(order)[word]
-        library = TimesProblem(values[order], rates[order], rows, np.zeros(4), np.zeros(1))
-        return price_word(library, n, numbers, times, 0, len(word), prices)
-
-    every = np.arange(len(values))
-    alone = [priced(np.append(j, np.delete(every, j)), 1) for j in every]
-    least = min(value for value, *_ in alone)
-    value, trim, position, moment = priced(every, len(values))
-    assert value == least == alone[trim][0]
-    assert trim == min(j for j in every if alone[j][0] == least and alone[j][2] == position)
-    assert (position, moment) == alone[trim][2:]
-
-
-@pytest.mark.parametrize(
-    "first", [(1.0, 0, 1.0), (1.0, 0, 0), (-1.0, 0, 1.0)], ids=["turn", "straight", "reverse"]
-)
-def test_a_single_trim_is_certified(first):
-    problem = shortest(REEDS_SHEPP, SE2.exp(0.8 * np.array(first)).pose)
-    solution = best(problem)
-    assert solution.trims.size == 1
-    assert certificate(problem, problem.goals[0], solution) > -1e-9
 
 
 @pytest.mark.parametrize("second", [(1.0, 0, 0), (1.0, 0, -1.0)], ids=["straight", "turn"])
@@ -250,20 +191,6 @@ def test_a_straight_ahead_goal_on_a_grid():
 
 
 @compiled_only
-def test_finer_grids_are_no_dearer():
-    horizon = Horizon(time=8.0)
-    costs = []
-    for n in (5, 9, 17):
-        problem = grid(np.linspace(-2.0, 2.0, n), cost=Cost(effort=1.0), horizon=horizon)
-        solution = best(problem)
-        assert_ends_at_the_goal(problem, solution)
-        assert solution.duration == pytest.approx(8.0, abs=1e-9)
-        costs.append(solution.cost)
-    assert costs[0] >= costs[1] - 1e-9
-    assert costs[1] >= costs[2] - 1e-9
-
-
-@compiled_only
 def test_finer_grids_are_no_dearer_with_few_trims():
     horizon = Horizon(time=8.0, max_trims=6)
     coarse, fine = (
@@ -290,28 +217,6 @@ def test_a_goal_on_an_arc_may_have_a_cheaper_word():
 
 
 # Limits and corners.
-
-
-@compiled_only
-def test_words_do_not_grow_once_the_time_is_over(monkeypatch):
-    """A grid whose seeds grow: the first word that may be long takes all the time."""
-    long = []
-    insert = free_insertion._with_insertions
-
-    def inserted(library, seed, most, rounds, counts):
-        long.extend([most] * (most == free_insertion.LONGEST))
-        return insert(library, seed, most, rounds, counts)
-
-    monkeypatch.setattr(free_insertion, "_with_insertions", inserted)
-    grid = Automaton.of_grid(Unicycle(), [AXIS, AXIS])
-    problem = Problem(
-        grid, [0, 0, 0], [3, 1, 2.0], cost=Cost(effort=1.0), horizon=Horizon(time=8.0, max_trims=3)
-    )
-    for ends, most in ((1, 1), (99, free_insertion.GROWN)):
-        long.clear()
-        budget = Budget(began=0.0, deadline=1.0, clock=lambda ends=ends: 2.0 * (len(long) >= ends))
-        search_insertion(problem, problem.goals[0], budget=budget)
-        assert len(long) == most
 
 
 def test_alternatives_are_different_words_by_rising_cost():
@@ -457,27 +362,6 @@ def test_the_end_is_exact_however_near_the_goal(size):
     found = search_insertion(problem, problem.goals[0]).solutions[0]
     twists = library.body_velocities[found.trims]
     np.testing.assert_allclose(reference.plain_end(twists, found.durations), goal, atol=1e-14)
-
-
-def test_only_a_fixed_time_fixes_the_time_of_a_shorter_word():
-    """Where every trim climbs, altitude is a condition on all of them, and still no time."""
-    climbing = [[1, 0, 0, 0.5], [1, 0, 1, 0.5], [1, 0, -1, 0.5], [2, 0, 1, 1.0]]
-    model = UserModel(
-        name="glider",
-        group=SE2xR,
-        control_names=("a", "b", "c", "d"),
-        velocity=lambda _, u: np.asarray(u),
-    )
-    library = Automaton.of_controls(model, {str(k): row for k, row in enumerate(climbing)})
-    goal = reference.plain_end(climbing[1:3] + climbing[:1], [0.5, 0.4, 1.0])
-    problem = Problem(library, [0, 0, 0, 0], goal)
-    setup = search_setup(problem, problem.goals[0])
-    arrays = insertion_library(problem, setup)
-    word = arrays.number_of[[1, 2, 0]]
-    short = shortened(arrays, TimedWord(tuple(word.tolist()), np.array([0.5, 0.4, 1.0])), 3)
-    assert short is not None
-    end = reference.plain_end(arrays.problem.twists[short.numbers], short.durations)
-    np.testing.assert_allclose(end, goal, atol=1e-9)
 
 
 @compiled_only

@@ -13,30 +13,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton.budget import UNLIMITED, Budget
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
+from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.search import _kernels_nodes as layout
 from maneuver_automaton.search.lattice import distance_grids, first_plan
 from maneuver_automaton.search.lattice_pass import (
-    GROWN_S,
-    SMALLEST,
     pass_of,
-    search_arrays,
     with_cost,
-    with_room,
 )
 from maneuver_automaton.search.lattice_query import lattice_query
-from maneuver_automaton.search.lattice_task import AT_WILL, Resolution, task_of
+from maneuver_automaton.search.lattice_task import Resolution
 from maneuver_automaton.words.library import SWITCH
 from tests import scenes
 from tests.collision.scenes import random_map
 from tests.quickly import quick_are
 from tests.reference import plain_end
 from tests.reference_collision import driven
-from tests.search.cases import compiled_only
 from tests.solids import World, outside
 
 ROOT = Path(__file__).parents[2]
@@ -239,55 +234,6 @@ def test_who_waits_until_contact_is_still_somewhere():
     assert done.returncode == 0, done.stderr
 
 
-def test_the_same_at_every_call_and_from_used_memory():
-    query = query_of(PROBLEMS["car"])
-    resolution, grids = Resolution(), distance_grids(query)
-    memory = search_arrays(query.library.arrays.library)
-    said = []
-    for arrays in (None, memory, memory):
-        one = pass_of(query, resolution, grid=grids[0], arrays=arrays)
-        word = one.run(EXPANSIONS, math.inf)
-        said.append((one.expansions, None if word is None else word.durations.tobytes()))
-    assert said[0] == said[1] == said[2]
-
-
-def test_in_chunks_it_is_the_same_as_at_once():
-    nodes = []
-    for chunks in ([EXPANSIONS], [1, 7, EXPANSIONS - 8]):
-        query = query_of(PROBLEMS["car"])
-        one = pass_of(query, Resolution(stop=False), grid=distance_grids(query)[0])
-        for n in chunks:
-            one.run(n, math.inf)
-        nodes.append(one.arrays.nodes[: int(one.arrays.state[layout.N_NODES])])
-    assert nodes[0].shape == nodes[1].shape
-    assert np.array_equal(nodes[0], nodes[1])
-
-
-def test_arrays_grow_and_forget_nothing():
-    one, nodes, links = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400))
-    wide = with_room(one.arrays, 5 * len(one.arrays.nodes))
-    used = len(nodes)
-    assert len(wide.nodes) >= 5 * len(one.arrays.nodes)
-    assert np.array_equal(wide.nodes[:used], nodes)
-    assert np.array_equal(wide.links[:used], links)
-    one.search = one.search._replace(arrays=wide)
-    one.run(20, math.inf)
-    other, _, _ = grown(PROBLEMS["car"], n=min(EXPANSIONS, 400) + 20)
-    more = int(wide.state[layout.N_NODES])
-    assert np.array_equal(wide.nodes[:more], other.arrays.nodes[:more])
-
-
-@compiled_only
-def test_room_for_more_nodes_is_not_made_late():
-    """What is found by then stands; the search is neither exhausted nor over."""
-    one, _, _ = grown(PROBLEMS["car"], n=1)
-    late = Budget(began=0.0, deadline=0.5 * GROWN_S * SMALLEST, clock=lambda: 0.0)
-    one.run(10 * SMALLEST, math.inf, budget=late)
-    assert (one.alive, one.is_late, one.may_go_on) == (True, True, False)
-    assert len(one.arrays.nodes) == SMALLEST
-    assert one.expansions > 1
-
-
 def test_joined_and_priced_by_hand():
     query = query_of(PROBLEMS["prices"])
     gears = query.library.arrays.library.gears
@@ -301,63 +247,4 @@ def test_joined_and_priced_by_hand():
     assert with_cost(query.word_of([], 0), query).cost == 0.0
 
 
-def test_finer_resolutions_begin_one_after_the_other():
-    begun = [after for after, _ in AT_WILL.stages]
-    assert begun == sorted(begun)
-    query = query_of(scenes.bay(2.1, 4.3))
-    if not COMPILED:
-        return
-    found = first_plan(query, budget=replace(UNLIMITED, expansions=1000))
-    assert found.word is None or found.expansions <= 1000
-    assert first_plan(query, budget=replace(UNLIMITED, expansions=50)).expansions == 50
-
-
-def test_cells_have_numbers_of_64_bits_however_many_there_are():
-    """A window of 1000 km, times, and layers for every trim: numbers are shared, none is lost."""
-    wide = replace(
-        PROBLEMS["moving"],
-        cost=PRICES,
-        bounds=Bounds(x=(-5e5, 5e5), y=(-5e5, 5e5)),
-        horizon=Horizon(max_trims=9, min_coast=0.1),
-        search=SearchSettings(headings=5000),
-    )
-    task = task_of(query_of(wide), Resolution(layered=True))
-    sides, turns, levels, ticks = task.cells.radix
-    layers = 3 * (len(ROBOT) + 1) * 16
-    assert layers * 2 * ticks * levels * turns * sides**2 <= 2**62
-    assert (task.cells.by_gear, task.cells.by_trim, task.cells.by_count) == (True, True, True)
-    near = task_of(query_of(PROBLEMS["car"]), Resolution())
-    # no two cells of the scene share a number
-    assert near.cells.radix[0] * near.cells.fine_cell > 2.0 * 4.5
-
-
 # --- queries ---
-
-
-def test_a_query_from_its_own_frame():
-    query = query_of(PROBLEMS["goals"])
-    back = (SE2(query.world.frame) @ SE2(np.vstack([query.start, query.goals])[:, :3])).pose
-    given = np.array([BASE.start, [4.5, 1.0, 0.5], [-2.0, 2.0, 1.0]])
-    assert np.abs(back - given)[:, :2].max() < 3e-9
-    assert np.abs(np.sin(back[:, 2] - given[:, 2])).max() < 3e-9
-    assert query.goal_index == (0, 1)
-
-
-def test_the_margin_is_half_of_what_the_ends_have():
-    usual = query_of(BASE).margin
-    assert usual == pytest.approx(0.005 * 0.25)
-    near = Obstacle(Box([1.0, 1.0], [-0.3 - 0.5 - 1e-3, 0.0]))  # 1 mm behind the start
-    tight = replace(BASE, obstacles=(*BASE.obstacles, near))
-    assert query_of(tight).margin == pytest.approx(0.5e-3, rel=1e-4)
-    kept = replace(tight, margin=0.4e-3)
-    assert query_of(kept).margin == pytest.approx(0.3e-3, rel=1e-3)
-
-
-def test_the_window_holds_the_ends_and_the_bounds_are_walls():
-    query = query_of(BASE)
-    ends = np.vstack([query.start, query.goals])[:, :2]
-    assert (ends > query.box[:2]).all()
-    assert (ends < query.box[2:]).all()
-    assert not query.bounded
-    assert query_of(PROBLEMS["bounds"]).bounded
-    assert not query_of(replace(BASE, bounds=Bounds(x=(-9.0, 9.0)))).bounded

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,7 +15,6 @@ from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from maneuver_automaton.search.limits import why_impossible
 
-MISSES = "all trims of the library move along one and the same curve, which misses the goal"
 CURVES = {
     "straight": [1.0, 0.0, 0.0, 0.0],
     "sideways": [0.3, -0.8, 0.0, 0.0],
@@ -85,47 +83,6 @@ def test_a_goal_beside_the_curve_is_out_of_reach(name, time, start, axis, off):
         return  # it is further along the curve
     goal = (SE2xR(after(twist, time, start=start)) @ SE2xR(beside)).pose
     assert reason([twist, -twist], goal, start=start)
-
-
-@pytest.mark.parametrize(
-    ("name", "goal"),
-    [
-        ("straight", [1, 1, 0, 0]),
-        ("straight", [2, 1e-4, 0, 0]),
-        ("circle", [1, 0, 0, 0]),
-        ("circle", [0, 4, math.pi + 0.01, 0]),  # the far side, and a little too much of a turn
-        ("spin", [0.1, 0, 1, 0]),
-        ("helix", [0, 0, 0.1, 1.2 * math.pi]),  # after a whole turn, and a tenth too much
-    ],
-)
-def test_by_hand_a_curve_misses_the_goal(name, goal):
-    assert reason([CURVES[name], [-2 * v for v in CURVES[name]]], goal) == MISSES
-
-
-@pytest.mark.parametrize(
-    ("name", "goal"),
-    [
-        ("straight", [7, 0, 2 * math.pi, 0]),
-        ("circle", [0, 4, math.pi, 0]),
-        ("circle", [0, 4, -math.pi, 0]),  # the other way round it is the same place
-        ("spin", [0, 0, -1, 0]),
-        ("helix", [0, 0, 0, 1.2 * math.pi]),
-    ],
-)
-def test_by_hand_a_curve_meets_the_goal(name, goal):
-    assert reason([CURVES[name]], goal) == ""
-
-
-def test_behind_a_vehicle_that_only_goes_ahead():
-    assert reason([[1.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0]], [-1, 0, 0, 0]) == MISSES
-
-
-def test_of_a_free_heading_nothing_is_said():
-    assert reason([CURVES["circle"]], [1, 0, 0, 0], free_heading=True) == ""
-
-
-def test_two_curves_lead_anywhere():
-    assert reason([CURVES["circle"], CURVES["straight"]], [1, 1, 0, 0]) == ""
 
 
 def test_a_goal_straight_ahead_behind_a_wall_is_not_called_off_the_curve():

@@ -12,12 +12,11 @@ from scipy.optimize import least_squares
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
-from maneuver_automaton.search.result import SearchStatus, plan_of
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.linked_words import scan_linked_words
+from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_setup import word_setup
 from tests.inertia import car_automaton, unicycle_automaton
 from tests.search.cases import compiled_only, lasting
@@ -33,10 +32,6 @@ def problem(goal, *, automaton=None, **changed) -> Problem:
 
 def searched(one: Problem, **options):
     return scan_linked_words(one, one.goals[0], **options)
-
-
-def first_plan(one: Problem, **options):
-    return plan_of(one, searched(one, **options).solutions[0])
 
 
 def by_brute_force(one: Problem, most_trims: int, starts: int):
@@ -118,80 +113,6 @@ def test_a_moved_problem_has_the_moved_words(x, y, turn, by):
     assert len(here) == len(there)
     if here:
         assert there[0].cost == pytest.approx(here[0].cost, abs=1e-5)
-
-
-def test_a_fixed_time_is_filled_by_rest_or_met():
-    goal = [3.0, 0.5, 0.0]
-    least = searched(problem(goal)).solutions[0].cost
-    fixed = problem(goal, horizon=Horizon(time=least + 4.0))
-    padded = [plan_of(fixed, word) for word in searched(fixed, alternatives=2).solutions]
-    assert all(plan.duration == pytest.approx(least + 4.0) for plan in padded)
-    assert padded[0].trims[-1].is_rest
-    late = searched(problem(goal, horizon=Horizon(max_time=0.9 * least)))
-    assert late.solutions == ()
-    assert late.status is SearchStatus.EXHAUSTED
-
-
-def test_without_a_rest_a_fixed_time_is_met_exactly():
-    goal = Goal(pose=[6.0, 1.0, 0.0], trim="1, 0")
-    free = problem(goal, start_trim="1, 0")
-    least = first_plan(free).duration
-    fixed = problem(goal, start_trim="1, 0", horizon=Horizon(time=least + 1.0))
-    plan = first_plan(fixed)
-    assert plan.duration == pytest.approx(least + 1.0, abs=1e-8)
-    assert plan.trims[0].name == plan.trims[-1].name == "1, 0"
-
-
-def test_a_fixed_time_is_met_without_solving_every_word_for_it():
-    """The pose decides the times of three trims, so it is words of four that are solved for."""
-    trim = "speed 20, turn_rate 0"
-    one = Problem(
-        load_stock_library("single_track"),
-        [0.0, 0.0, 0.0],
-        Goal(pose=[120.0, 12.0, 0.1], trim=trim),
-        start_trim=trim,
-        cost=Cost(effort=1.0),
-        horizon=Horizon(time=6.8),
-    )
-    short = steer_linked_words(one, one.goals[0])
-    assert (short.status, short.counts["expansions"]) == (SearchStatus.EXHAUSTED, 0)
-    found = searched(one, alphabet=14)
-    assert found.solutions[0].cost == pytest.approx(66.0014, abs=1e-3)
-    assert found.counts["steering_calls"] < 1_000_000  # every word in full takes 2,200,000
-    assert plan_of(one, found.solutions[0]).duration == pytest.approx(6.8, abs=1e-8)
-
-
-def test_effort_prefers_slow_words():
-    one = problem([4.0, 0.0, 0.0], cost=Cost(effort=1.0, time=0.1))
-    best = searched(one).solutions[0]
-    plan = plan_of(one, best)
-    assert best.cost == pytest.approx(one.cost_of(plan), rel=1e-9)
-    assert max(goal.off(plan.end)[0] for goal in one.goals) < 1e-9
-
-
-def test_any_heading_costs_no_more_than_one():
-    one = problem([2.0, 2.0, 0.3])
-    fixed = searched(one).solutions[0].cost
-    free = problem(Goal(pose=[2.0, 2.0, 0.3], free_heading=True))
-    either = searched(free).solutions[0]
-    assert either.cost <= fixed + 1e-6
-    assert np.abs(plan_of(free, either).end[:2] - 2.0).max() < 1e-9
-
-
-def test_limits_on_trims_and_coasting_times_are_kept():
-    one = problem([3.0, 2.0, 1.0], horizon=Horizon(max_trims=3, min_coast=0.3))
-    for solution in searched(one, alternatives=5).solutions:
-        trims, times = lasting(solution)
-        assert 0 < len(trims) <= 3
-        assert (times >= 0.3 - 1e-12).all()
-
-
-def test_expansions_bound_the_search():
-    one = problem([0.0, 3.0, 0.0], search=SearchSettings(max_expansions=5))
-    first, second = searched(one), searched(one)
-    assert first.counts == second.counts
-    assert first.counts["expansions"] <= 5
-    assert first.solutions[0].cost == second.solutions[0].cost
 
 
 @pytest.mark.parametrize("switch", [0.3, 20.0])

@@ -8,13 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
-from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import SearchStatus, search_words, words
-from maneuver_automaton.search.setup import search_setup
+from maneuver_automaton.problem import Horizon, Problem, SearchSettings
+from maneuver_automaton.search import SearchStatus, search_words
 from tests.reference import Word, words_of
 from tests.search.cases import (
     INTERPRETED,
@@ -126,15 +124,6 @@ def test_the_complete_list_holds_only_solutions(controls):
     assert len(seen) == len(result.solutions)
 
 
-def test_slsqp_confirms_the_complete_list():
-    problem = parking()
-    for solution in search(problem, alternatives=None).solutions:
-        word, times = reference_word(problem, solution)
-        again = word.slsqp(times)
-        assert again is not None
-        assert word.cost(again) == pytest.approx(solution.cost, abs=1e-6)
-
-
 # numbers in the library without its rest; all of three, and a few of four that take the whole time
 SUBSET = [*list(words_of(4, 3))[::4], (2, 1, 0, 2), (0, 3, 0, 3), (1, 3, 0, 2), (3, 0, 1, 3)]
 
@@ -185,24 +174,12 @@ def test_the_pruned_search_is_the_head_of_the_complete_list(controls, alternativ
     assert_same_solutions(pruned, head)
 
 
-def test_small_buffers_change_nothing(monkeypatch):
-    expected = search(parking(), alternatives=None)
-    monkeypatch.setattr("maneuver_automaton.search.word_scan.CAPACITY", 40)
-    assert_same_solutions(expected, search(parking(), alternatives=None), atol=0.0)
-
-
 def test_ties_go_to_fewer_trims_then_to_the_smaller_word():
     twins = robot({"b": (0.0, 1.0), "a": (1.0, 0.0), "c": (0.0, -1.0)})
     problem = Problem(twins, [0, 0, 0], [-1.0, 0.0, np.pi], horizon=Horizon(max_trims=3))
     words = [names(problem, s) for s in search(problem, alternatives=3).solutions]
     assert words[:2] == [("b", "a"), ("c", "a")]  # half a turn either way, in the library's order
     assert words == [names(problem, s) for s in search(problem, alternatives=3).solutions]
-
-
-def test_of_equal_trims_the_cheapest_is_taken():
-    library = robot({"ahead": (1.0, 0.0), "also": (1.0, 0.0), "left": (0.0, 1.0)})
-    problem = Problem(library, [0, 0, 0], [2.0, 0, 0], horizon=Horizon(max_trims=3))
-    assert names(problem, best(problem, alternatives=None)) == ("ahead",)
 
 
 # Minimum time, limits, prices.
@@ -242,56 +219,6 @@ def test_with_a_longest_time_every_solution_is_a_local_optimum():
         assert word.cost(word.slsqp(times)) > solution.cost - 1e-6, names(problem, solution)
 
 
-@compiled_only
-def test_free_heading():
-    problem = parking()
-    problem = replace(problem, goals=(Goal(pose=[0.0, 0.0, 0.0], free_heading=True),))
-    solution = best(problem)
-    assert_valid(problem, solution)
-    assert solution.cost < best(parking()).cost
-    assert names(problem, solution) == ("cw", "straight", "rest")
-    # turn towards the goal, then drive there
-    spin = Problem(
-        robot({"ahead": (1.0, 0.0), "spin": (0.0, 1.0)}),
-        [0, 0, 0],
-        replace(problem.goals[0], pose=[1.0, 1.0, 2.0]),
-    )
-    turned = best(spin)
-    assert names(spin, turned) == ("spin", "ahead")
-    assert turned.durations == pytest.approx([np.pi / 4, np.sqrt(2)])
-
-
-def test_price_of_a_switch():
-    priced = parking(cost=Cost(effort=1.0, norm=0.5, switch=2.0))
-    result = search(priced, alternatives=None)
-    for solution in result.solutions:
-        assert_valid(priced, solution)
-    plain = search(parking(), alternatives=None)
-    assert result.solutions[0].cost == pytest.approx(plain.solutions[0].cost + 6.0, abs=1e-9)
-    costly = search(parking(cost=Cost(effort=1.0, norm=0.5, switch=20.0)))
-    assert names(priced, costly.solutions[0]) == ("acw", "cw", "rest")  # fewest switches
-
-
-def test_price_of_a_direction_change():
-    priced = parking(cost=Cost(effort=1.0, norm=0.5, direction_change=5.0))
-    result = search(priced, alternatives=10)
-    for solution in result.solutions:
-        assert_valid(priced, solution)
-    assert names(priced, result.solutions[0]) == ("acw", "cw", "rest")  # in reverse all the way
-    third = search(parking(), alternatives=2).solutions[2]
-    assert result.solutions[0].cost == pytest.approx(third.cost)
-
-
-@pytest.mark.parametrize("price", [{"switch": 1.0}, {"direction_change": 1.0}])
-@compiled_only
-def test_pruning_knows_the_prices(price):
-    problem = parking(cost=Cost(effort=1.0, norm=0.5, **price))
-    complete = search(problem, alternatives=None)
-    assert_same_solutions(
-        search(problem, alternatives=9), replace(complete, solutions=complete.solutions[:10])
-    )
-
-
 def test_a_limit_on_words_ends_the_search():
     limited = replace(parking(), search=SearchSettings(max_expansions=1))
     result = search(limited, alternatives=None)
@@ -315,53 +242,6 @@ def test_a_fixed_time_without_rest_is_met_exactly():
     with_rest = search(parking(), alternatives=None)
     full = [s.cost for s in with_rest.solutions if 0 not in s.trims]
     assert [s.cost for s in result.solutions] == pytest.approx(full, abs=1e-9)
-
-
-def test_start_equal_to_goal():
-    still = replace(parking(), start=np.zeros(3))
-    rest = best(still)
-    assert names(still, rest) == ("rest",)
-    assert rest.durations.tolist() == [8.0]
-    assert rest.cost == 0.0
-    free = best(replace(parking(time=None), start=np.zeros(3)))
-    assert free.trims.size == 0
-    assert free.cost == 0.0
-    whole_turn = replace(parking(time=None), start=np.array([0.0, 0.0, -4.0 * np.pi]))
-    assert best(whole_turn).trims.size == 0
-
-
-def test_start_equal_to_goal_without_rest_moves_for_the_whole_time():
-    problem = replace(parking(without_rest(TABLE_2)), start=np.zeros(3))
-    result = search(problem)
-    assert result.status is SearchStatus.FOUND
-    assert_valid(problem, result.solutions[0])
-
-
-def test_only_straights():
-    library = robot({"slow": (1.0, 0.0), "fast": (2.0, 0.0), "back": (-1.0, 0.0)})
-    ahead = Problem(library, [0, 0, 0], [4.0, 0, 0])
-    assert [names(ahead, s) for s in search(ahead, alternatives=None).solutions] == [
-        ("fast",), ("slow",),
-    ]  # fmt: skip
-    in_time = replace(ahead, horizon=Horizon(time=3.0, max_trims=2))
-    mixed = best(in_time)
-    assert names(in_time, mixed) == ("slow", "fast")
-    assert mixed.durations == pytest.approx([2.0, 1.0])
-    assert search(Problem(library, [0, 0, 0], [4.0, 1.0, 0])).status is SearchStatus.EXHAUSTED
-
-
-def test_only_spins():
-    library = robot({"slow": (0.0, 1.0), "fast": (0.0, 2.0), "back": (0.0, -1.0)})
-    problem = Problem(library, [0, 0, 0], [0, 0, 2.0])
-    found = search(problem, alternatives=None).solutions
-    assert names(problem, found[0]) == ("fast",)
-    assert [round(s.cost, 9) for s in found] == [
-        1.0, 2.0, round(2 * np.pi - 2.0, 9),
-    ]  # fmt: skip
-    in_time = replace(problem, horizon=Horizon(time=1.5, max_trims=2))
-    assert best(in_time).durations == pytest.approx([1.0, 0.5])
-    aside = replace(problem, goals=(Goal(pose=[1.0, 0, 0]),))
-    assert search(aside).status is SearchStatus.EXHAUSTED
 
 
 def test_table_1_of_the_paper():
@@ -450,14 +330,6 @@ def test_a_moved_problem_has_the_same_alternatives(start):
         assert_same_solutions(here, search(problem.moved(by), alternatives=8))
 
 
-def test_a_moved_problem_with_a_tangent_solution_has_the_same_alternatives():
-    # acw, cw are tangent circles here: words with one trim more touch the goal for no time at all
-    problem = parking()
-    here = search(problem, alternatives=5)
-    for by in moves(4):
-        assert_same_solutions(here, search(problem.moved(by), alternatives=5))
-
-
 @compiled_only
 def test_a_moved_climb_has_the_same_words():
     problem = Problem(
@@ -477,23 +349,3 @@ def test_too_many_trims_are_refused(problem, most):
     message = rf"max_trims is \d+, need at most {most}; use insertion for more"
     with pytest.raises(ValueError, match=message):
         search(problem)
-
-
-@pytest.mark.parametrize(("looks", "most"), [(0, words.MOST_LATE), (250, 350), (10**6, 1000)])
-def test_few_of_many_seeds_are_made_once_the_time_is_over(monkeypatch, looks, most):
-    """All of one cost, so that none is left out for its price; over after some looks."""
-    seen = itertools.count()
-    budget = Budget(began=0.0, deadline=1.0, clock=lambda: 2.0 * (next(seen) >= looks))
-    made = []
-
-    def solutions(_job):
-        for number in range(1000):
-            made.append(number)
-            yield words.Word(trims=[0], durations=[1.0], cost=1.0)
-
-    monkeypatch.setattr(words.WordScan, "solutions", solutions)
-    monkeypatch.setattr(words.WordScan, "run", lambda *_: True)
-    problem = parking()
-    setup = search_setup(problem, problem.goals[0])
-    found = words.search_setup_words(problem, setup, alternatives=2, budget=budget, spare=False)
-    assert (len(found), len(made)) == (3, most + (most < 1000))

@@ -47,48 +47,11 @@ def test_what_is_nearly_there_gets_there(word, seed, free_heading, far):
     assert np.linalg.norm(closed - times - off) < 1.01 * np.linalg.norm(off) + 1e-9
 
 
-def test_a_goal_a_full_turn_away_is_the_same():
-    twists, times = TWISTS[[0, 1, 2]], np.array([1.0, 1.0, 1.0])
-    goal = end_of(np.zeros(3), twists, times)
-    turned = goal + np.array([0.0, 0.0, 4.0 * math.pi])
-    assert closed_at(np.zeros(3), twists, times, turned) == pytest.approx(times, abs=1e-12)
-
-
-def test_nothing_to_close():
-    empty = closed_at(np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.zeros(3))
-    assert empty.shape == (0,)
-    far = closed_at(np.zeros(3), np.zeros((0, 3)), np.zeros(0), np.array([5.0, 0.0, 0.0]))
-    assert far.shape == (0,)
-
-
 def test_a_word_that_cannot_get_there_is_as_good_as_it_gets():
     straight = np.array([[1.0, 0.0, 0.0]])
     closed = closed_at(np.zeros(3), straight, np.array([1.9]), np.array([2.0, 1.0, 0.0]))
     assert closed == pytest.approx([1.9], abs=0.2)
     assert closed.min() >= 0.0
-
-
-def test_no_time_becomes_negative():
-    # the second trim would have to be driven backwards
-    twists = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    closed = closed_at(np.zeros(3), twists, np.array([1.0, 1e-9]), np.array([1.0, -1e-6, 0.0]))
-    assert (closed >= 0.0).all()
-    assert closed == pytest.approx([1.0, 0.0], abs=1e-8)
-
-
-def test_at_the_goal_the_times_stay_as_they_are():
-    twists, times = TWISTS[[0, 1, 2, 1]], np.array([0.5, 1.5, 0.25, 2.0])
-    goal = end_of(np.array([1.0, 2.0, 0.5]), twists, times)
-    closed = closed_at(np.array([1.0, 2.0, 0.5]), twists, times, goal)
-    assert closed == pytest.approx(times, abs=1e-14)
-
-
-def test_the_given_times_are_not_written_on():
-    twists, times = TWISTS[[0, 1, 2]], np.array([1.0, 1.0, 1.0])
-    times.setflags(write=False)
-    goal = np.array([2.0, 1.5, 1.0])
-    closed_at(np.zeros(3), twists, times, goal)
-    assert times.tolist() == [1.0, 1.0, 1.0]
 
 
 CLIMBING = np.column_stack([TWISTS, [0.2, 0.0, -0.3, 0.1, 0.0]])
@@ -114,28 +77,6 @@ def test_altitude_and_the_sum_of_times_are_met_too(seed, fixed):
     assert reached == pytest.approx(goal, abs=1e-11)
     assert not fixed or closed.sum() == pytest.approx(times.sum(), abs=1e-12)
     assert np.linalg.norm(closed - times - off) < 1.01 * np.linalg.norm(off) + 1e-9
-
-
-@pytest.mark.parametrize("free_heading", [False, True])
-def test_how_conditions_follow_the_times(free_heading):
-    twists, times = CLIMBING, np.array([0.7, 1.1, 0.4, 2.0, 0.9])
-    conditions = EndConditions(
-        start=np.array([1.0, 2.0, 0.3, -1.0]), twists=twists, goal=np.array([3.0, 1.0, 0.8, 0.5]),
-        free_heading=free_heading, rows=np.array([[1.0, 2.0, 0.0, 0.0, 3.0]]),
-        targets=np.array([4.0]),
-    )  # fmt: skip
-    _, columns = conditions.missing(times)
-    for k, step in enumerate(1e-6 * np.eye(len(times))):
-        change = conditions.missing(times - step)[0] - conditions.missing(times + step)[0]
-        assert change / 2e-6 == pytest.approx(columns[:, k], abs=1e-8)
-
-
-def test_what_is_then_missing_is_said():
-    straight = EndConditions(
-        start=np.zeros(3), twists=np.array([[1.0, 0.0, 0.0]]), goal=np.array([2.0, 0.05, 0.0])
-    )
-    times, missing = closest_times(straight, np.array([1.9]))
-    assert (times.tolist(), missing) == ([2.0], 0.05)
 
 
 def closed_by_svd(conditions: EndConditions, durations: np.ndarray) -> tuple[np.ndarray, float]:

@@ -14,8 +14,6 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.words._kernels_times import (
     end_and_columns,
     lagrangian_hessian,
-    least_squares,
-    null_space,
 )
 from maneuver_automaton.words.closing import conjugated
 from tests import reference
@@ -35,14 +33,6 @@ def derivatives(twists, times, p_x, p_y):
     end = end_and_columns(twists, times, columns)
     lagrangian_hessian(columns, p_x, p_y, hessian)
     return end, columns, hessian
-
-
-@kernel
-def solved_and_free(matrix, rhs):
-    """Least-squares solution, rank, null space."""
-    basis = null_space(matrix)
-    solution, rank = least_squares(matrix.copy(), rhs.copy(), 1e-11)
-    return solution, rank, basis
 
 
 @st.composite
@@ -72,11 +62,6 @@ def test_kernel_agrees_on_the_end_with_displacements(word):
     assert np.abs(off).max() < 1e-11
 
 
-def test_the_least_of_all_turn_rates_is_a_straight():
-    end, _, _ = derivatives(np.array([[1.0, 0, 5e-324, 0]]), np.array([1.5]), 0, 0)
-    assert end[0] == 1.5
-
-
 @settings(max_examples=draws(50))
 @given(words())
 def test_columns_are_the_derivatives_of_the_end(word):
@@ -93,33 +78,3 @@ def test_hessian_is_the_derivative_of_the_columns(word, p_x, p_y):
     _, _, hessian = derivatives(twists, times, p_x, p_y)
     expected = reference.hessian(twists[:, :3], times, [p_x, p_y, 0.0])
     assert hessian == pytest.approx(expected, abs=1e-3)
-
-
-@settings(max_examples=draws(50))
-@given(words(), st.floats(0.0, 1.0))
-def test_a_trim_cut_in_two_ends_in_the_same_place(word, share):
-    twists, times, _ = word
-    cut = np.concatenate([[share * times[0], (1.0 - share) * times[0]], times[1:]])
-    twice = np.vstack([twists[:1], twists])
-    off = reference.off_goal(
-        derivatives(twice, cut, 0.0, 0.0)[0], derivatives(twists, times, 0.0, 0.0)[0]
-    )
-    assert np.abs(off).max() < 1e-11
-
-
-@given(arrays(np.float64, (4, 5), elements=st.integers(-2, 2).map(float)))
-def test_least_squares_and_null_space_find_the_rank(matrix):
-    rhs = matrix @ np.arange(5.0)
-    solution, rank, basis = solved_and_free(matrix, rhs)
-    assert rank == np.linalg.matrix_rank(matrix)
-    assert basis.shape == (5, 5 - rank)
-    assert matrix @ solution == pytest.approx(rhs, abs=1e-9)
-    assert np.abs(matrix @ basis).max(initial=0.0) < 1e-9
-    assert np.linalg.matrix_rank(basis) == 5 - rank
-
-
-def test_by_hand():
-    quarter = np.pi / 2
-    twists, times = np.array([[1.0, 0, 1, 0], [2.0, 0, 0, 0]]), np.array([quarter, 3.0])
-    end, _, _ = derivatives(twists, times, 0.0, 0.0)
-    assert end == pytest.approx([1.0, 7.0, quarter])
