@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import os
 import subprocess
 import sys
-from collections import namedtuple
 from pathlib import Path
 
 import numba
 import pytest
-from numba import types
 
 import maneuver_automaton
 from maneuver_automaton import _compile_all, _kernel_cache
@@ -25,13 +22,10 @@ from maneuver_automaton._kernel_list import (
     later_uses,
     module_of,
     signatures_of,
-    stated,
-    type_of,
     write_list,
 )
 
 PACKAGE = Path(maneuver_automaton.__file__).parent
-Pair = namedtuple("Pair", "near far")
 
 
 def test_every_kernel_is_listed():
@@ -63,26 +57,6 @@ def test_a_missing_kernel_is_compiled_with_those_of_its_uses():
             assert not set(together).intersection(installed)
     (road,) = {tuple(compiled_with(name)) for name in names if module_of(name).startswith("roads.")}
     assert {module_of(name) for name in road} == set(USES["roads"])
-
-
-@pytest.mark.parametrize(
-    ("kind", "name"),
-    [
-        (types.float64, "float64"),
-        (types.boolean, "bool"),
-        (types.Array(types.int64, 2, "C"), "int64[2C]"),
-        (types.Array(types.boolean, 1, "A", readonly=True), "bool[1A, read only]"),
-        (types.UniTuple(types.float64, 2), ["float64", "float64"]),
-        (types.literal(True), "True"),
-        (
-            types.NamedTuple((types.int64, types.float64), Pair),
-            {f"{__name__}:Pair": ["int64", "float64"]},
-        ),
-    ],
-)
-def test_types_are_written_and_read(kind, name):
-    assert stated(kind) == name
-    assert type_of(json.loads(json.dumps(name))) == kind
 
 
 def test_the_list_is_written_as_it_was_read(tmp_path, monkeypatch):
@@ -151,30 +125,6 @@ def test_what_compiles_is_this_package_also_in_the_folder_of_another(tmp_path, m
     monkeypatch.chdir(tmp_path)
     failed = _compile_all.compile_kernels(["no.kernel"], jobs=1)
     assert failed == ["no.kernel: KeyError: 'no.kernel'"]
-
-
-def test_the_lock_of_a_process_that_is_gone_is_taken(tmp_path):
-    lock = tmp_path / "lock"
-    assert _compile_all._locked(lock, [])
-    assert not _compile_all._locked(lock, [])
-    os.utime(lock, (0.0, 0.0))
-    _compile_all._report(lock, None, ["one"], ["one", "other"])  # its process is at work
-    assert not _compile_all._locked(lock, [])
-    os.utime(lock, (0.0, 0.0))
-    assert _compile_all._locked(lock, [])
-
-
-def test_kernels_that_another_process_compiles_are_waited_for(tmp_path, monkeypatch):
-    lock, compiled = tmp_path / _compile_all.LOCK, []
-    monkeypatch.setattr(_compile_all, "kernel_folder", lambda: tmp_path)
-    monkeypatch.setattr(_compile_all, "compile_kernels", lambda names, **_: compiled.append(names))
-    monkeypatch.setattr(_compile_all.time, "sleep", lambda _: lock.unlink())  # the other is done
-    monkeypatch.delenv(_compile_all.WORKER, raising=False)
-    for others, own in (("ab", "ab"), ("abc", "b"), ("ab", "bc")):
-        assert _compile_all._locked(lock, others)
-        _compile_all.compile_missing(own)
-        assert not lock.exists()
-    assert compiled == ["bc"]
 
 
 def test_a_build_says_which_rooms_are_done_and_what_is_left(tmp_path, monkeypatch, capsys):

@@ -7,9 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from maneuver_automaton.audit import clearance, closest_to, outlines, pairs, passages
+from maneuver_automaton.audit import closest_to, outlines
 from maneuver_automaton.audit._kernels_edges import distances
-from maneuver_automaton.audit._kernels_still import Found
 from maneuver_automaton.audit.judge import audit_plan
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
@@ -33,7 +32,6 @@ FLYER = UserModel(
     control_names=("ahead", "turn", "climb"),
     velocity=lambda z, u: [u[0], 0.0, u[1], u[2]],
 )
-TOUCHES = Found(0.0, 0.0, 0, 0.0, True)  # what has arrays take over from the compiled call
 
 
 def random_plan(rng, n):
@@ -42,32 +40,6 @@ def random_plan(rng, n):
     trims = [Trim(name=f"t{k}", body_velocity=one, control=one) for k, one in enumerate(twists)]
     durations = rng.uniform(0.0, 3.0, n) * (rng.random(n) < 0.8)
     return Plan(random_pose(rng), trims, durations=durations)
-
-
-@pytest.mark.parametrize("seed", quick_are(range(6), range(30)))
-def test_what_is_left_out_changes_nothing(seed, monkeypatch):
-    """All edges at once, against few at a time, and the near ones of many."""
-    rng = np.random.default_rng([21, seed])
-    body = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
-    plan, obstacles = random_plan(rng, 3), random_scene(rng, moving=seed % 2)
-
-    monkeypatch.setattr(clearance, "nearest_still", lambda *_: TOUCHES)
-
-    def found(*, many, at_once, within):
-        monkeypatch.setattr(pairs, "MANY", many)
-        monkeypatch.setattr(passages, "AT_ONCE", at_once)
-        monkeypatch.setattr(pairs, "FIRST_WITHIN", within)
-        return closest_to(plan, ANY, obstacles, footprint=body)
-
-    every = found(many=10**9, at_once=10**9, within=1e9)
-    for other in (
-        found(many=256, at_once=512, within=0.1),
-        found(many=80, at_once=7, within=1e-3),
-        found(many=65, at_once=100, within=3.0),
-    ):
-        assert other.measured == pytest.approx(every.measured, abs=1e-12)
-        low = every.measured - max(1e-3, 0.011 * every.measured)
-        assert low <= other.distance <= other.measured
 
 
 @pytest.mark.parametrize("seed", quick_are(range(10), range(100)))
@@ -84,27 +56,6 @@ def test_among_many_movers_the_nearest_counts(seed):
     sharp = max(1e-3, 0.011 * min(own))
     assert one.measured == pytest.approx(min(own), abs=sharp)
     assert min(own) - 2.0 * sharp <= one.distance <= one.measured
-
-
-@pytest.mark.parametrize("seed", quick_are(range(8), range(60)))
-def test_compiled_bounds_are_those_of_arrays(seed, monkeypatch):
-    """Stretches halved one by one, against all cut side by side."""
-    rng = np.random.default_rng([22, seed])
-    body = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
-    plan, obstacles = random_plan(rng, 4), random_scene(rng)
-    enough = float(rng.uniform(0.0, 0.5))
-
-    def found():
-        return closest_to(plan, ANY, obstacles, footprint=body, enough=enough)
-
-    one = found()
-    monkeypatch.setattr(clearance, "nearest_still", lambda *_: TOUCHES)
-    other = found()
-    sharp = max(1e-3, 0.011 * other.measured)
-    assert one.measured == pytest.approx(other.measured, abs=sharp)
-    for low, known in ((one, other), (other, one)):
-        assert low.distance <= known.measured + 1e-12
-        assert low.distance >= low.measured - sharp
 
 
 def test_what_is_far_is_found():

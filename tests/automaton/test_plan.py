@@ -118,23 +118,6 @@ def test_between_two_samples_the_control_drives_from_one_to_the_other(pieces):
     assert samples.control[-1].tolist() == plan.trims[-1].control.tolist()
 
 
-@pytest.mark.parametrize("step", [0.01, 0.3])
-def test_the_steps_can_be_chosen(step):
-    samples = plan_of([(AHEAD, 1.0), (SPIN, 1.0)]).sample(max_step_m=step, max_step_rad=2 * step)
-    moved = np.diff(samples.pose, axis=0)
-    assert (np.abs(moved[:, 0]) <= step * (1 + 1e-9)).all()
-    assert (np.abs(moved[:, 2]) <= 2 * step * (1 + 1e-9)).all()
-    needed = math.ceil(2.0 / step) + math.ceil(1.0 / step)
-    assert needed <= len(samples.time) <= needed + 3
-
-
-def test_headings_go_on_over_several_turns():
-    samples = plan_of([(SPIN, 4 * math.pi), (LEFT, 6 * math.pi)]).sample()
-    assert samples.pose[:, 2].min() == pytest.approx(-8 * math.pi)
-    assert samples.pose[-1, 2] == pytest.approx(-2 * math.pi)
-    assert np.abs(np.diff(samples.pose[:, 2])).max() <= 0.05 * (1 + 1e-9)
-
-
 @given(pieces=PIECES, start=STARTS, by=STARTS)
 def test_a_moved_plan_is_moved_at_every_time(pieces, start, by):
     plan, group_element = plan_of(pieces, start, start_time=2.0), SE2(by)
@@ -181,20 +164,6 @@ def test_an_empty_plan_stays_where_it_is():
     assert plan.moved(SE2([1.0, 0.0, 0.0])).end.tolist() == [2.0, 2.0, 3.0]
     with pytest.raises(ValueError, match=r"^plan: an empty word has no control$"):
         plan.control_at(5.0)
-
-
-def test_a_trim_of_no_duration_changes_no_pose():
-    plan = plan_of([(AHEAD, 1.0), (SPIN, 0.0), (LEFT, 1.0)])
-    without = plan_of([(AHEAD, 1.0), (LEFT, 1.0)])
-    times = np.linspace(0.0, 2.0, 21)
-    np.testing.assert_array_equal(plan.pose_at(times), without.pose_at(times))
-    assert plan.control_at(1.0).tolist() == LEFT.control.tolist()
-
-
-def test_a_waiting_plan_has_its_two_ends_as_samples():
-    samples = plan_of([(REST, 3.0)], start=(1.0, 0.0, 0.0)).sample()
-    assert samples.time.tolist() == [0.0, 3.0]
-    assert samples.pose.tolist() == [[1.0, 0.0, 0.0]] * 2
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
-from maneuver_automaton.collision.fcl_checker import Course, FclChecker, _coasted_within
+from maneuver_automaton.collision.fcl_checker import Course, FclChecker
 from maneuver_automaton.groups import SE2
 from tests.collision.scenes import (
     CAR,
@@ -224,23 +224,6 @@ def test_the_margin_is_kept_round_corners():
     assert checker.pose_hit([0.0, 0.0, 0.0]) == 0
 
 
-@pytest.mark.parametrize("twist", [*TWISTS, (1.0, 0.0, 1e-12), (1e-8, 0.0, 0.0), (0.0, 0.0, 0.0)])
-@pytest.mark.parametrize("duration", [0.0, 1e-300, 1e-12, 1e-7, 7.3, 1e5])
-def test_any_duration_will_do(twist, duration):
-    walls = (Obstacle(Box([1.0, 1.0], center=[50.0, 30.0])),)
-    checker = FclChecker((CAR,), walls)
-    assert motion_hit(checker, [0.0, 0.0, 0.0], twist, duration) is None
-    assert motion_hit(checker, [50.0, 30.0, 0.0], twist, duration) == 0
-
-
-def test_a_long_straight_way_is_checked_whole():
-    post = (Obstacle(Box([0.5, 0.5], center=[12_345.6, 0.9])),)
-    checker = FclChecker((CAR,), post)
-    assert motion_hit(checker, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 12_340.0) is None
-    assert motion_hit(checker, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0], 20_000.0) == 0
-    assert motion_hit(checker, [20_000.0, 0.0, 0.0], [-1.0, 0.0, 0.0], 20_000.0) == 0
-
-
 def test_the_index_is_that_of_the_obstacle_touched():
     scene = (
         Obstacle(Disc(0.5, center=[0.0, 9.0])),
@@ -275,7 +258,6 @@ def test_what_moves_does_not_count():
     ],
 )
 def test_careless_polygons_lose_nothing_solid(corners):
-    import shapely
 
     checker = FclChecker((), (Obstacle(Polygon(corners)),))
     careful = shapely.make_valid(shapely.Polygon(corners))
@@ -341,100 +323,6 @@ def test_threads_do_not_disturb_each_other():
     assert answers == [expected] * 4
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_course_is_free_exactly_where_its_poses_are():
-    """Courses past a corner at many distances: shapely on dense poses, to within a millimetre."""
-    rng = np.random.default_rng(7)
-    body = (Box([4.0, 2.0], center=[1.0, 0.0]),)
-    wall = (Obstacle(Polygon([[4.0, 2.0], [9.0, 2.0], [9.0, 7.0]])),)
-    checker = FclChecker(body, wall)
-    target = shapely.Polygon([[4.0, 2.0], [9.0, 2.0], [9.0, 7.0]])
-    outline = np.array([[-1.0, -1.0], [3.0, -1.0], [3.0, 1.0], [-1.0, 1.0]])
-    hits = 0
-    for _ in range(60):
-        start = np.array([rng.uniform(-4, 0), rng.uniform(-1.5, 2.5), rng.uniform(-0.3, 0.5)])
-        turns = np.cumsum(rng.uniform(-0.01, 0.01, 80)) + rng.uniform(-0.02, 0.02)
-        steps = np.stack([np.full(80, 0.05), np.zeros(80), turns], axis=-1)
-        poses = [np.zeros(3)]
-        for step in steps:
-            poses.append((SE2(poses[-1]) @ SE2.exp(step)).pose)
-        found = course_hit(checker, start, np.array(poses))
-        shares = np.linspace(0.0, 1.0, 20)[:, None, None]
-        within = SE2(np.array(poses)[:-1]) @ SE2.exp(shares * steps)
-        dense = (SE2(start) @ within).pose.reshape(-1, 3)
-        nearest = min(shapely.Polygon(SE2(pose).act(outline)).distance(target) for pose in dense)
-        if nearest > 2e-3:
-            assert found is None
-        if nearest == 0.0:
-            assert found == 0
-            hits += 1
-    assert 5 < hits < 55
-
-
-def test_a_course_may_be_given_up_between_its_parts():
-    wall = (Obstacle(Box([2.0, 2.0], center=[5.0, 0.0])),)
-    poses = np.stack([np.linspace(0.0, 3.0, 41), np.zeros(41), np.zeros(41)], axis=-1)
-
-    def late():
-        raise TimeoutError
-
-    with pytest.raises(TimeoutError):
-        course_hit(FclChecker((Box([2.0, 2.0]),), wall), [0, 0, 0], poses, ask=late)
-
-
-def first_of(hits):
-    """The first that is hit, and which obstacle."""
-    return next(((k, hit) for k, hit in enumerate(hits) if hit is not None), None)
-
-
-@pytest.mark.parametrize("seed", quick_are(range(6), range(40)))
-def test_several_motions_are_hit_where_one_of_them_is(seed):
-    """Of no length, standing still, spins and long ways among them."""
-    rng = np.random.default_rng([300, seed])
-    footprint = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
-    obstacles = random_scene(rng)
-    checker = FclChecker(footprint, obstacles)
-    n = rng.integers(0, 8)
-    starts = np.array([random_pose(rng) for _ in range(n)]).reshape(-1, 3)
-    free = np.array([checker.pose_hit(pose) is None for pose in starts], dtype=bool)
-    starts = starts[free]
-    kinds = np.array([(0.0, 0.0, 0.0), (0.0, 0.0, 1.5), *TWISTS])
-    twists = kinds[rng.integers(len(kinds), size=len(starts))]
-    durations = rng.choice([0.0, 1e-14, 0.3, 2.0], size=len(starts))
-    one_by_one = [motion_hit(checker, *one) for one in zip(starts, twists, durations, strict=True)]
-    found = checker.motions_hit(starts, twists, durations)
-    assert (found is None) == (first_of(one_by_one) is None)
-    if found is not None:
-        assert found[0] == first_of(one_by_one)[0]
-
-
-def random_course(rng, n, step):
-    """A course of n samples that begins anywhere, its turns those of a vehicle that steers."""
-    poses = [np.zeros(3)]
-    for turn in np.cumsum(rng.uniform(-0.02, 0.02, n - 1)):
-        poses.append((SE2(poses[-1]) @ SE2.exp([step, 0.0, turn])).pose)
-    return np.array(poses)
-
-
-@pytest.mark.parametrize("seed", quick_are(range(6), range(40)))
-def test_several_courses_are_hit_where_one_of_them_is(seed):
-    rng = np.random.default_rng([400, seed])
-    footprint = list(FOOTPRINTS.values())[seed % len(FOOTPRINTS)]
-    obstacles = random_scene(rng)
-    checker = FclChecker(footprint, obstacles)
-    courses = []
-    for n in rng.choice([1, 2, 5, 40, 90], size=rng.integers(0, 6)):
-        start = random_pose(rng)
-        if checker.pose_hit(start) is None:
-            courses.append(Course(start, random_course(rng, n, 0.05)))
-    one_by_one = [course_hit(checker, *one) for one in courses]
-    found = checker.courses_hit(courses)
-    assert (found is None) == (first_of(one_by_one) is None)
-    if found is not None:
-        assert found[0] == first_of(one_by_one)[0]
-
-
 @pytest.mark.parametrize("seed", quick_are(range(4), range(20)))
 def test_a_course_of_one_coast_is_that_coast(seed):
     """Cut into samples of any length, also where they turn by radians."""
@@ -452,16 +340,3 @@ def test_a_course_of_one_coast_is_that_coast(seed):
             assert least <= PROVEN + slack
         answers.add(found is None)
     assert answers
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_coasts_stay_in_their_boxes(seed):
-    rng = np.random.default_rng([31, seed])
-    starts = np.array([random_pose(rng) for _ in range(20)])
-    twists = rng.uniform(-2.0, 2.0, (20, 3)) * (rng.random((20, 3)) < 0.7)
-    durations = rng.uniform(0.0, 9.0, 20)
-    low, high = _coasted_within(starts, twists, durations)
-    for k in range(20):
-        _, poses = poses_of(starts[k], twists[k], durations[k], 200)
-        assert (poses[:, :2] >= low[k] - PROVEN).all()
-        assert (poses[:, :2] <= high[k] + PROVEN).all()

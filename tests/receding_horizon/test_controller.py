@@ -10,17 +10,12 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
-from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, at_will, within
-from maneuver_automaton.receding_horizon.at_will import InFreeSpace
+from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
 from maneuver_automaton.receding_horizon.rest_of_plan import missed
-from maneuver_automaton.search import choose
-from maneuver_automaton.search.limits import sole_bound
 from tests.receding_horizon.loops import AHEAD, EFFORT, NEAR, SPIN_TOO, parking_loop, straight
 from tests.search.cases import (
     REEDS_SHEPP,
-    REVERSED_SPIN,
     TABLE_2,
-    compiled_only,
     helicopter,
     robot,
     without_rest,
@@ -75,16 +70,6 @@ class TestOneStep:
             assert step.goal_index == 1
             assert missed(step.plan, goals[1]) <= 1e-9
 
-    @pytest.mark.parametrize("turns", [1, -3, 1000])
-    def test_headings_count_modulo_a_turn(self, turns):
-        loop = controller()
-        _, step = loop.step([0.0, 1.0, 2.0 * math.pi * turns])
-        assert step.value == pytest.approx(4.6615840195, abs=1e-9)
-        _, step = loop.step(step.predicted - [0.0, 0.0, 2.0 * math.pi * turns])
-        assert step.off_plan == pytest.approx(0.0, abs=1e-9)
-        assert not step.replanned
-        assert step.violations == ()
-
     def test_the_certificate_of_an_exhaustive_search(self):
         _, step = controller().step([0.0, 1.0, 0.0])
         assert step.exhaustive
@@ -138,14 +123,6 @@ class TestElapsed:
         assert second.value == pytest.approx(4.6615840195)
         assert [one.guarantee for one in second.disturbed] == [Guarantee.DECREASE]
         assert second.violations == ()
-
-    def test_many_short_steps_keep_the_bound_on_their_number(self):
-        loop = controller(straight(1.0), step=0.5)
-        pose = np.array([-1.0, 0.0, 0.0])
-        _, step = loop.step(pose)
-        while not step.arrived:
-            _, step = loop.step(step.plan.pose_at(step.time + 0.05), elapsed=0.05)
-            assert step.violations == ()
 
     @pytest.mark.parametrize("elapsed", [-0.1, math.nan, math.inf])
     def test_no_time(self, elapsed):
@@ -219,22 +196,6 @@ def test_a_first_plan_is_filled_with_rest():
     assert step.plan.word == ("ahead", "rest")
     assert step.plan.durations.tolist() == [2.0, 2.0]
     assert step.origin is Origin.FIRST
-
-
-def test_a_step_longer_than_the_plan_applies_all_of_it():
-    loop = controller(straight(horizon=Horizon()), step=50.0)
-    _, step = loop.step([-2.0, 0.0, 0.0])
-    assert (step.applied, step.applied_cost) == (2.0, 2.0)
-    assert step.predicted.tolist() == [0.0, 0.0, 0.0]
-
-
-def test_a_step_as_long_as_the_horizon():
-    loop = controller(straight(), step=4.0)
-    _, step = loop.step([-2.0, 0.0, 0.0])
-    assert step.applied == 4.0
-    assert step.predicted.tolist() == [0.0, 0.0, 0.0]
-    _, step = loop.step(step.predicted)
-    assert step.arrived
 
 
 class TestMargin:
@@ -322,19 +283,6 @@ class TestHopeless:
             "horizon: no plan was found that takes at most 4 s; the one applied takes 9 s"
         ]
 
-    def test_exactly_the_least_time_is_enough(self):
-        loop = controller(straight(4.0))
-        _, step = loop.step([-4.0, 0.0, 0.0])
-        assert step.violations == ()
-        assert step.plan.durations.tolist() == [4.0]
-
-    def test_every_plan_that_is_late_is_flagged(self):
-        loop = controller(straight(9.0))
-        _, step = loop.step([-9.0, 0.0, 0.0])
-        _, step = loop.step(step.predicted)
-        assert step.plan.durations[0] == pytest.approx(8.0)
-        assert Guarantee.HORIZON in [one.guarantee for one in step.violations]
-
 
 class TestHold:
     def test_within_the_goal_it_stays_within(self):
@@ -345,19 +293,6 @@ class TestHold:
         ends = step.plan.pose_at(step.plan.start_time + np.arange(1, 6) * loop.settings.step)
         inside = [within(pose, NEAR) for pose in samples]
         assert all(inside) or all(within(pose, NEAR) for pose in ends)
-
-    @pytest.mark.parametrize(
-        ("pose", "expected"),
-        [
-            ((0.15, 0.0, 0.15), True),
-            ((0.0, -0.15, 2.0 * math.pi), True),
-            ((0.16, 0.0, 0.0), False),
-            ((0.11, 0.11, 0.0), False),  # a disc, no square
-            ((0.0, 0.0, 0.16), False),
-        ],
-    )
-    def test_within(self, pose, expected):
-        assert within(np.array(pose), NEAR) is expected
 
 
 class TestSpace:
@@ -380,22 +315,6 @@ class TestSpace:
                 break
             pose = step.predicted
         assert step.arrived
-
-
-class TestHuge:
-    @pytest.mark.parametrize("far", [1e6, -1e6])
-    def test_a_million_metres_away(self, far):
-        problem = parking_loop(start=(far, 1.0 - far, 0.0), goal=(far, -far, 0.0))
-        loop = controller(problem)
-        pose = problem.start
-        for _ in range(4):
-            _, step = loop.step(pose)
-            assert step.violations == ()
-            pose = step.predicted
-        assert max(problem.goals[0].off(pose)) <= 1e-9
-        assert loop.last.accumulated_cost + loop.last.applied_cost == pytest.approx(
-            4.6615840195, abs=1e-8
-        )
 
 
 class TestSwitches:
@@ -434,16 +353,6 @@ def test_spin_library_turns_the_long_way_round_if_it_must():
     assert step.value == pytest.approx(2.0 * math.pi - 1.0)
 
 
-def test_going_on_from_a_step():
-    whole = controller()
-    _, first = whole.step([0.0, 1.0, 0.0])
-    _, second = whole.step(first.predicted)
-    again = controller(last=first)
-    _, other = again.step(first.predicted)
-    assert other.plan.durations.tolist() == second.plan.durations.tolist()
-    assert (other.number, other.value, other.origin) == (1, second.value, second.origin)
-
-
 class TestLowerBound:
     """A lower bound is below every plan, also below those that were found and not taken."""
 
@@ -464,60 +373,3 @@ class TestLowerBound:
         _, step = controller(problem, retimed=True).step(problem.start)
         assert step.value == pytest.approx(1.0)  # 2 m in 4 s, the least effort there is
         assert step.lower_bound == pytest.approx(1.0)
-
-
-class TestWordsLeftOut:
-    """What a step need not search: it decides as one that searches every word."""
-
-    @staticmethod
-    def drives(problem, starts):
-        for start in starts:
-            loop = controller(replace(problem, start=start))
-            pose, steps = start, []
-            while len(steps) < 12 and not (steps and steps[-1].arrived):
-                _, step = loop.step(pose)
-                steps.append(step)
-                pose = step.predicted
-            yield steps
-
-    @staticmethod
-    def searching_all(monkeypatch):
-        monkeypatch.setattr(at_will, "sole_bound", lambda *_: 0.0)
-        monkeypatch.setattr(InFreeSpace, "_driven", lambda *_: None)
-
-    @compiled_only
-    @pytest.mark.parametrize("controls", [TABLE_2, REVERSED_SPIN, REEDS_SHEPP])
-    @pytest.mark.parametrize("horizon", [FREE, Horizon(time=8.0, max_trims=4)])
-    def test_the_loop_is_the_same(self, controls, horizon, monkeypatch):
-        time_too = Cost(effort=1.0, time=1.0)
-        problem = parking_loop({"rest": (0.0, 0.0)} | controls, cost=time_too, horizon=horizon)
-        rng = np.random.default_rng(3)
-        starts = [[*rng.uniform(-2.0, 2.0, 2), rng.uniform(-3.0, 3.0)] for _ in range(8)]
-        fast = list(self.drives(problem, starts))
-        self.searching_all(monkeypatch)
-        for some, every in zip(fast, self.drives(problem, starts), strict=True):
-            assert [step.plan.word for step in some] == [step.plan.word for step in every]
-            assert [step.value for step in some] == pytest.approx(
-                [step.value for step in every], rel=1e-12
-            )
-            assert [step.exhaustive for step in some] == [step.exhaustive for step in every]
-
-    def test_a_plan_straight_to_the_goal_is_not_searched_for_again(self, monkeypatch):
-        loop = controller(straight(3.0, controls=SPIN_TOO, horizon=FREE, cost=Cost(time=1.0)))
-        _, step = loop.step([-3.0, 0.0, 0.0])
-        monkeypatch.setattr(choose, "search_words", None)
-        _, step = loop.step(step.predicted)
-        assert (step.plan.word, step.value, step.exhaustive) == (("ahead",), 2.0, True)
-
-    def test_an_equally_cheap_plan_is_searched_for(self):
-        pair = {"slow": (0.5, 0.0), "fast": (1.0, 0.0), "spin": (0.0, 1.0)}
-        by_length = straight(3.0, controls=pair, cost=Cost(length=1.0), horizon=Horizon())
-        assert sole_bound(by_length, by_length.goals[0]) == 0.0
-
-    def test_off_its_plan_every_word_is_searched(self):
-        loop = controller(parking_loop(cost=Cost(effort=1.0, time=1.0), horizon=FREE))
-        _, step = loop.step([0.0, 1.0, 0.0])
-        _, step = loop.step(step.predicted + np.array([1e-4, 0.0, 0.0]))
-        assert step.exhaustive
-        fresh = controller(parking_loop(start=step.pose, cost=loop.problem.cost, horizon=FREE))
-        assert step.value == pytest.approx(fresh.step(step.pose)[1].value, rel=1e-9)

@@ -22,7 +22,6 @@ from maneuver_automaton.receding_horizon import (
 )
 from maneuver_automaton.scenario import load_scenario
 from tests.receding_horizon.loops import (
-    AHEAD,
     EFFORT,
     NEAR,
     SCENARIOS,
@@ -183,17 +182,6 @@ class TestEnds:
         assert loop.poses.shape == (1, 3)
         assert loop.times.tolist() == [0.0]
 
-    def test_the_start_is_within_the_tolerance(self):
-        loop = simulate(parking_loop(start=(0.1, 0.1, 0.1), goal=NEAR), step=1.0)
-        assert (loop.reached, len(loop.steps)) == (True, 0)
-
-    def test_the_nearest_of_several_goals(self):
-        goals = [Goal(pose=[5.0, 5.0, 0.0]), Goal(pose=[0.0, 0.0, 0.0])]
-        loop = simulate(parking_loop(goal=goals), step=1.0)
-        assert loop.reached
-        assert {step.goal_index for step in loop.steps} == {1}
-        assert loop.cost == pytest.approx(4.6615840195)
-
     def test_any_heading(self):
         goal = Goal(pose=[0.0, 0.0, 0.0], free_heading=True)
         loop = simulate(parking_loop(goal=goal), step=0.5)
@@ -209,23 +197,11 @@ class TestEnds:
         assert loop.value == pytest.approx(4.6615840195 - loop.cost)
         assert len(loop.steps) == 2
 
-    def test_nothing_leads_there(self):
-        loop = simulate(parking_loop(AHEAD), step=1.0)
-        assert (loop.reached, loop.status, loop.steps) == (False, "no_plan", ())
-        assert "no plan leads from [0.0, 1.0, 0.0] to the goal" in loop.reason
-
     def test_out_of_time_it_arrives_late(self):
         loop = simulate(straight(9.0), step=1.0)
         assert loop.reached
         assert len(loop.steps) == 9
         assert loop.steps[0].violations[0].guarantee is Guarantee.HORIZON
-
-    @pytest.mark.parametrize("step", [0.3, 1.0, 4.0])
-    def test_exactly_the_least_time(self, step):
-        loop = simulate(straight(4.0), step=step)
-        assert loop.reached
-        assert loop.cost == pytest.approx(4.0)
-        assert list(loop.violations) == []
 
     def test_bounds_are_kept(self):
         bounds = Bounds(x=(-0.15, 1.0))
@@ -234,17 +210,6 @@ class TestEnds:
         assert list(loop.violations) == []
         for piece in loop.driven:
             assert piece.sample().pose[:, 0].min() >= -0.15 - 1e-9
-
-    def test_free_time_and_no_rest(self):
-        problem = straight(controls={"ahead": (1.0, 0.0)}, horizon=Horizon())
-        loop = simulate(problem, step=0.75)
-        assert loop.reached
-        assert [step.applied for step in loop.steps] == pytest.approx([0.75, 0.75, 0.5])
-        assert loop.times[-1] == pytest.approx(2.0)
-
-    def test_no_step(self):
-        with pytest.raises(ValueError, match="steps must be at least 1, got 0"):
-            simulate(straight(), step=1.0, steps=0)
 
 
 class TestDisturbances:
@@ -423,12 +388,3 @@ def test_a_piece_that_the_model_does_not_drive_fails_its_audit():
     first = Plan(problem.start, (liar,), durations=[4.0 / 3.0])
     loop = simulate(problem, step=1.0, steps=1, first=first)
     assert [audit.passed for audit in loop.audits] == [False]
-
-
-def test_a_loop_over_a_library_with_one_trim():
-    problem = Problem(
-        robot({"circle": (1.0, 1.0)}), [0.0, 0.0, 0.0], [0.0, 2.0, math.pi], cost=EFFORT
-    )
-    loop = simulate(problem, step=1.0)
-    assert loop.reached
-    assert loop.times[-1] == pytest.approx(math.pi)

@@ -12,14 +12,12 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem
 from maneuver_automaton.refinement import effort_report, least_effort, retime
-from maneuver_automaton.refinement.shooting import _averages, _columns, _Shooting
 
 ROBOT = Automaton.of_controls(
     Unicycle(),
     {"ahead": (1.0, 0.0), "back": (-1.0, 0.0), "left": (1.0, 1.0), "right": (1.0, -1.0),
      "spin": (0.0, 1.0), "rest": (0.0, 0.0)},
 )  # fmt: skip
-EFFORT = Cost(effort=1.0)
 
 
 def random_plan(rng, n=5):
@@ -43,30 +41,6 @@ def test_it_ends_where_the_other_plan_does_and_costs_less(seed):
     assert effort(fine) <= 1.001 * effort(retime(plan, Unicycle()).after)
     goal = Goal(pose=plan.end)
     assert audit_plan(better, goal, Unicycle()).passed
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_slsqp_finds_no_cheaper_controls(seed):
-    plan = random_plan(np.random.default_rng([1, seed]), n=3)
-    columns = _columns(plan, Unicycle())
-    shooting = _Shooting(plan.start, plan.end, columns, np.eye(2), plan.duration / 12)
-    first = _averages(plan, 12)
-    ours = shooting.nearest_to_none(first)
-    theirs = shooting.within(np.full((2, 2), np.inf) * [-1.0, 1.0], first)
-    assert ours is not None
-    assert np.abs(shooting.missed(ours.ravel())).max() <= 1e-9
-    assert shooting.effort(ours.ravel()) <= shooting.effort(theirs.ravel()) * (1.0 + 1e-5)
-
-
-def test_the_slopes_are_those_of_differences():
-    rng = np.random.default_rng(3)
-    columns = np.array([[1.0, 0.0, 0.2], [0.0, 0.3, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    shooting = _Shooting(rng.normal(size=4), rng.normal(size=4), columns, np.eye(3), 0.7)
-    for scale in (1.0, 1e-6, 0.0):  # turns, hardly any, none
-        flat = rng.normal(size=15) * scale
-        steps = 1e-6 * np.eye(15)
-        numeric = [(shooting.missed(flat + h) - shooting.missed(flat - h)) / 2e-6 for h in steps]
-        np.testing.assert_allclose(shooting.slopes(flat), np.transpose(numeric), atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -90,14 +90,6 @@ def test_a_straight_stroke_is_timed_like_on_paper() -> None:
     assert run.twist[:, 0].max() <= v + 1e-12
 
 
-def test_it_stops_and_turns_the_wheel_where_the_gear_changes() -> None:
-    run = timed(plan((1.0, 0.35, 0.2), (-1.0, -0.35, 0.2)), pace_of_car(CAR))
-    turned = 2.0 * math.atan(2.8 * 0.35)
-    strokes = 2.0 * math.sqrt(0.2 / 0.9)  # each; the wheel turns at the ends too
-    assert run.duration == pytest.approx(4.0 * turned / 2.0 / 0.5, abs=strokes)
-    assert run.pose[-1] == pytest.approx(plan((1.0, 0.35, 0.2), (-1.0, -0.35, 0.2)).end)
-
-
 def test_closure_brings_a_motion_to_its_end_within_the_limits() -> None:
     rng = np.random.default_rng(3)
     control = np.clip(rng.normal(size=(60, 2)) * [0.4, 0.2], [-1.0, -0.5], [1.0, 0.5])
@@ -114,18 +106,6 @@ def test_closure_brings_a_motion_to_its_end_within_the_limits() -> None:
                   durations=durations)  # fmt: skip
     assert not isinstance(free, str)
     assert np.abs(free.course.pose[-1, :2] - end[:2]).max() < 1e-12
-
-
-def test_closure_says_which_limit_is_exceeded() -> None:
-    slow = SecondOrderCar(
-        wheelbase=2.8, max_steering=0.75, max_speed=0.5, max_acceleration=1.0, max_steering_rate=0.5
-    )
-    control, durations = np.array([[0.9, 0.0], [-0.9, 0.1]]), np.ones(2)
-    end = drive(slow, [0.0, 0.0], control=control, durations=durations)
-    goal = [*end.pose[-1].tolist(), *end.reduced_state[-1].tolist()]
-    found = closed(slow, np.zeros(2), goal, control=control, durations=durations)
-    assert isinstance(found, str)
-    assert "speed exceeds its limit by 0.4" in found
 
 
 def test_the_goal_needs_a_place_and_the_start_its_limits() -> None:
@@ -149,12 +129,6 @@ def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
     assert motion.duration < around().duration * 1.2
     stroke = motion.maneuver("polished", source="rest", target="rest")
     assert stroke.duration == motion.duration
-
-
-def test_what_is_not_accepted_is_not_returned() -> None:
-    result = polish_guesses(swerve(), [around()], budget=UNLIMITED, accepts=lambda motion: False)
-    assert result.motion is None
-    assert result.reason == "what was found is not accepted"
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from maneuver_automaton._arrays import wrapped
-from maneuver_automaton.groups import SE2, SE2xR, group_of
+from maneuver_automaton.groups import SE2, group_of
 from maneuver_automaton.groups.chain import chained
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at, conjugated
@@ -106,42 +106,6 @@ def test_a_fixed_total_and_least_times_are_met(dof):
         assert np.abs(off(end, goal)).max() < 1e-9
 
 
-def test_longest_times_are_kept():
-    for twists, rates, displacements, planted in words(20, seed=4, sizes=(5, 7)):
-        goal = joined(twists, displacements, planted)
-        solved = solve_switching_times(
-            twists,
-            rates,
-            goal,
-            displacements=displacements,
-            longest=planted + 0.05,
-            guesses=[planted],
-        )
-        if solved.status is TimesStatus.FAILED:
-            continue
-        assert (solved.durations <= planted + 0.05 + 1e-12).all()
-        assert np.abs(off(joined(twists, displacements, solved.durations), goal)).max() < 1e-9
-
-
-def test_any_heading_costs_no_more_than_one():
-    for twists, rates, displacements, planted in words(20, seed=5):
-        goal = joined(twists, displacements, planted)
-        one = solve_switching_times(
-            twists, rates, goal, displacements=displacements, guesses=[planted]
-        )
-        either = solve_switching_times(
-            twists,
-            rates,
-            goal,
-            displacements=displacements,
-            guesses=[one.durations],
-            free_heading=True,
-        )
-        assert either.cost <= one.cost + 1e-7
-        end = joined(twists, displacements, either.durations)
-        assert np.abs(off(end, goal)[:2]).max() < 1e-9
-
-
 @given(seed=st.integers(0, 10_000), x=st.floats(-1e3, 1e3), turn=st.floats(-7.0, 7.0))
 @settings(max_examples=30)
 def test_a_moved_word_is_closed_by_the_same_times(seed, x, turn):
@@ -154,27 +118,3 @@ def test_a_moved_word_is_closed_by_the_same_times(seed, x, turn):
     assert np.abs(here - there).max() < 1e-8
     if not np.array_equal(here, near):
         assert np.abs(off(joined(twists, displacements, here), goal)).max() < 1e-9
-
-
-def test_a_word_of_fixed_times_only_must_fit():
-    twist, step = [[1.0, 0.0, 0.0]], np.zeros((0, 3))
-    fits = solve_switching_times(
-        twist, [2.0], [1.5, 0, 0], displacements=step, least=[1.5], longest=[1.5]
-    )
-    assert (fits.status, fits.cost) == (TimesStatus.OPTIMAL, 3.0)
-    too_far = solve_switching_times(twist, [2.0], [1.7, 0, 0], displacements=step, longest=[1.5])
-    assert too_far.status is TimesStatus.FAILED
-
-
-def test_wrong_numbers_of_displacements_are_refused():
-    with pytest.raises(ValueError) as error:
-        solve_switching_times([[1, 0, 0]] * 2, [1, 1], [2, 0, 0], displacements=[])
-    assert str(error.value) == "displacements: got 0, need 1, one between each two"
-
-
-def test_climbs_are_part_of_it():
-    up, ahead = [0.0, 0, 0, 0.5], [1.0, 0, 0, 0]
-    goal = joined([ahead, up], [[0.2, 0.0, 0.0, 0.3]], [2.0, 1.0])
-    solved = solve_switching_times([ahead, up], [1, 1], goal, displacements=[[0.2, 0.0, 0.0, 0.3]])
-    assert solved.durations == pytest.approx([2.0, 1.0], abs=1e-9)
-    assert group_of(4) is SE2xR
