@@ -154,27 +154,6 @@ def test_start_equal_to_goal_is_an_empty_word(folder):
     assert load_plan("out/plan.json").duration == 0.0
 
 
-def test_start_equal_to_goal_for_a_fixed_time_is_rest(folder):
-    text = but("[1.0, 1.0, 0.0]", "[0.0, 0.0, 0.0]").replace("time_s: free", "time_s: 3.0")
-    Path("x.yaml").write_text(text)
-    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
-    document = result_file()
-    assert document["duration_s"] == pytest.approx(3.0, abs=1e-12)
-    assert [primitive["name"] for primitive in document["primitives"]] == ["rest"]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", ["car_slot", "grid_1681", "parking_min_time", "several_goals", "warehouse"]
-)
-def test_shipped_scenarios_plan(folder, name):
-    assert run(["plan", str(SCENARIOS / f"{name}.yaml"), "--no-plot", "--quiet"]) == 0
-    document = result_file()
-    assert document["audit"]["passed"] is True
-    assert document["terminal_error"]["position_m"] <= 1e-9
-    assert document["terminal_error"]["heading_rad"] <= 1e-9
-
-
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_flight_among_heights_is_drawn_in_space_too(folder):
@@ -185,6 +164,7 @@ def test_a_flight_among_heights_is_drawn_in_space_too(folder):
     assert sorted(names) == ["plan.json", "plan.png", "plan_3d.png"]
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_obstacles_are_told_of(folder, capsys):
     Path("x.yaml").write_text(AMONG)
@@ -420,6 +400,7 @@ def test_convert_lists_the_trims(folder):
     assert len(load_scenario("new/y.yaml").problem.automaton) == 5
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_plot_draws_from_the_file_alone(folder):
     assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
@@ -430,15 +411,6 @@ def test_plot_draws_from_the_file_alone(folder):
     assert Path("a/b.svg").exists()
     assert run(["plot", "out/plan.json", "--out", "a", "--animate"]) == 0
     assert Path("a/plan.gif").exists()
-
-
-@pytest.mark.slow
-def test_an_animation_on_demand(folder):
-    assert run(["plan", "x.yaml", "--quiet", "--animate", "--no-plot"]) == 0
-    assert sorted(path.name for path in Path("out").iterdir()) == ["plan.gif", "plan.json"]
-    Path("x.yaml").write_text(AHEAD_ONLY)
-    assert run(["plan", "x.yaml", "--quiet", "--animate", "--no-plot"]) == 1
-    assert [path.name for path in Path("out").iterdir()] == ["plan.json"]
 
 
 def test_a_page_on_demand(folder, capsys):

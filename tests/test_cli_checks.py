@@ -9,7 +9,6 @@ import pytest
 
 from maneuver_automaton.cli import run
 from tests.formats.test_documents import WRITERS
-from tests.roads.files import scene_of
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 LOOP = str(SCENARIOS / "parking_loop.yaml")
@@ -73,19 +72,3 @@ def test_statistics_say_why_they_cannot_be_checked(tmp_path, capsys):
     WRITERS["statistics"](tmp_path, tmp_path / "statistics.json")
     assert run(["check", str(tmp_path / "statistics.json")]) == 2
     assert "holds statistics, which do not say what was driven" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("kind", ["road-plan", "drive", "road-fleet", "road-fleet-drive"])
-def test_what_was_made_on_roads(kind, tmp_path, capsys):
-    scene_of(tmp_path)
-    (road,) = tmp_path.glob("*.xml")
-    file = tmp_path / "result.json"
-    WRITERS[kind](tmp_path, file)
-    assert run(["check", str(file)]) == 2
-    assert "need --with" in capsys.readouterr().err
-    assert run(["check", str(file), "--with", str(road)]) == 0
-    said = capsys.readouterr().out
-    assert ": driven" in said
-    assert "reached at" in said
-    assert run(["check", str(file), "--with", LOOP]) == 2
-    assert capsys.readouterr().err.count("\n") == 1

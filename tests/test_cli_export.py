@@ -133,28 +133,6 @@ def test_a_bag_is_a_folder_beside_the_file(loop):
     assert {one.name for one in folder.iterdir()} == {"closed_loop_ros2.db3", "metadata.yaml"}
 
 
-@pytest.mark.parametrize("name", ["plan", "closed_loop"])
-@pytest.mark.filterwarnings("ignore")  # of the libraries that write
-def test_a_plan_and_a_drive_on_roads_are_written(road, name, tmp_path, capsys):
-    asked = ["export", str(road / f"{name}.json"), "--with", str(road / "road.xml"), "--to"]
-    assert run([*asked, "csv", "--out", str(tmp_path), "--step", "0.1"]) == 0
-    header, rows = lines(tmp_path / f"{name}.csv")
-    assert "state_steering" in header
-    document = json.loads((road / f"{name}.json").read_text())
-    assert len(rows) == round(document["duration_s"] / 0.1) + 1
-    last = [float(cell) for cell in rows[-1].split(",")[1:4]]
-    end = document["steps"][-1]["pose"] if name == "closed_loop" else None
-    end = end or document["trajectory"]["pose"][-1]
-    np.testing.assert_allclose(last, end, atol=1e-9)
-    assert run([*asked, "geojson", "--out", str(tmp_path / "road.geojson")]) == 0
-    assert len(features(tmp_path / "road.geojson", "lanelet")) == 2
-    pytest.importorskip("commonroad.common.solution")
-    assert run([*asked, "commonroad", "--out", str(tmp_path)]) == 0
-    text = (tmp_path / f"{name}_commonroad.xml").read_text()
-    assert text.count("<ksState>") == len(rows)
-    assert capsys.readouterr().err == ""
-
-
 @pytest.mark.filterwarnings("ignore")
 def test_a_drive_that_missed_its_goal_is_told(road, tmp_path, capsys):
     pytest.importorskip("commonroad.common.solution")

@@ -11,17 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from maneuver_automaton.cli import fleets, run
 from maneuver_automaton.fleet import plan_fleet, simulate_fleet
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.receding_horizon import Disturbance
-from maneuver_automaton.scenario import load_scenario, to_yaml
-from tests.scenario.files import SCENARIO
+from maneuver_automaton.scenario import load_scenario
 from tests.test_cli_fleets import FLEET, SCENARIOS
-from tests.test_cli_mpc import LOOP as ONE
 
 NEAR = "tolerance_m: 0.05, tolerance_rad: 0.05}"
 LOOP = (
@@ -63,11 +60,6 @@ def document(out="out"):
     return json.loads((Path(out) / "closed_loop.json").read_text(encoding="utf-8"))
 
 
-def frames_of(path):
-    with Image.open(path) as film:
-        return film.n_frames
-
-
 def poses(log):
     return {name: [one.start for one in log.driven[name]] for name in log.problem.names}
 
@@ -97,6 +89,7 @@ class TestMpc:
         ):
             assert said in out
 
+    @pytest.mark.exhaustive
     @pytest.mark.slow
     def test_the_loop_is_that_of_the_library(self, driven, monkeypatch):
         """Bit for bit, from the same first plans: these go by the clock."""
@@ -118,50 +111,6 @@ class TestMpc:
         assert document()["cost"] == log.cost
         assert [one.names for _, one in written.swaps] == [one.names for _, one in log.swaps]
 
-    def test_a_moved_file_has_the_moved_loop(self, folder, monkeypatch):
-        calm = LOOP.replace(", disturbance: {position_m: 0.003, seed: 3}", "")
-        Path("x.yaml").write_text(calm)
-        scenario = load_scenario("x.yaml")
-        by = SE2(np.array([30.0, -20.0, 1.1]))
-        first = plan_fleet(scenario.fleet, time_limit=20.0, max_rounds=2)
-        monkeypatch.setattr(
-            fleets, "plan_fleet", lambda one, **_: plan_fleet(one, time_limit=20.0, max_rounds=2)
-        )
-        text = to_yaml(scenario)
-        Path("moved.yaml").write_text(_moved(scenario, by))
-        assert text != Path("moved.yaml").read_text()
-        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--time-limit", "20"]) == 0
-        one = document()
-        assert run(["mpc", "moved.yaml", "--quiet", "--no-plot", "--time-limit", "20"]) == 0
-        other = document()
-        assert first.plans.keys() == one["vehicles"].keys()
-        assert other["cost"] == pytest.approx(one["cost"], rel=1e-9)
-        for name in one["vehicles"]:
-            ways = [
-                [step["vehicle_pose"] for step in found["vehicles"][name]["steps"]]
-                for found in (one, other)
-            ]
-            there = (by @ SE2(np.array(ways[0]))).pose
-            np.testing.assert_allclose(np.cos(ways[1]), np.cos(there), atol=1e-6)
-
-    def test_joins_and_breaks(self, folder):
-        text = LOOP.replace("name: east,", "name: east, receding_horizon: {breaks_s: 2.0},")
-        text = text.replace("name: north,", "name: north, receding_horizon: {joins_s: 1.0},")
-        Path("x.yaml").write_text(text)
-        assert run(["mpc", "x.yaml", "--quiet", "--no-plot"]) == 0
-        found = document()["vehicles"]
-        assert found["east"]["status"] == "broken_down"
-        assert found["north"]["steps"][0]["time_s"] == 1.0
-        assert found["north"]["reached"]
-
-    def test_steps_spent(self, folder, capsys):
-        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--steps", "2"]) == 1
-        assert capsys.readouterr().err == (
-            "x.yaml: steps_spent: east, north did not arrive in 2 steps\n"
-        )
-        found = document()
-        assert (found["reached"], len(found["steps"])) == (False, 3)
-
     def test_a_broken_guarantee_is_no_success(self, driven, capsys):
         """One is pushed onto the other."""
         east, north = (driven["vehicles"][name]["steps"][5] for name in ("east", "north"))
@@ -175,16 +124,6 @@ class TestMpc:
         printed = capsys.readouterr().err
         assert "broke a guarantee: " in printed
         assert "east and north touch at " in printed
-
-    @pytest.mark.exhaustive
-    @pytest.mark.slow
-    def test_page_and_film(self, folder):
-        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate", "--steps", "4"]) == 1
-        assert not Path("out/closed_loop.png").exists()
-        assert frames_of("out/closed_loop.gif") > 10
-        assert "A crossing" in Path("out/closed_loop.html").read_text(encoding="utf-8")
-        assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--steps", "4"]) == 1
-        assert not Path("out/closed_loop.gif").exists()  # of an earlier loop
 
     @pytest.mark.parametrize("option", [["--seeds", "3"], ["--gap", "0.1"]])
     def test_options_of_one_vehicle(self, folder, capsys, option):
@@ -215,18 +154,6 @@ class TestMpc:
         said = "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans\n"
         assert capsys.readouterr().err == said
 
-    def test_a_folder(self, folder, capsys):
-        Path("files").mkdir()
-        Path("files/fleet.yaml").write_text(LOOP)
-        Path("files/one.yaml").write_text(ONE)
-        Path("files/none.yaml").write_text(FLEET)
-        Path("files/plan.yaml").write_text(SCENARIO)
-        assert run(["mpc", "files", "--no-plot"]) == 0
-        printed = capsys.readouterr().out
-        rows = [row.split()[:2] for row in printed.splitlines() if ".yaml " in row]
-        assert rows == [["fleet.yaml", "reached"], ["one.yaml", "reached"]]
-        assert document("out/fleet")["kind"] == "fleet"
-
 
 @pytest.mark.parametrize(
     "file",
@@ -244,25 +171,7 @@ def test_every_scenario_with_a_loop(file, folder):
     assert run(["check", "out/closed_loop.json"]) == 0
 
 
-def _moved(scenario, by):
-    """The file of a fleet that is moved, without obstacles' shapes that have no place for it."""
-    text = to_yaml(scenario)
-    for problem in scenario.fleet.problems:
-        for pose in (problem.start, problem.goals[0].pose):
-            text = text.replace(f"pose: {pose.tolist()}", f"pose: {(by @ SE2(pose)).pose.tolist()}")
-    disc = scenario.fleet.problems[0].obstacles[0].shape
-    there = by.act(np.asarray(disc.center))
-    return text.replace(f"center: {np.asarray(disc.center).tolist()}", f"center: {there.tolist()}")
-
-
 class TestCheck:
-    def test_what_was_driven_is_found_good(self, driven, capsys):
-        assert run(["check", "out/closed_loop.json"]) == 0
-        printed = capsys.readouterr().out
-        assert ": apart" in printed
-        assert "east: goal" in printed
-        assert " NO " not in printed
-
     def test_a_falsified_log_is_caught(self, driven, capsys):
         """One vehicle is shifted onto the other for a step."""
         east, north = (driven["vehicles"][name]["steps"] for name in ("east", "north"))
@@ -334,14 +243,6 @@ def test_a_damaged_file_is_told_in_one_line(driven, capsys, change):
 
 
 class TestPlot:
-    def test_picture_film_and_page(self, driven):
-        drawn = Path("out/closed_loop.png").read_bytes()
-        assert run(["plot", "out/closed_loop.json", "--out", "again.png"]) == 0
-        same = Path("again.png").read_bytes() == drawn  # pytest would compare them byte by byte
-        assert same
-        assert run(["plot", "out/closed_loop.json", "--html", "--out", "y.html"]) == 0
-        assert "A crossing" in Path("y.html").read_text(encoding="utf-8")
-
     def test_a_damaged_file(self, driven, capsys):
         driven["vehicles"]["east"]["steps"][0].pop("plan")
         Path("out/closed_loop.json").write_text(json.dumps(driven))

@@ -110,14 +110,6 @@ class TestPlan:
         assert found["gap"] is None
         assert list(load_plans("out/plan.json")) == ["east"]
 
-    def test_nobody_has_one(self, folder, capsys):
-        text = FLEET.replace("[0.0, 2.0, 1.5]", "[0.0, 3.0, 1.5]").replace("[4, 0, 0]", "[0, 3, 0]")
-        Path("x.yaml").write_text(text)
-        assert run(["plan", "x.yaml", "--quiet", *QUICK]) == 1
-        found = document()
-        assert (found["status"], found["sum_s"], found["last_s"]) == ("no_plan", 0.0, 0.0)
-        assert capsys.readouterr().err.startswith("x.yaml: no_plan: east: ")
-
     @pytest.mark.parametrize(
         ("options", "message"),
         [
@@ -195,18 +187,6 @@ class TestPlan:
 
 
 class TestCheck:
-    def test_a_fleet(self, folder, capsys):
-        assert run(["check", "x.yaml"]) == 0
-        printed = capsys.readouterr().out
-        for said in (
-            "symmetry: vector field",
-            "start: keeps clear of obstacles",
-            "starts: are apart",
-            "goals: are apart",
-            "plans of all 2 vehicles exist",
-        ):
-            assert said in printed
-
     def test_it_says_who_begins_or_ends_where_nobody_can_be(self, folder, capsys):
         text = FLEET.replace("[0.0, 2.0, 1.5]", "[0.0, 3.0, 1.5]").replace(
             "[-4, 0, 0]", "[0, -3.5, 0]"
@@ -270,21 +250,6 @@ class TestCheck:
         assert capsys.readouterr().err == said
 
 
-class TestPlot:
-    def test_the_plans_again(self, folder, capsys):
-        assert run(["plan", "x.yaml", "--quiet", *QUICK]) == 0
-        assert run(["plot", "out/plan.json"]) == 0
-        assert run(["plot", "out/plan.json", "--out", "y.pdf", "--with", "x.yaml"]) == 0
-        assert Path("out/plan.png").exists()
-        assert Path("y.pdf").exists()
-        assert run(["plot", "out/plan.json", "--html", "--out", "y.html"]) == 0
-        assert "A crossing" in Path("y.html").read_text(encoding="utf-8")
-        Path("x.yaml").unlink()
-        assert run(["plot", "out/plan.json"]) == 2
-        said = "out/plan.json: source: there is no x.yaml, need --with and that file\n"
-        assert capsys.readouterr().err == said
-
-
 class TestConvert:
     def test_to_a_scenario_and_again(self, folder):
         Path("cars.yaml").write_text(PROBLEM)
@@ -334,18 +299,6 @@ class TestFile:
             result.status, result.closest, result.order
         )  # fmt: skip
         assert (again.sum_s, again.value, again.gap) == (result.sum_s, result.value, result.gap)
-
-    def test_a_moved_fleet_has_the_moved_file(self, result):
-        """All numbers that have no place are the same."""
-        from maneuver_automaton.groups import SE2
-
-        by = SE2([3.0, -2.0, 0.5])
-        moved = plan_fleet(result.problem.moved(by), time_limit=20.0, max_rounds=3)
-        one, two = fleet_to_dict(result), fleet_to_dict(moved)
-        for key in ("status", "objective", "order"):
-            assert one[key] == two[key]
-        for key in ("cost", "sum_s", "last_s", "lower_bound"):
-            assert two[key] == pytest.approx(one[key], rel=1e-6)
 
     @pytest.mark.parametrize(
         ("content", "message"),

@@ -51,12 +51,3 @@ def test_a_picture_carries_the_name_of_its_scenario_unless_told_otherwise(tmp_pa
 def test_a_look_that_cannot_be_is_bad_input(command, options, said, capsys):
     assert run([*command, str(SCENARIOS / "parking_loop.yaml"), *options]) == 2
     assert said in capsys.readouterr().err
-
-
-def test_a_library_is_drawn_under_the_name_of_its_scenario(tmp_path):
-    draw = ["automaton", "draw", str(SCENARIOS / "parking.yaml"), "--out"]
-    assert run([*draw, str(tmp_path / "a.svg")]) == 0
-    assert ">Parallel parking of the mobile robot</text>" in (tmp_path / "a.svg").read_text()
-    assert run([*draw, str(tmp_path / "a.png"), *PAPER]) == 0
-    with Image.open(tmp_path / "a.png") as picture:
-        assert picture.size == (3.5 * DPI, 4 * DPI)

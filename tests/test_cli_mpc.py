@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from pathlib import Path
 from typing import Any
@@ -67,19 +66,6 @@ def test_it_drives_to_the_goal(folder, capsys):
     assert document["cost"] == pytest.approx(document["steps"][0]["value"])
     assert document["audit"]["failed"] == 0
     assert document["audit"]["pieces"] == len(document["steps"]) - 1
-
-
-def test_quiet_prints_nothing(folder, capsys):
-    assert run(["mpc", "x.yaml", *QUICK, "--out", "here"]) == 0
-    printed = capsys.readouterr()
-    assert (printed.out, printed.err) == ("", "")
-    assert files("here") == ["closed_loop.json"]
-
-
-def test_pictures_of_an_earlier_loop_are_removed(folder):
-    assert run(["mpc", "x.yaml", "--quiet"]) == 0
-    assert run(["mpc", "x.yaml", *QUICK]) == 0
-    assert files() == ["closed_loop.json"]
 
 
 def test_steps(folder, capsys):
@@ -147,12 +133,6 @@ class TestSeed:
         assert untimed(log("a")) == untimed(log("b"))
         assert log("a")["steps"][1]["pose"] != log("c")["steps"][1]["pose"]
 
-    def test_that_of_the_file_unless_told(self, folder, capsys):
-        Path("x.yaml").write_text(SHAKEN)
-        run(["mpc", "x.yaml", "--out", "a", *QUICK])
-        run(["mpc", "x.yaml", "--out", "b", "--seed", "1", *QUICK])
-        assert untimed(log("a")) == untimed(log("b"))
-
     def test_what_noise_takes_is_not_called_broken(self, folder, capsys):
         Path("x.yaml").write_text(SHAKEN)
         run(["mpc", "x.yaml", "--no-plot"])
@@ -171,12 +151,6 @@ class TestSeed:
 
 
 class TestStatistics:
-    def test_it_is_the_loop_that_the_file_describes(self, folder, capsys):
-        Path("x.yaml").write_text(SCENARIO + "receding_horizon: {step_s: 0.5, retimed: true}\n")
-        said = [(run(["mpc", "x.yaml", *more]), capsys.readouterr().err) for more in ([], SEEDS)]
-        assert said[0] == said[1]
-        assert "retimed plans need a fixed horizon" in said[0][1]
-
     def test_over_seeds(self, folder, capsys):
         Path("x.yaml").write_text(SHAKEN)
         code = run(["mpc", "x.yaml", "--seeds", "3", "--seed", "5"])
@@ -185,23 +159,6 @@ class TestStatistics:
         assert [row["seed"] for row in document["loops"]] == [5, 6, 7]
         assert code == (0 if document["reached"] == 1.0 else 1)
         assert "loops:" in capsys.readouterr().out
-
-    def test_each_is_the_loop_of_its_seed(self, folder):
-        Path("x.yaml").write_text(SHAKEN)
-        run(["mpc", "x.yaml", "--seeds", "2", *QUICK])
-        run(["mpc", "x.yaml", "--seed", "1", "--out", "one", *QUICK])
-        rows = json.loads(Path("out/statistics.json").read_text())["loops"]
-        assert rows[1]["cost"] == log("one")["cost"]
-        assert rows[1]["steps"] == len(log("one")["steps"]) - 1
-
-    @pytest.mark.parametrize("address", ["local", "tcp://host:8786"])
-    def test_without_dask(self, folder, monkeypatch, capsys, address):
-        monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-        assert run(["mpc", "x.yaml", "--seeds", "2", "--dask", address, *QUICK]) == 2
-        assert capsys.readouterr().err == (
-            f"x.yaml: receding_horizon: scheduler: got '{address}', but Dask is not installed; "
-            "need `pip install 'maneuver-automaton[distributed]'`\n"
-        )
 
 
 class TestResume:
@@ -216,13 +173,6 @@ class TestResume:
         for one, other in zip(rest["steps"], whole["steps"][4:], strict=True):
             assert one == other
         assert rest["cost"] == whole["cost"]
-
-    def test_at_the_goal_there_is_nothing_left(self, folder):
-        run(["mpc", "x.yaml", *QUICK])
-        cost = log()["cost"]
-        assert run(["mpc", "x.yaml", "--resume", "out/closed_loop.json", *QUICK]) == 0
-        assert len(log()["steps"]) == 1
-        assert log()["cost"] == cost
 
     @pytest.mark.parametrize(
         ("make", "message"),
@@ -260,15 +210,6 @@ class TestResume:
 
 
 class TestFolder:
-    def test_each_scenario_into_its_own(self, folder):
-        Path("many").mkdir()
-        for name in ("a.yaml", "b.yml"):
-            Path("many", name).write_text(LOOP)
-        Path("many/notes.txt").write_text("no scenario")
-        assert run(["mpc", "many", *QUICK]) == 0
-        assert files() == ["a", "b"]
-        assert log("out/a")["reached"] is True
-
     def test_one_bad_file_does_not_stop_the_others(self, folder, capsys):
         Path("many").mkdir()
         Path("many/a.yaml").write_text("schema: 1\n")
@@ -279,22 +220,6 @@ class TestFolder:
         lines = capsys.readouterr().err.splitlines()
         assert lines[0].startswith(f"{Path('many/a.yaml')}:1: ")
         assert "no_plan" in lines[1]
-
-    def test_nothing_in_it(self, folder, capsys):
-        Path("none").mkdir()
-        assert run(["mpc", "none"]) == 2
-        assert capsys.readouterr().err == (
-            "none: holds no file that states a problem, need a scenario (.yaml, .yml) or another "
-            "format that is read\n"
-        )
-
-    def test_two_files_of_one_name(self, folder, capsys):
-        Path("many").mkdir()
-        for name in ("a.yaml", "a.yml"):
-            Path("many", name).write_text(LOOP)
-        assert run(["mpc", "many", *QUICK]) == 2
-        message = f"{Path('many/a.yml')}: has the same name as a.yaml, need another one\n"
-        assert capsys.readouterr().err == message
 
 
 @pytest.mark.parametrize(
@@ -353,18 +278,6 @@ def test_a_tiny_budget_still_arrives(folder):
     assert run(["mpc", "x.yaml", "--time-limit", "1e-9", *QUICK]) == 0
     kinds = {one["guarantee"] for one in log()["broken_guarantees"]}
     assert kinds <= {"time budget"}
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_an_animation_on_demand(folder):
-    Path("x.yaml").write_text(LOOP.replace("step_s: 0.5", "step_s: 2.0"))
-    assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--animate"]) == 0
-    assert {"closed_loop.gif", "closed_loop.html", "closed_loop.json"} <= set(files())
-    assert "closed_loop.png" not in files()
-    assert run(["mpc", "x.yaml", "--quiet", "--no-plot", "--html"]) == 0
-    assert "closed_loop.gif" not in files()
-    assert "closed_loop.html" in files()
 
 
 def test_a_closed_loop_has_no_alternatives(folder, capsys):

@@ -41,6 +41,7 @@ def plan(folder, processors):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
+@pytest.mark.exhaustive
 @linux
 @pytest.mark.slow
 def test_pictures_are_the_same_wherever_they_are_drawn(tmp_path):

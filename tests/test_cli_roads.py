@@ -6,10 +6,8 @@ import json
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from maneuver_automaton.cli import run
-from maneuver_automaton.plotting.pages import DPI
 from tests.roads.files import GOAL, LANES, car, commonroad, interval, problem
 
 QUICK = ["--no-plot", "--quiet"]
@@ -35,13 +33,6 @@ def test_a_scenario_is_driven(folder, capsys):
     assert last["control"] is None
     assert last["accumulated_cost"] == pytest.approx(document["cost"])
     assert "reached" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_pictures_are_drawn(folder):
-    assert run(["mpc", "road.xml", "--steps", "5", "--animate", "--quiet"]) == 1
-    for name in ("closed_loop.png", "closed_loop.gif", "closed_loop.html"):
-        assert Path("out", name).stat().st_size > 1000
 
 
 def test_a_goal_that_is_missed_ends_with_one(folder, capsys):
@@ -83,19 +74,6 @@ def test_a_contact_ends_with_one_in_every_output(folder, capsys):
     assert capsys.readouterr().err.endswith(f"two.xml: touched: 100: {said}\n")
 
 
-def test_one_plan(folder):
-    assert run(["plan", "road.xml", "--animate", "--html", "--quiet"]) == 0
-    document = json.loads(Path("out/plan.json").read_text())
-    assert document["status"] == "found"
-    assert document["audit"]["passed"] is True
-    lasting = sum(one["duration_s"] for one in document["primitives"])
-    assert lasting == pytest.approx(document["duration_s"])
-    assert document["trajectory"]["time_s"][-1] == pytest.approx(lasting)
-    assert Path("out/plan.png").is_file()
-    assert Path("out/plan.gif").is_file()
-    assert Path("out/plan.html").is_file()
-
-
 def test_one_of_several_problems(folder, capsys):
     Path("two.xml").write_text(commonroad(*LANES, problem(1, goal=LATE), problem(2)))
     assert run(["check", "two.xml"]) == 2
@@ -131,11 +109,3 @@ def test_bad_input_is_told_in_one_line(folder, capsys, arguments, said):
     )
     assert run(arguments) == 2
     assert capsys.readouterr().err.startswith(said)
-
-
-def test_a_drive_is_drawn_in_the_look_asked_for(folder):
-    look = ["--title", "A drive", "--size", "5x6", "--style", "paper"]
-    assert run(["plan", "road.xml", "--quiet", "--html", *look]) == 0
-    with Image.open("out/plan.png") as picture:
-        assert picture.size == (5 * DPI, 6 * DPI)
-    assert "<title>A drive</title>" in Path("out/plan.html").read_text()

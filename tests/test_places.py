@@ -25,8 +25,6 @@ from maneuver_automaton import (
     Polygon,
     Problem,
     SearchSettings,
-    Unicycle,
-    load_scenario,
     plan,
     verify,
 )
@@ -40,12 +38,6 @@ WALLS = (
     Obstacle(Box([30.0, 1.0], [8.0, 2.5])),
     Obstacle(Disc(0.7, [9.0, -2.5])),
     Obstacle(Polygon([[14, -1.5], [16, -4], [12, -4]])),
-)
-MEADOW = shapely.MultiPolygon(
-    [
-        shapely.Polygon([[3.0, -6.0], [13.0, -6.0], [13.0, 2.5], [3.0, 3.5]]),
-        shapely.box(6.5, 3.2, 9.5, 6.0),
-    ]
 )
 LAWN = Polygon([[2.0, -3.0], [7.5, -3.0], [6.0, 3.0], [3.0, 3.0]])
 
@@ -209,38 +201,6 @@ def test_plans_say_what_they_cost_and_where():
     assert "place_price" not in plain["audit"]
     planner = Planner(CAR, obstacles=WALLS, footprint=BODY, place_costs=Clearance(2.0, 1.0))
     assert planner.problem([0, 0, 0], [18, 0.5, 0]).place_costs == planner.place_costs
-
-
-@pytest.mark.slow  # 5 s each: long ways are improved
-@pytest.mark.parametrize("ends", ["outside", "inside"])
-def test_the_way_leads_round_a_wide_patch_of_mud(ends):
-    """Past two corners, 41.05 m; dearer ground aside, or mud at the ends, must not hide that."""
-    mud = Ground(Box([10.0, 12.0], [20.0, -2.0]), price=5.0)
-    aside = Ground(Disc(3.0, [7.0, -16.0]), price=100.0)
-    at_ends = Ground([Box([6.0, 6.0]), Box([6.0, 6.0], [40.0, 0.0])], price=3.0)
-    controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1), "spin": (0, 1), "back": (-1, 0)}
-    here = Problem(
-        Automaton.of_controls(Unicycle(), controls),
-        [0, 0, 0],
-        [40, 0, 0],
-        place_costs=(mud, aside if ends == "outside" else at_ends),
-        search=SearchSettings(max_expansions=300),
-    )
-    corners = 2.0 * math.hypot(15.0, 4.0) + 10.0
-    least = corners if ends == "outside" else corners + 2.0 * 3.0 * math.hypot(3.0, 0.8)
-    assert plan(here, time_limit=60.0).cost == pytest.approx(least, rel=0.02)
-
-
-@pytest.mark.slow
-def test_the_way_leads_round_ground_that_has_a_price():
-    """Straight across it costs 31, round both pieces 20.4 along cells: which leads the search."""
-    here = load_scenario("scenarios/priced_ground.yaml").problem
-    here = replace(here, search=replace(here.search, max_expansions=100))
-    result = plan(here, time_limit=60.0)
-    assert result.cost < 21.5
-    way = shapely.LineString(result.plan.sample().pose[:, :2])
-    across = sum(way.intersection(one).length for one in MEADOW.geoms)
-    assert across < 0.5
 
 
 @pytest.mark.parametrize(

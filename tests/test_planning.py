@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
-import subprocess
-import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from maneuver_automaton.audit import audit_plan
@@ -183,25 +181,6 @@ def test_dubins_and_reeds_shepp_turn_round():
     assert shepp.plan.durations == pytest.approx([math.pi / 3] * 3)
 
 
-@pytest.mark.parametrize(("dearness", "cost"), [(0.1, math.pi + 0.2), (10.0, 7 * math.pi / 3)])
-def test_costly_changes_of_direction_are_avoided(dearness, cost):
-    result = found(
-        CAR, [0, 0, 0], [0, 0, math.pi],
-        cost=Cost(length=1.0, direction_change=dearness), horizon=Horizon(max_trims=3),
-    )  # fmt: skip
-    assert result.cost == pytest.approx(cost)
-
-
-def test_costly_switches_are_avoided():
-    free = found(ROBOT, [0, 1, 0], [0, 0, 0], cost=Cost(time=1.0), horizon=Horizon(max_trims=4))
-    assert len(free.plan.word) == 4
-    cost = Cost(time=1.0, switch=10.0)
-    costly = found(ROBOT, [0, 1, 0], [0, 0, 0], cost=cost, horizon=Horizon(max_trims=4))
-    # two half circles of radius 0.25 m in reverse
-    assert costly.plan.word == ("anticlockwise", "clockwise")
-    assert costly.cost == pytest.approx(2 * math.pi + 10.0)
-
-
 PRICES = [
     {"switch": 10.0},
     {"direction_change": 10.0},
@@ -247,18 +226,6 @@ class Toll:
 def test_a_user_s_price_of_switches_counts(horizon):
     result = found(ROBOT, [0, 1, 0], [0, 0, 0], cost=Toll(), horizon=horizon)
     assert result.cost == pytest.approx(2 * math.pi + 10.0)
-
-
-def test_a_user_s_rates_count():
-    class Slow(Toll):
-        def rates(self, controls, body_velocities):
-            return 1.0 + controls[:, 0] ** 2
-
-        def switching(self, body_velocities):
-            return 0.0
-
-    result = found(ROBOT, [0, 0, 0], [3, 0, 0], cost=Slow())
-    assert result.cost == pytest.approx(2.0 * (1.0 + 1.5**2))
 
 
 def test_of_trims_that_move_alike_the_cheapest_is_taken():
@@ -374,46 +341,10 @@ def test_start_equal_to_goal_is_an_empty_word(turns, search):
     assert result.certificate is None
 
 
-def test_start_equal_to_goal_rests_for_a_fixed_time():
-    result = found(
-        ROBOT, [5, 1, 2], [5, 1, 2], cost=Cost(effort=1.0, time=0.5), horizon=Horizon(time=3.0)
-    )
-    assert result.plan.word == ("rest",)
-    assert result.plan.durations.tolist() == [3.0]
-    assert result.cost == result.lower_bound == 1.5
-
-
-def test_of_several_goals_the_cheapest_is_chosen():
-    goals = [[0, 2, 0], [3, 0, 0], [0, -2, 1.0], [-3, 0, 0]]
-    horizon = Horizon(max_trims=3)
-    alone = [found(ROBOT, [0, 0, 0], goal, horizon=horizon).cost for goal in goals]
-    result = found(ROBOT, [0, 0, 0], goals, horizon=horizon, alternatives=2)
-    assert result.goal_index == int(np.argmin(alone)) == 1
-    assert result.cost == pytest.approx(min(alone))
-    assert result.alternatives[0].cost == pytest.approx(sorted(alone)[1])
-
-
 def test_goals_outside_the_bounds_do_not_count():
     result = found(ROBOT, [0, 0, 0], [[9, 0, 0], [3, 0, 0]], bounds=Bounds(x=(-1, 4)))
     assert result.goal_index == 1
     assert result.plan.word == ("straight",)
-
-
-@pytest.mark.parametrize("automaton", [ROBOT, CAR], ids=["robot", "car"])
-@pytest.mark.parametrize("horizon", [Horizon(max_trims=3), Horizon(time=12.0, max_trims=4)])
-def test_a_free_heading_is_never_dearer_than_a_fixed_one(automaton, horizon):
-    cost = Cost(effort=1.0, time=0.5)
-    if automaton is CAR:
-        horizon = replace(horizon, time=None)
-    free = found(
-        automaton, [0, 0, 0], Goal(pose=[0.4, 1.3, 0.0], free_heading=True),
-        cost=cost, horizon=horizon,
-    )  # fmt: skip
-    for heading in (*np.linspace(-3.0, 3.0, 7), free.plan.end[2]):
-        fixed = planned(automaton, [0, 0, 0], [0.4, 1.3, heading], cost=cost, horizon=horizon)
-        if fixed.plan is not None:
-            assert free.cost <= fixed.cost + 1e-9
-    assert free.cost == pytest.approx(fixed.cost)  # the last one is its own
 
 
 def test_far_from_the_origin_no_digit_is_lost():
@@ -631,51 +562,6 @@ def test_more_trims_than_words_can_take():
 # --- alternatives, budgets, repetition ---
 
 
-def test_alternatives_are_the_next_best():
-    # `planned` checks that they rise, that there are at most K, and that none is there twice
-    ten = found(ROBOT, [0, 1, 0], [0, 0, 0], horizon=Horizon(max_trims=4), alternatives=10)
-    assert len(ten.alternatives) == 10
-    three = found(ROBOT, [0, 1, 0], [0, 0, 0], horizon=Horizon(max_trims=4), alternatives=3)
-    for one, other in zip(three.alternatives, ten.alternatives, strict=False):
-        assert one.plan.word == other.plan.word
-        assert one.cost == pytest.approx(other.cost)
-    assert found(ROBOT, [0, 1, 0], [0, 0, 0]).alternatives == ()
-
-
-@pytest.mark.parametrize("problem", [
-    PARKING,
-    HURRY,
-    replace(HURRY, horizon=Horizon()),
-    replace(PARKING, horizon=Horizon(time=8.0)),
-    replace(HURRY, horizon=Horizon(max_trims=3, min_coast=0.5)),
-    replace(HURRY, horizon=Horizon(max_time=5.0)),
-    replace(HURRY, search=SearchSettings(max_expansions=40)),
-])  # fmt: skip
-def test_planning_twice_gives_the_same_to_the_last_bit(problem):
-    first, second = (plan(problem, time_limit=LIMIT, alternatives=2) for _ in range(2))
-    assert first.status is second.status is PlanStatus.FOUND
-    assert first.counts == second.counts
-    assert (first.cost, first.lower_bound, first.certificate) == (
-        second.cost, second.lower_bound, second.certificate
-    )  # fmt: skip
-    for one, other in zip(
-        (first, *first.alternatives), (second, *second.alternatives), strict=True
-    ):
-        assert one.plan.word == other.plan.word
-        assert one.plan.durations.tobytes() == other.plan.durations.tobytes()
-
-
-def test_more_trims_and_more_words_are_never_dearer():
-    costs = [
-        found(ROBOT, [0, 1, 0], [0.3, -0.2, 1.0], horizon=Horizon(max_trims=n)).cost for n in (3, 4)
-    ]
-    costs.append(found(ROBOT, [0, 1, 0], [0.3, -0.2, 1.0]).cost)
-    assert costs[0] >= costs[1] - 1e-9
-    assert costs[1] >= costs[2] - 1e-9
-    more = robot(TABLE_2 | {"back": (-1.5, 0.0)})
-    assert found(more, [0, 1, 0], [0.3, -0.2, 1.0], horizon=Horizon(max_trims=4)).cost <= costs[1]
-
-
 # --- laws ---
 
 
@@ -780,41 +666,3 @@ def test_the_way_back_costs_as_much(name, data):
 
 def robot_of_twists(twists):
     return robot({f"{k}": (v, w) for k, (v, _, w) in enumerate(twists)})
-
-
-@pytest.mark.slow
-@settings(max_examples=15)
-@given(problem=problems(FAMILIES["robot, words"]), factor=st.floats(0.01, 100.0))
-def test_the_unit_of_cost_does_not_matter(problem, factor):
-    assume(problem.horizon.time is None)
-    costlier = replace(COST, **{k: factor * getattr(COST, k) for k in ("effort", "time", "length")})
-    one, other = (plan(replace(problem, cost=cost), time_limit=LIMIT) for cost in (COST, costlier))
-    assert one.plan.word == other.plan.word
-    assert other.cost == pytest.approx(factor * one.cost, rel=1e-9, abs=1e-9)
-
-
-@pytest.mark.slow
-@settings(max_examples=15)
-@given(data=st.data())
-def test_bounds_of_insertion_hold_for_words(data):
-    problem = data.draw(problems(Family(ROBOT, (Horizon(max_trims=4),))))
-    words = plan(problem, time_limit=LIMIT)
-    insertion = plan(
-        replace(problem, horizon=Horizon(), search=SearchSettings(method="insertion")),
-        time_limit=LIMIT,
-    )
-    assert_consistent(insertion)
-    assert insertion.lower_bound <= words.cost + 1e-9
-
-
-FULL = """
-from tests.test_planning import COST, GLIDER, Horizon, Problem, plan
-plan(Problem(GLIDER, [1.625, 0, 0, 0], [0, 0, 0, 0], cost=COST, horizon=Horizon(max_trims=4)))
-"""
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_a_full_buffer_is_no_crash():
-    done = subprocess.run([sys.executable, "-c", FULL], capture_output=True, check=False)
-    assert done.returncode == 0

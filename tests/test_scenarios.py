@@ -158,18 +158,6 @@ def test_its_cost_is_that_of_its_word(planned):
     assert result.lower_bound <= result.cost
 
 
-def test_the_plan_comes_back_from_its_file(planned, tmp_path):
-    scenario, result = planned
-    ma.save_plan(result, tmp_path / "plan.json")
-    read = ma.load_plan(tmp_path / "plan.json", model=scenario.problem.automaton.model)
-    assert read.word == result.plan.word
-    assert read.durations.tolist() == result.plan.durations.tolist()
-    assert read.start.tolist() == result.plan.start.tolist()
-    times = np.linspace(0.0, read.duration, 40)
-    np.testing.assert_allclose(read.pose_at(times), result.plan.pose_at(times), atol=1e-9)
-    np.testing.assert_array_equal(read.control_at(times), result.plan.control_at(times))
-
-
 def test_the_plan_from_the_file_passes_the_audit_again(planned, tmp_path):
     scenario, result = planned
     ma.save_plan(result, tmp_path / "plan.json")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -13,23 +12,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from maneuver_automaton._files import journal as opened
-from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.building import (
-    Entry,
-    all_pairs,
-    build_key,
     build_library,
     journal_path,
-    nearest_pairs,
-    pair_key,
     read_journal,
 )
 from maneuver_automaton.automaton.library import automaton_hash, load_library
 from maneuver_automaton.errors import UnknownTrim
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import CarWithTrailer, Hovercraft, UserModel
-from maneuver_automaton.optimal_control.maneuvers import ManeuverObjective, TransferSettings
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.primitives.equilibrium import trims_of
@@ -101,48 +92,6 @@ def test_a_killed_build_goes_on_and_comes_to_the_same_file(tmp_path):
     assert not journal.exists()
 
 
-def test_a_line_cut_short_is_made_again(tmp_path):
-    path = tmp_path / "journal"
-    entry = Entry(key="a", interval=0.1, control=np.array([[0.1, 1 / 3]]), defect=1e-9)
-    failed = Entry(key="b", interval=np.inf, control=np.zeros((0, 2)), reason="too far")
-    with opened(path) as write:
-        write([entry.line(), failed.line()])
-    whole = path.read_text()
-    path.write_text(whole + '{"key": "c", "rea')
-    assert set(read_journal(path)) == {"a", "b"}
-    assert np.array_equal(read_journal(path)["a"].control, entry.control)
-    assert read_journal(path)["b"].reason == "too far"
-    with opened(path) as write:
-        write([entry.line()])
-    assert path.read_text() == whole + entry.line() + "\n"
-    path.write_text("nonsense\n" + json.dumps({"key": 1}) + "\n" + whole)
-    assert set(read_journal(path)) == {"a", "b"}
-    assert read_journal(tmp_path / "none") == {}
-
-
-def test_a_journal_of_another_vehicle_counts_for_nothing():
-    objective, settings = ManeuverObjective(), TransferSettings()
-    key = build_key(CRAFT, objective, settings)
-    assert key == build_key(CRAFT, objective, settings)
-
-    def user(rate):
-        return UserModel(
-            name="cart", group=SE2, control_names=("push",), reduced_names=("speed",),
-            velocity=lambda z, u: [z[0], 0.0, 0.0], dynamics=lambda z, u: [rate * u[0]],
-        )  # fmt: skip
-
-    others = [
-        build_key(CRAFT, ManeuverObjective(effort=1.0), settings),
-        build_key(CRAFT, objective, TransferSettings(intervals=10)),
-        build_key(user(1.0), objective, settings),
-        build_key(user(2.0), objective, settings),
-    ]
-    assert len({key, *others}) == 5
-    pair = pair_key(key, TRIMS[0], TRIMS[1])
-    assert pair != pair_key(key, TRIMS[1], TRIMS[0])
-    assert pair != pair_key(key, TRIMS[0], TRIMS[1], keep_sign=("force",))
-
-
 def test_what_fails_is_named_and_the_rest_is_kept():
     fast = Trim(name="fast", body_velocity=[3.5, 0, 0], control=[3.5, 0], reduced_state=[3.5, 0, 0])
     pairs = [(TRIMS[1].name, "fast"), SOME[0]]
@@ -168,15 +117,6 @@ def test_a_trailer_goes_one_way():
     assert len(rests) == 2
     assert {m.source.split(",")[0] for m in every.maneuvers} == {"speed 3", "speed -1"}
     assert all(m.source.split(",")[0] == m.target.split(",")[0] for m in every.maneuvers)
-
-
-def test_near_pairs_come_in_both_directions():
-    nodes = Automaton(CRAFT, TRIMS)
-    assert len(all_pairs(nodes)) == 30
-    near = nearest_pairs(nodes, 2)
-    assert 12 <= len(near) < 30
-    assert {(b, a) for a, b in near} == set(near)
-    assert nearest_pairs(nodes, 5) == all_pairs(nodes)
 
 
 @pytest.mark.parametrize(

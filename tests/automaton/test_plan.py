@@ -11,11 +11,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import rollout
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
-from maneuver_automaton.primitives.connecting import _rates, pieces
 
 AHEAD = Trim(name="ahead", body_velocity=[2.0, 0.0, 0.0], control=[2.0, 0.0])
 LEFT = Trim(name="left", body_velocity=[1.0, 0.0, 1.0], control=[1.0, 1.0])
@@ -150,22 +147,6 @@ def test_the_way_back_is_the_plan_of_the_opposite_trims(pieces, start):
     np.testing.assert_allclose(back.end, plan.start, atol=1e-10)
 
 
-def test_an_empty_plan_stays_where_it_is():
-    plan = Plan([1.0, 2.0, 3.0], (), durations=[], start_time=5.0)
-    assert plan.word == ()
-    assert plan.duration == 0.0
-    assert plan.switching_times.tolist() == [5.0]
-    assert plan.end.tolist() == [1.0, 2.0, 3.0]
-    assert plan.pose_at([[0.0], [9.0]]).tolist() == [[[1.0, 2.0, 3.0]]] * 2
-    samples = plan.sample()
-    assert samples.time.tolist() == [5.0]
-    assert samples.pose.tolist() == [[1.0, 2.0, 3.0]]
-    assert samples.control.shape == samples.reduced_state.shape == (1, 0)
-    assert plan.moved(SE2([1.0, 0.0, 0.0])).end.tolist() == [2.0, 2.0, 3.0]
-    with pytest.raises(ValueError, match=r"^plan: an empty word has no control$"):
-        plan.control_at(5.0)
-
-
 @pytest.mark.parametrize(
     ("start", "durations", "message"),
     [
@@ -258,18 +239,3 @@ def test_a_maneuver_without_a_course_cannot_be_sampled():
     assert plan.end.tolist() == [2, 0, 0]
     with pytest.raises(ValueError, match=r"^maneuver 'hop': has no course, so it cannot be"):
         plan.sample()
-
-
-@pytest.mark.parametrize("name", ["helicopter", "second_order_car"])
-def test_poses_between_samples_are_those_of_the_equations(name):
-    library = load_stock_library(name)
-    rates, dof = _rates(library.model), library.model.group.dof
-    for maneuver in library.maneuvers[::40]:
-        ends = library[maneuver.source], library[maneuver.target]
-        plan = Plan(np.zeros(dof), ends, durations=[0.0, 0.0], maneuvers=(maneuver,))
-        state = np.concatenate([np.zeros(dof), ends[0].reduced_state])
-        for begin, end, control in pieces(maneuver.course.time, maneuver.course.control):
-            times = np.linspace(begin, end, 7)
-            driven = rollout(rates, state, control=control, times=times, rtol=1e-11, atol=1e-12)
-            assert np.abs(plan.pose_at(times) - driven[:, :dof]).max() < 1e-9
-            state = driven[-1]

@@ -14,8 +14,6 @@ import maneuver_automaton as ma
 from maneuver_automaton.groups import SE2
 from tests.exports.cases import VALUES, assert_close, drive_on_lanes, ends, slalom, trailer
 from tests.plotting.cases import parking_plan
-from tests.plotting.fleets import crossing
-from tests.roads.files import LANES, car, parked, problem
 
 
 def written(value, folder):
@@ -51,28 +49,6 @@ def test_every_feature_is_valid_and_the_path_leads_from_start_to_end(name, tmp_p
     assert_close(start[0].coords[0], first[kept])
 
 
-def test_what_is_around_a_plan_is_there(tmp_path):
-    result = slalom()
-    document = written(result, tmp_path)
-    ((swept, _),) = features(document, "swept")
-    bodies = features(document, "body")
-    assert len(bodies) == len(result.plan.trims) + 1
-    assert all(swept.buffer(1e-6).contains(body) for body, _ in bodies)
-    obstacles = features(document, "obstacle")
-    areas = [one.area for one, facts in obstacles if "time_s" not in facts]
-    assert_close(areas[0], 1.2**2 * 0.75)  # a polygon with a hole of half its size
-    assert_close(areas[1], np.pi * 0.09, atol=0.002)
-    assert_close(areas[2:], [0.4, 4 * 0.2**2])
-    moving = {facts["time_s"]: one.centroid for one, facts in obstacles if "time_s" in facts}
-    x, y = result.plan.start[:2]
-    crossing = SE2([x - 2.0, y + 1.5, 0.0]).act(np.array([0.1, 0.0]))
-    assert_close(moving[0.0].coords[0], crossing)
-    assert len(moving) > 3
-    ((goal, facts),) = features(document, "goal")
-    assert_close(goal.coords[0], result.plan.end[:2])
-    assert facts["heading_rad"] == result.problem.goals[0].pose[2]
-
-
 def test_the_trailer_is_swept_too(tmp_path):
     document = written(trailer(), tmp_path)
     parts = {facts["part"] for _, facts in features(document, "body")}
@@ -82,25 +58,6 @@ def test_the_trailer_is_swept_too(tmp_path):
         assert swept.buffer(1e-6).contains(body)
 
 
-def test_a_road_has_lanelets_goals_and_those_who_are_there(tmp_path):
-    gone = car(8, x=100.0, y=6.0, speed=6.0, steps=4)
-    drive = drive_on_lanes(
-        tmp_path, *LANES, car(7, x=35.0, y=2.0, speed=6.0, steps=40), gone,
-        parked(9, x=190.0, y=2.0), problem(),
-    )  # fmt: skip
-    document = written(drive, tmp_path)
-    assert document["name"] == "TST_Lanes-1_1_T-1"
-    lanes = features(document, "lanelet")
-    assert [facts["id"] for _, facts in lanes] == [1, 2]
-    assert_close([one.area for one, _ in lanes], [800.0, 800.0])
-    ((swept, _),) = features(document, "swept")
-    assert shapely.union_all([one for one, _ in lanes]).buffer(1e-6).contains(swept)
-    times = [f["time_s"] for _, f in features(document, "obstacle") if f["name"] == "car 8"]
-    assert times == [0.0]  # it leaves after 0.4 s
-    ((goal, facts),) = features(document, "goal")
-    assert_close([goal.area, *facts["time_s"]], [800.0, 2.0, 4.0])
-
-
 def test_no_limit_is_null(tmp_path):
     drive = drive_on_lanes(tmp_path)
     scene = drive.planner.scene
@@ -108,18 +65,6 @@ def test_no_limit_is_null(tmp_path):
     planner = replace(drive.planner, scene=replace(scene, goals=(goal,)))
     ((_, facts),) = features(written(replace(drive, planner=planner), tmp_path), "goal")
     assert facts["time_s"] == [2.0, None]
-
-
-def test_what_several_do_is_told_apart(tmp_path):
-    result = crossing()
-    document = written(result, tmp_path)
-    paths = {facts["vehicle"]: path for path, facts in features(document, "path")}
-    assert {name: one.coords[-1] for name, one in paths.items()} == {
-        name: tuple(plan.end[:2]) for name, plan in result.plans.items()
-    }
-    assert [facts["vehicle"] for _, facts in features(document, "start")] == list(result.results)
-    once = [facts["name"] for _, facts in features(document, "obstacle") if "time_s" not in facts]
-    assert once == [""]  # the wall, which all three have around them
 
 
 def test_a_moved_plan_has_moved_features(tmp_path):

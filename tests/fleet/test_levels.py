@@ -18,7 +18,6 @@ from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.fleet import (
     FleetProblem,
-    FleetResult,
     FleetStatus,
     plan_fleet,
     simulate_fleet,
@@ -30,11 +29,7 @@ from maneuver_automaton.fleet.meetings import meetings
 from maneuver_automaton.fleet.verdict import nearest
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
-from maneuver_automaton.planning.result import PlanResult, PlanStatus
-from maneuver_automaton.plotting.cast import cast_of
-from maneuver_automaton.plotting.over_time import nearest_others
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.recording import recording_of
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import car
 from tests.matrix.vehicles import VEHICLES
@@ -184,18 +179,6 @@ def test_who_climbs_is_met_at_the_height_of_the_other():
             assert nearest(rising, climbing(level, level)).distance == 0.0
         else:
             assert nearest(rising, climbing(level, level)).distance == pytest.approx(4.0, abs=0.05)
-
-
-def test_pictures_show_the_distance_in_space():
-    fleet = over_a_truck(2.5)
-    one = PlanResult(problem=fleet.problems[0], status=PlanStatus.FOUND, reason="")
-    plans = straight(fleet)
-    results = {name: replace(one, plan=plan) for name, plan in plans.items()}
-    result = FleetResult(problem=fleet, status=FleetStatus.FOUND, results=results)
-    times = np.arange(0.0, 12.0, 0.01)
-    shown = nearest_others(cast_of(recording_of(result)).actors, times)
-    assert shown.min() == pytest.approx(least_in_space(fleet, plans))
-    assert shown.min() == pytest.approx(2.5 - 1.5 - 0.3)
 
 
 @pytest.mark.exhaustive

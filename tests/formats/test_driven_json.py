@@ -39,21 +39,6 @@ def test_the_drive_is_that_of_the_loop():
     assert np.abs(np.diff(poses[:, 2])).max() <= 0.05 + 1e-12
 
 
-def test_plot_draws_a_closed_loop(tmp_path, capsys):
-    file = tmp_path / "closed_loop.json"
-    save_closed_loop(LOOP, file)
-    assert run(["plot", str(file)]) == 0
-    assert (tmp_path / "closed_loop.png").exists()
-    assert run(["plot", str(file), "--out", str(tmp_path / "loop.svg")]) == 0
-    assert "ahead" in (tmp_path / "loop.svg").read_text()
-    assert run(["plot", str(file), "--animate"]) == 0
-    assert run(["plot", str(file), "--html"]) == 0
-    assert capsys.readouterr().err == ""
-    page = (tmp_path / "closed_loop.html").read_text()
-    assert "the motion alone; body and obstacles with the scenario" in page
-    assert "turn rate [rad/s]" in page
-
-
 def test_what_is_played_of_a_file_is_where_the_vehicle_was():
     plan = plan_of_document(driven_document(closed_loop_to_dict(LOOP)))
     for time, pose in zip(LOOP.times, LOOP.poses, strict=True):
@@ -81,17 +66,6 @@ def test_with_its_scenario_it_is_the_loop_that_it_was(tmp_path):
     assert loop.inside == LOOP.inside
     for ours, theirs in zip(loop.driven, LOOP.driven, strict=True):
         np.testing.assert_array_equal(ours.end, theirs.end)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("ending", ["png", "gif"])
-def test_plot_with_a_scenario_draws_as_mpc_does(tmp_path, ending):
-    scenario, out = str(SCENARIOS / "parking_loop.yaml"), str(tmp_path)
-    animate = ["--animate"] if ending == "gif" else []
-    assert run(["mpc", scenario, "--steps", "2", "--quiet", "--out", out, "--no-plot"]) == 1
-    argv = ["plot", f"{out}/closed_loop.json", "--with", scenario, *animate]
-    assert run(argv) == 0
-    assert (tmp_path / f"closed_loop.{ending}").exists()
 
 
 def test_another_scenario_is_told(tmp_path, capsys):

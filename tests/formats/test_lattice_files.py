@@ -31,7 +31,7 @@ from maneuver_automaton.formats.sbpl_mprim import (
     read_mprim,
     save_mprim,
 )
-from maneuver_automaton.models import LatticeBody, Unicycle
+from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan
 from maneuver_automaton.primitives.connecting import maneuver_defect
 from maneuver_automaton.problem import Problem
@@ -150,16 +150,6 @@ def test_primitives_of_sbpl_keep_their_headings_and_end_on_the_grid(tmp_path):
     for one in automaton.maneuvers:
         ends = {"source": automaton[one.source], "target": automaton[one.target]}
         assert maneuver_defect(automaton.model, one, **ends) < 1e-9
-
-
-def test_words_of_primitives_stay_on_the_grid(tmp_path):
-    automaton = automaton_of_mprim(read_mprim(write(tmp_path, "a.mprim", MPRIM)))
-    _, aside, bent, spin = automaton.maneuvers
-    word = (bent, spin)
-    trims = tuple(automaton[name] for name in ("heading 2", "heading 3", "heading 0"))
-    plan = Plan([0.0, 0.0, np.pi], trims, durations=[0.0, 0.0, 0.0], maneuvers=word)
-    np.testing.assert_allclose(plan.end, [-0.5, -0.5, 2 * np.pi], atol=1e-15)
-    assert aside.target == "heading 1"
 
 
 @pytest.mark.parametrize("pace", [{}, {"speed": 2.0, "turn_rate": 0.5}])
@@ -400,16 +390,6 @@ def test_what_lattices_cannot_state():
         mprim_of_automaton(turned)
     with pytest.raises(ValueError, match="speed and turn_rate must be positive"):
         automaton_of_lattice(Lattice(resolution=1.0, headings=[0.0], moves=()), speed=0.0)
-
-
-def test_the_direction_of_a_lattice_body_turns_with_it():
-    body = LatticeBody(resolution=0.1)
-    angle = np.linspace(0.0, 6.0, 7)
-    state = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    step = 1e-6
-    later = np.stack([np.cos(angle + step), np.sin(angle + step)], axis=-1)
-    rates = body.reduced_dynamics(state, np.array([3.0, 1.0, 1.0]))
-    np.testing.assert_allclose(rates, (later - state) / step, atol=1e-6)
 
 
 @needs_data

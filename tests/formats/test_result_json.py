@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.cli import run
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.plan_json import load_result, plan_to_dict, save_plan
 
@@ -43,22 +42,3 @@ def test_another_scenario_is_told(tmp_path):
     other = ma.load_scenario(SCENARIOS / "car_slot.yaml").problem
     with pytest.raises(InvalidScenario, match="planned with another library"):
         load_result(tmp_path / "plan.json", other)
-
-
-@pytest.mark.slow
-def test_plot_with_a_scenario_draws_as_plan_does(tmp_path, capsys):
-    scenario, plan = str(SCENARIOS / "car_slot.yaml"), str(tmp_path / "plan.json")
-    assert run(["plan", scenario, "--out", str(tmp_path), "--quiet", "--html"]) == 0
-    for name, more in (("plan.png", []), ("plan.html", ["--html"])):
-        again = tmp_path / f"again{Path(name).suffix}"
-        assert run(["plot", plan, "--with", scenario, "--out", str(again), *more]) == 0
-        if name == "plan.png":
-            assert again.read_bytes() == (tmp_path / name).read_bytes()
-        else:
-            assert "swept" in again.read_text()
-    assert run(["plot", plan, "--out", str(tmp_path / "alone.svg")]) == 0
-    alone = (tmp_path / "alone.svg").read_text()
-    assert ">A car parks in a slot</text>" in alone  # the file has its name
-    assert ">steering [rad]</text>" in alone  # and the units of its controls
-    assert run(["plot", plan, "--with", str(SCENARIOS / "parking.yaml")]) == 2
-    assert "planned with another library" in capsys.readouterr().err

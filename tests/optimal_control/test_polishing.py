@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-
 import numpy as np
 import pytest
 import shapely
 
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.polishing import polish
@@ -84,43 +81,11 @@ def test_a_guess_inside_is_led_out() -> None:
     assert found.state[20, 1] < -0.3  # on the nearer side
 
 
-def test_a_point_is_a_body_too() -> None:
-    point = BodyPart(solids=((np.zeros((1, 2)), 0.0),))
-    scene = PolishScene(parts=(point,), pieces=((moved(2.0, 0.1), 0.0),))
-    out = polish(ROBOT, at_rest(4.0), scene, guess(), elastic=True)
-    found = polish(ROBOT, at_rest(4.0), scene, out.as_guess)
-    assert found.status is SolveStatus.SOLVED
-    poses = simulated(found.state, found.control, found.durations)
-    box = shapely.Polygon(moved(2.0, 0.1))
-    assert min(shapely.Point(x, y).distance(box) for x, y, _ in poses) > 0.0
-
-
-def test_walls_hold_between_nodes_too() -> None:
-    walls = ((0.0, 1.0, 0.3), (0.0, -1.0, 0.05))  # -0.05 <= y <= 0.3
-    found = polish(
-        ROBOT, at_rest(1.0, 0.2), PolishScene(walls=walls), guess(length=1.0, duration=4.0)
-    )
-    assert found.status is SolveStatus.SOLVED
-    poses = simulated(found.state, found.control, found.durations)
-    assert poses[:, 1].min() >= -0.05
-    assert poses[:, 1].max() <= 0.3
-
-
 def test_a_free_heading_is_free() -> None:
     found = polish(ROBOT, at_rest(2.0, 1.0, None), PolishScene(), guess(length=2.0, aside=0.3))
     assert found.status is SolveStatus.SOLVED
     assert found.state[-1, :2] == pytest.approx([2.0, 1.0])
     assert abs(found.state[-1, 2]) > 0.1
-
-
-def test_with_fixed_gears_each_stretch_takes_its_own_time() -> None:
-    there_and_back = guess(length=1.0, duration=6.0)
-    gears = np.where(np.arange(40) < 10, 1.0, -1.0)
-    found = polish(ROBOT, at_rest(-1.0), PolishScene(), there_and_back, gears=gears)
-    assert found.status is SolveStatus.SOLVED
-    assert (found.state[:11, 3] >= -1e-6).all()
-    assert (found.state[10:, 3] <= 1e-6).all()
-    assert np.ptp(found.durations[:10]) < 1e-6 < abs(found.durations[0] - found.durations[-1])
 
 
 def test_a_trailer_is_part_of_the_body() -> None:
@@ -189,17 +154,6 @@ def touched(
     return float(least)
 
 
-def test_a_solve_ends_between_two_iterations_once_the_time_is_over() -> None:
-    """A clock that ticks at every look: the solver has some iterations, and asks at each."""
-    scene = PolishScene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
-    ticks = itertools.count(0.0)
-    budget = Budget(began=0.0, deadline=20.0, clock=lambda: next(ticks))
-    found = polish(ROBOT, at_rest(4.0), scene, guess(aside=0.8), budget=budget)
-    assert (found.status, found.reason) == (SolveStatus.OUT_OF_BUDGET, "User_Requested_Stop")
-    assert 0 < found.iterations < 20
-    assert next(ticks) < 30.0
-
-
 def test_a_solve_that_is_cut_short_hands_on_its_best_iterate() -> None:
     """It breaks no condition of the program, and is near the end of the whole solve."""
     scene = PolishScene(parts=(BODY,), pieces=((SQUARE * [1.0, 0.6] + [2.0, 0.0], 0.0),))
@@ -211,15 +165,6 @@ def test_a_solve_that_is_cut_short_hands_on_its_best_iterate() -> None:
     poses = simulated(cut.state, cut.control, cut.durations)
     assert poses[-1] == pytest.approx([4.0, 0.0, 0.0], abs=1e-3)
     assert whole.objective <= cut.objective < 1.001 * whole.objective
-
-
-def test_no_program_is_built_that_takes_more_than_the_time_left() -> None:
-    budget = Budget(began=0.0, deadline=1e-3, clock=lambda: 0.0)
-    found = polish(ROBOT, at_rest(4.0), PolishScene(), guess(), budget=budget)
-    assert found.status is SolveStatus.OUT_OF_BUDGET
-    assert found.reason.startswith("no time was left: to build the program would take")
-    assert found.build_s > 1e-3
-    assert found.iterations == 0
 
 
 def test_the_last_digits_of_a_guess_and_of_the_ends_change_nothing() -> None:

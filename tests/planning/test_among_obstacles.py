@@ -148,18 +148,6 @@ def test_a_price_on_a_fixed_time_changes_no_plan():
     assert priced.lower_bound == pytest.approx(free.lower_bound + 32.0, abs=1e-9)
 
 
-def test_without_a_rest_a_fixed_time_is_driven():
-    fixed = replace(EASY, automaton=scenes.dubins(1.0), horizon=Horizon(time=20.0))
-    result = plan(fixed, time_limit=LIMIT)
-    assert result.plan is None or result.plan.duration == pytest.approx(20.0, abs=1e-8)
-
-
-def test_improvements_cost_what_the_plan_does():
-    prices = replace(EASY, cost=Cost(effort=1.0, switch=0.3), horizon=Horizon(time=20.0))
-    result = found(prices)
-    assert result.improvements[-1][1] == pytest.approx(result.cost, rel=1e-9)
-
-
 @pytest.mark.slow
 def test_hardly_turning_costs_what_driving_straight_does():
     costs = []
@@ -255,35 +243,6 @@ def test_with_max_expansions_the_time_limit_changes_nothing():
 
 
 # --- several goals, no way to go, any heading ---
-
-
-def test_the_nearest_free_goal_is_chosen():
-    goals = [Goal(pose=[2.0, 0.7, 0.4]), Goal(pose=[4.5, 1.0, 0.5]), Goal(pose=[-1.5, 0.0, 0.0])]
-    result = found(replace(BASE, goals=tuple(goals)))  # the first is in the shelf
-    assert result.goal_index == 2
-    assert result.cost == pytest.approx(1.5)
-    far = found(replace(BASE, goals=tuple(goals[:2])))
-    assert far.goal_index == 1
-    alone = found(replace(BASE, goals=(goals[1],)))
-    assert far.cost == pytest.approx(alone.cost, rel=0.05)
-
-
-def test_any_heading_is_no_dearer():
-    fixed = found(BASE)
-    free = found(replace(BASE, goals=(Goal(pose=BASE.goals[0].pose, free_heading=True),)))
-    assert free.cost <= fixed.cost + 1e-9
-    assert free.terminal_error.heading_rad == 0.0
-    assert free.terminal_error.position_m < 1e-9
-
-
-@pytest.mark.parametrize("turns", [0, 1, -3])
-def test_start_is_goal(turns):
-    there = replace(ROBOTS, goals=(Goal(pose=[0.0, 0.0, 2.0 * math.pi * turns]),))
-    result = found(there)
-    assert (result.plan.word, result.cost, result.gap) == ((), 0.0, 0.0)
-    waiting = found(replace(there, horizon=Horizon(time=3.0)))
-    assert waiting.plan.word == ("rest",)
-    assert waiting.plan.durations == pytest.approx([3.0])
 
 
 @pytest.mark.parametrize(("off", "heading"), [((-1e-8, 0.0, 0.0), 0.0), ((1e-9, 2e-9, 1e-9), 2.3)])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
+from maneuver_automaton.collision import Box, Disc, Obstacle, Polygon
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle
@@ -114,16 +114,3 @@ def test_an_effort_is_spread_over_the_time_there_is():
 
 def test_a_moved_problem_has_the_moved_plan():
     assert assert_moved(CASES["mixed"], SE2([3.0, -2.0, 0.7]))
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_alternatives_and_moving_obstacles():
-    """Words of all trims stay out of searches that know only a few."""
-    result = plan(BASE, time_limit=LIMIT, alternatives=2)
-    assert result.cost <= min(other.cost for other in result.alternatives)
-    cart = Obstacle(Box([0.5, 0.5]), motion=Motion([0.0, 4.0], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]]))
-    problem = replace(BASE, obstacles=(*BLOCKS, cart))
-    result = plan(problem, time_limit=LIMIT)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert check_plan(problem, result.plan, result.goal_index).passes(problem, result.goal_index)

@@ -101,6 +101,7 @@ def test_a_moved_problem_has_the_moved_plan():
     assert other.terminal_error.position_m < 1e-9
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_fixed_time_is_filled_with_rest():
     search = replace(WORK, improve=False)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.collision import Box, Disc, Obstacle
+from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Bounds, Goal, Problem
 from maneuver_automaton.receding_horizon import search_fail_safe
-from maneuver_automaton.receding_horizon.failsafe import mitigate
 from tests.inertia import unicycle_automaton
 from tests.matrix.vehicles import VEHICLES
 from tests.receding_horizon.scenes import among, cannot_stop, crossing, moving_obstacle
@@ -119,32 +118,6 @@ def test_a_moved_scene_has_the_moved_trajectory():
     one, two = (search_fail_safe(p, until=12.0) for p in (among(COMING), among(COMING).moved(move)))
     assert one.plan.word == two.plan.word
     assert two.plan.durations == pytest.approx(one.plan.durations, abs=1e-6)
-
-
-class TestMitigation:
-    def test_the_contact_that_comes_last(self):
-        # a wall 40 m wide at 2 m/s: driving away at 1 m/s gains as long as it lasts
-        wall = moving_obstacle([0.0, 9.0], [(-4.0, 0.0), (14.0, 0.0)], Box([0.2, 40.0]))
-        found = mitigate(among(wall), step=0.5, until=9.0)
-        assert set(found.plan.word) == {"ahead"}
-        assert found.contact == pytest.approx(3.6, abs=1e-2)
-
-    def test_of_those_without_contact_the_one_that_keeps_furthest(self):
-        near = Obstacle(Box([1.0, 1.0], [0.0, 0.9]))
-        found = mitigate(among(near, margin=0.5), step=0.5, until=2.0)
-        assert found.contact == 2.0
-        assert found.clearance >= 0.09  # measured from below
-
-    def test_a_known_plan_may_be_the_best(self):
-        known = search_fail_safe(among(COMING), until=12.0).plan
-        found = mitigate(among(COMING), step=0.5, until=12.0, known=(known,))
-        assert found.contact == 12.0
-
-    def test_what_cannot_stop_goes_on(self):
-        wall = Obstacle(Box([0.2, 40.0], [5.0, 0.0]))
-        found = mitigate(among(wall, robot=cannot_stop()), step=0.5, until=6.0)
-        assert "rest" not in found.plan.word
-        assert found.contact == 6.0
 
 
 def with_inertia(*obstacles, automaton=None, **changed) -> Problem:

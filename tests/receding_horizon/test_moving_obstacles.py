@@ -10,7 +10,7 @@ import pytest
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Bounds, Goal, Horizon, SearchSettings
+from maneuver_automaton.problem import Goal, Horizon, SearchSettings
 from maneuver_automaton.receding_horizon import (
     Decision,
     Disturbance,
@@ -18,18 +18,15 @@ from maneuver_automaton.receding_horizon import (
     RecedingHorizon,
     simulate,
 )
-from tests.quickly import quick_are
 from tests.receding_horizon.loops import totals
 from tests.receding_horizon.scenes import (
     among,
     cannot_stop,
     clearances,
     crossing,
-    door,
     moving_obstacle,
     on_the_goal,
 )
-from tests.scenes import moving_scene
 
 
 def decisions(loop) -> list[Decision]:
@@ -53,15 +50,6 @@ class TestWaitingAndEvading:
         total = totals(loop)
         assert (total[1:] <= total[:-1] + 1e-8).all()
         assert loop.cost < 7.0
-
-    @pytest.mark.exhaustive
-    @pytest.mark.slow
-    def test_a_door_that_opens_is_waited_for(self):
-        problem = among(*door(), bounds=Bounds(x=(-2, 8), y=(-5, 5)))
-        loop = simulate(problem, step=0.5, time_limit=0.3)
-        assert loop.reached
-        assert_free(loop)
-        assert loop.times[-1] < 14.0
 
     @pytest.mark.slow
     def test_the_goal_is_left_to_what_passes_over_it(self):
@@ -111,14 +99,6 @@ class TestWaitingAndEvading:
         assert loop.reached
         assert_free(loop)
         assert loop.times[-1] > 12.0
-
-    @pytest.mark.exhaustive
-    @pytest.mark.slow
-    @pytest.mark.parametrize("seed", quick_are([0], range(4)))
-    def test_a_scene_of_a_dozen(self, seed):
-        loop = simulate(moving_scene(seed), step=1.0, time_limit=2.0)
-        assert loop.reached
-        assert_free(loop)
 
     @pytest.mark.slow
     def test_a_fixed_time_is_exceeded_where_waiting_takes_longer(self):

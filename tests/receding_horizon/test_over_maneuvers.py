@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.closed_loop_json import (
-    closed_loop_to_dict,
     load_steps,
     save_closed_loop,
 )
@@ -156,12 +154,6 @@ def test_a_fixed_time_is_prolonged_by_rest():
     assert not list(loop.violations)
 
 
-def test_control_is_that_of_the_maneuver_under_way():
-    controller = ManeuverHorizon(posed([4.0, 0.0, 0.0]), step=0.25)
-    control, _ = controller.step([0.0, 0.0, 0.0])
-    assert np.abs(control).max() > 0.0  # rest is left by a maneuver
-
-
 def test_a_moved_loop_is_the_moved_loop():
     by = SE2([4.0, -2.0, 1.0])
     here = simulate(posed(), step=0.5, time_limit=5.0)
@@ -177,30 +169,11 @@ def test_a_margin_keeps_the_known_word():
     assert not any(step.replanned for step in loop.steps)
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_among_obstacles_only_free_plans_are_driven():
-    problem = posed(
-        [4.0, 0.0, 0.0], obstacles=[Box([0.5, 2.0], [2.0, 0.0])], footprint=Box([0.4, 0.3])
-    )
-    loop = simulate(problem, step=0.5, time_limit=1.0, steps=80)
-    assert loop.reached, loop.reason
-    assert loop.min_clearance_m > 0.0
-    assert not list(loop.collisions)
-
-
 def test_what_cannot_be_reached_is_said():
     problem = posed([3.0, 1.0, 1.0], horizon=Horizon(max_time=1.0))
     _, log = ManeuverHorizon(problem, step=0.5, time_limit=0.2).step([0.0, 0.0, 0.0])
     assert log.decision is Decision.STOPPED
     assert [one.guarantee for one in log.violations] == [Guarantee.FEASIBILITY]
-
-
-def test_the_log_can_be_written():
-    loop = simulate(posed(), step=0.5, time_limit=1.0)
-    document = json.loads(json.dumps(closed_loop_to_dict(loop), allow_nan=False))
-    assert document["reached"] is True
-    assert document["steps"][0]["control"] == loop.steps[0].control.tolist()
 
 
 @pytest.mark.slow
@@ -261,16 +234,6 @@ def test_a_plan_that_ends_within_the_tolerance_is_kept(noise):
         assert [step.decision for step in loop.steps[1:]] == [Decision.KEPT] * (len(loop.steps) - 1)
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_told_to_stay_it_comes_back_when_it_is_pushed_out():
-    push = Disturbance(pushes={12: (0.2, 0.0, 0.0)})
-    loop = simulate(posed(NEAR), step=0.5, steps=30, time_limit=5.0, stay=True, disturbance=push)
-    assert loop.reached
-    assert len(loop.steps) == 30
-    assert (loop.inside[12], loop.inside[13], loop.inside[-1]) == (True, False, True)
-
-
 def test_the_goal_must_stay_free_for_as_long_as_is_asked():
     """A disc comes over the goal eight seconds after the start, three after the arrival."""
     coming = Obstacle(Disc(0.4), motion=Motion([4.0, 10.0], [[3.0, 4.0, 0.0], [3.0, -2.0, 0.0]]))
@@ -328,23 +291,6 @@ def crossing(begin=1.0, lasting=6.0, *, radius=0.4):
     """A disc that crosses the way of a robot from the origin to (5, 0)."""
     motion = Motion([begin, begin + lasting], [[2.5, -3.0, 0.0], [2.5, 3.0, 0.0]])
     return Obstacle(Disc(radius), motion=motion)
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.parametrize("begin", [0.0, 1.5])
-def test_past_a_moving_obstacle_nothing_is_hit(begin):
-    problem = posed(
-        [5.0, 0.0, 0.0],
-        obstacles=[crossing(begin)],
-        footprint=Box([0.4, 0.3]),
-        search=SearchSettings(max_expansions=2000),
-    )
-    loop = simulate(problem, step=0.5, time_limit=30.0, steps=60)
-    assert loop.reached, loop.reason
-    assert not list(loop.collisions)
-    assert loop.min_clearance_m > 0.0
-    assert_nothing_interrupted(loop)
 
 
 def test_an_obstacle_that_was_not_foreseen_is_answered():

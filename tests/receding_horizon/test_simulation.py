@@ -354,21 +354,6 @@ class TestRestart:
             assert again.cost == whole.cost
             assert again.reached == whole.reached
 
-    def test_also_where_the_pose_is_seen_late(self):
-        problem = parking_loop(goal=NEAR)
-        upset = Disturbance(position_m=0.02, heading_rad=0.02, delay=1, seed=3)
-        whole = simulate(problem, step=0.5, disturbance=upset)
-        here = replace(problem, start=whole.poses[1])
-        again = simulate(here, step=0.5, disturbance=upset, last=whole.steps[0])
-        assert again.steps[0].pose.tolist() == whole.steps[1].pose.tolist()
-
-    def test_at_the_goal_nothing_is_left_but_the_cost(self):
-        whole = simulate(straight(), step=1.0)
-        here = replace(whole.problem, start=whole.poses[-1])
-        again = simulate(here, step=1.0, last=whole.steps[-1])
-        assert (again.reached, again.steps) == (True, ())
-        assert again.cost == whole.cost
-
 
 def test_progress_is_told():
     seen = []

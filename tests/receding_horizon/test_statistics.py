@@ -34,24 +34,6 @@ def in_numbers(outcome: Outcome) -> tuple[object, ...]:
     )
 
 
-@pytest.mark.slow
-def test_two_jobs_come_to_the_same_as_one():
-    settings = {"step": 1.0, "steps": 4, "disturbance": NOISE, "seeds": range(3)}
-    starts = [[0.0, 1.0, 0.0], [0.5, 0.5, 1.0]]
-    problem = parking_loop(goal=NEAR)
-    told = []
-    one = simulate_many(problem, starts=starts, **settings)
-    two = simulate_many(
-        problem, starts=starts, jobs=2, progress=lambda *n: told.append(n), **settings
-    )
-    assert [in_numbers(a) for a in one.outcomes] == [in_numbers(b) for b in two.outcomes]
-    assert [(tuple(a.start.tolist()), a.seed) for a in one.outcomes] == [
-        (tuple(start), seed) for start in starts for seed in range(3)
-    ]
-    assert told[-1] == (6, 6)
-    assert [done for done, _ in told] == sorted(done for done, _ in told)
-
-
 def test_each_outcome_is_that_of_its_loop():
     problem = parking_loop(goal=NEAR)
     (seventh,) = simulate_many(
