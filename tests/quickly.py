@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-FEW, MANY = 25, 60  # numbers that Hypothesis draws for a law, in the default run and with -m slow
+FEW, MANY = 15, 50  # numbers that Hypothesis draws for a law, in the default run and with -m slow
 
 
 def quick_are(

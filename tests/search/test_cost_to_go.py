@@ -21,6 +21,7 @@ from maneuver_automaton.search._kernels_estimate import fill_table
 from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from tests import scenes
 from tests.reference_lattice import cost_table
+from tests.search.cases import compiled_only
 
 ROOT = Path(__file__).parents[2]
 HALF, HEADINGS, CELL = 7, 12, 0.31
@@ -73,6 +74,7 @@ def kept_in(folder):
     return cost_to_go_table(SMALL, reach=1.5, folder=folder).value
 
 
+@compiled_only
 @pytest.mark.parametrize("damage", ["empty", "foreign", "short", "flipped", "another"])
 def test_a_damaged_file_is_made_anew(tmp_path, damage):
     made = kept_in(tmp_path)
@@ -92,6 +94,7 @@ def test_a_damaged_file_is_made_anew(tmp_path, damage):
     assert path.read_bytes() == whole
 
 
+@compiled_only
 def test_tables_used_least_recently_go(tmp_path, monkeypatch):
     kept_in(tmp_path)
     (path,) = tmp_path.iterdir()
@@ -109,6 +112,7 @@ def test_tables_used_least_recently_go(tmp_path, monkeypatch):
     assert [other.exists() for other in others] == [False, False, True]
 
 
+@compiled_only
 def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
@@ -118,6 +122,7 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+@compiled_only
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_two_processes_at_once_keep_one_whole_table(tmp_path):

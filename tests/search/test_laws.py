@@ -15,7 +15,6 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import search_insertion, search_words
 from tests.search.cases import (
-    INTERPRETED,
     REEDS_SHEPP,
     REVERSED_SPIN,
     TABLE_2,
@@ -26,10 +25,9 @@ from tests.search.cases import (
     robot,
 )
 
-SEARCHES = pytest.mark.parametrize(
-    "search", [search_words, pytest.param(search_insertion, marks=compiled_only)]
-)
-FEW = settings(max_examples=4 if INTERPRETED else 20)
+pytestmark = compiled_only  # laws of the search, whoever runs its kernels
+SEARCHES = pytest.mark.parametrize("search", [search_words, search_insertion])
+FEW = settings(max_examples=20)
 NEAR = arrays(np.float64, 3, elements=st.floats(-3.0, 3.0).map(lambda x: round(x, 3)))
 FAR = arrays(np.float64, 3, elements=st.floats(-200.0, 200.0))
 COSTS = st.builds(
@@ -70,7 +68,7 @@ def test_a_moved_problem_has_the_moved_plan(search, library, start, by, cost):
 @SEARCHES
 def test_random_moves_change_neither_word_nor_cost(search):
     rng = np.random.default_rng(0)
-    for _ in range(3 if INTERPRETED else 25):
+    for _ in range(25):
         problem = replace(parking(), start=rng.uniform(-3.0, 3.0, 3))
         by = SE2(rng.uniform(-1.0, 1.0, 3) * [100.0, 100.0, 7.0])
         here, there = cheapest(search, problem), cheapest(search, problem.moved(by))
@@ -98,7 +96,6 @@ def test_one_more_trim_is_never_dearer(search, start):
         assert more.cost < few.cost + 1e-7
 
 
-@compiled_only
 @FEW
 @given(start=NEAR, cost=COSTS)
 def test_insertion_is_never_cheaper_than_an_exhaustive_search(start, cost):
@@ -123,7 +120,6 @@ def test_a_cost_times_a_factor_has_the_same_plan(search, start, factor):
         assert there.cost == pytest.approx(factor * here.cost, rel=1e-6, abs=1e-6)
 
 
-@compiled_only
 @FEW
 @given(goal=NEAR)
 def test_a_mirrored_goal_has_the_mirrored_plan(goal):

@@ -14,6 +14,9 @@ from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from maneuver_automaton.search.limits import why_impossible
+from tests.search.cases import compiled_only
+
+pytestmark = compiled_only
 
 CURVES = {
     "straight": [1.0, 0.0, 0.0, 0.0],

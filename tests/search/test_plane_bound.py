@@ -15,7 +15,10 @@ from maneuver_automaton.search.lattice_query import lattice_query
 from tests import scenes
 from tests.quickly import quick_are
 from tests.reference_lattice import shortest_way
+from tests.search.cases import compiled_only
 from tests.solids import clearance_at
+
+pytestmark = compiled_only
 
 
 def bound_and_way(problem):

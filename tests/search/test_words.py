@@ -97,6 +97,7 @@ def test_with_the_spin_reversed_the_papers_sequence_is_best():
     assert solution.cost == pytest.approx(best(parking()).cost, abs=1e-9)
 
 
+@compiled_only
 def test_slsqp_finds_nothing_cheaper_on_a_few_words():
     problem = parking()
     cheapest = best(problem).cost
@@ -146,6 +147,7 @@ def test_brute_force_finds_nothing_else():
             assert any(np.abs(times - mine).max() < 1e-4 for mine in ours), (word, times)
 
 
+@compiled_only
 def test_a_solution_whose_straights_are_antiparallel():
     # half a turn, ahead, half a turn back, ahead: straights at opposite headings
     problem = parking()
@@ -162,6 +164,7 @@ def test_a_solution_whose_straights_are_antiparallel():
     )
 
 
+@compiled_only
 @pytest.mark.parametrize("alternatives", [0, 3, 20])
 @pytest.mark.parametrize("controls", [TABLE_2, REVERSED_SPIN], ids=["table 2", "reversed spin"])
 def test_the_pruned_search_is_the_head_of_the_complete_list(controls, alternatives):
@@ -196,6 +199,7 @@ def test_minimum_time():
     assert solution.cost < best(parking(cost=MINIMUM_TIME, time=None, max_trims=3)).cost
 
 
+@compiled_only
 def test_minimum_time_agrees_with_brute_force_on_a_few_words():
     problem = parking(cost=MINIMUM_TIME, time=None)
     complete = listed(search(problem, alternatives=None))
@@ -211,6 +215,7 @@ def test_minimum_time_agrees_with_brute_force_on_a_few_words():
                 assert any(np.abs(times - mine).max() < 1e-3 for mine in ours), (word, times)
 
 
+@compiled_only
 @pytest.mark.xfail(strict=True, reason="the sign of the price of time is not looked at")
 def test_with_a_longest_time_every_solution_is_a_local_optimum():
     problem = parking(time=None, max_time=3.8)
@@ -234,6 +239,7 @@ def test_a_limit_on_words_ends_the_search():
 # Libraries without rest, goals at the start, words that do not span.
 
 
+@compiled_only
 def test_a_fixed_time_without_rest_is_met_exactly():
     problem = parking(without_rest(TABLE_2))
     result = search(problem, alternatives=None)
@@ -322,6 +328,7 @@ def test_a_moved_problem_has_the_same_words(problem):
         assert_same_solutions(here, search(problem.moved(by), alternatives=1))
 
 
+@compiled_only
 @pytest.mark.parametrize("start", [[0.3, 1.2, 0.4], [-2.1, 0.57, 2.9]])
 def test_a_moved_problem_has_the_same_alternatives(start):
     problem = replace(parking(), start=np.array(start))
