@@ -57,6 +57,7 @@ LONG = {  # pages whose code, and words in commands that, take seconds
     "best_so_far",
     "exact_pose",
     "gear_changes",
+    "keep_away",
     "primitives",
     "replanning",
     "smoothing",

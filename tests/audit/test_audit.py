@@ -216,20 +216,6 @@ def test_the_terminal_error_is_a_distance_and_an_angle(off):
     assert error.heading_rad == pytest.approx(abs(exact[2]), abs=1e-12)
 
 
-def test_an_empty_plan_is_there_or_not():
-    here = Plan([1.0, 2.0, 0.5], (), durations=[])
-    assert audit_plan(here, Goal(pose=[1.0, 2.0, 0.5 - 2 * math.pi]), ROBOT.model).passed
-    assert not audit_plan(here, Goal(pose=[1.0, 2.5, 0.5]), ROBOT.model).passed
-
-
-@pytest.mark.parametrize("start_time", [-50.0, 1e4, 1.7e9])
-def test_a_start_time_changes_nothing(start_time):
-    later = replace(PARKING, start_time=start_time)
-    audit = audit_plan(later, Goal(pose=PARKING.end), ROBOT.model)
-    assert audit.passed, audit.reason
-    assert audit.max_dynamics_defect < 1e-8
-
-
 BODY = (Polygon([[-0.5, -0.4], [1.5, -0.4], [1.5, 0.4], [-0.5, 0.4]]),)
 AHEAD = plan_of(CAR, ("ahead", 10.0))  # from (0, 0) to (10, 0), its front from 1.5 to 11.5
 AROUND = plan_of(CAR, ("left", 2.0), ("ahead", 3.0), ("back right", 4.0))
@@ -240,12 +226,6 @@ def audited(plan, *obstacles, footprint=BODY, margin=0.0, automaton=CAR):
     return audit_plan(
         plan, goal, automaton.model, footprint=footprint, obstacles=obstacles, margin=margin
     )
-
-
-def test_without_obstacles_there_is_no_clearance():
-    assert audited(AHEAD).min_clearance_m is None
-    empty = OccupancyMap(np.zeros((4, 4)), resolution=1.0)
-    assert audited(AHEAD, empty).min_clearance_m is None
 
 
 @pytest.mark.parametrize(

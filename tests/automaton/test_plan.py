@@ -78,16 +78,6 @@ def test_at_a_switch_the_control_is_that_of_the_trim_that_begins(time, control):
     assert TURN.control_at(time).tolist() == control.tolist()
 
 
-def test_times_may_be_a_batch():
-    times = np.array([[9.0, 10.5, 11.0], [11.5, 12.9, 20.0]])
-    poses, controls = TURN.pose_at(times), TURN.control_at(times)
-    assert poses.shape == (2, 3, 3)
-    assert controls.shape == (2, 3, 2)
-    for index in np.ndindex(times.shape):
-        assert poses[index].tolist() == TURN.pose_at(times[index]).tolist()
-        assert controls[index].tolist() == TURN.control_at(times[index]).tolist()
-
-
 @given(pieces=PIECES, start=STARTS, start_time=st.floats(-100.0, 100.0))
 def test_samples_are_close_and_hold_every_switch(pieces, start, start_time):
     plan = plan_of(pieces, start, start_time=start_time)

@@ -143,11 +143,6 @@ def test_nothing_of_a_map_is_lost_far_away(far):
         assert shifted == pytest.approx(got, abs=2e-9)
 
 
-def test_nothing_in_the_way_is_infinitely_far():
-    world = world_around((Disc(1.0),), [])
-    assert clearances(world, [[0.0, 0.0, 0.0]]).tolist() == [math.inf]
-
-
 def test_inside_of_a_hole_and_inside_of_a_solid():
     ring = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     court = [Obstacle(Polygon(30 * ring, [3 * ring]))]
@@ -156,11 +151,6 @@ def test_inside_of_a_hole_and_inside_of_a_solid():
                                                               [40.0, 0.0, 0.0]]))  # fmt: skip
     assert got[1] == pytest.approx(0.05)
     assert (exact[2:4] <= 0.0).all()
-
-
-def test_a_body_that_holds_everything_touches_it():
-    pillar = [Obstacle(Disc(0.1, [2.0, 1.0])), Obstacle(Box([0.2, 0.2], [1.0, 1.0]))]
-    compare((Box([10.0, 10.0]),), pillar, np.array([[0.0, 0.0, 0.3], [20.0, 0.0, 0.0]]))
 
 
 def test_diagonal_neighbours_in_a_map():

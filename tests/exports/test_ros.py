@@ -11,7 +11,7 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.exports.ros import DEFINITIONS, TYPES
-from tests.exports.cases import CAR, VALUES, assert_close, drive_on_lanes, ends, inertia, trailer
+from tests.exports.cases import CAR, VALUES, assert_close, ends, inertia, trailer
 from tests.plotting.cases import parking_plan
 from tests.plotting.fleets import crossing
 from tests.plotting.loops import pushed_loop
@@ -81,17 +81,6 @@ def test_accelerations_are_the_rates_of_the_velocities():
         off = np.abs(columns("accelerations") - rates).max(axis=1)
         assert np.quantile(off, 0.9) < 0.02  # all but where a control jumps
         assert np.abs(columns("accelerations")).max() > 0.1
-
-
-def test_a_piece_of_a_loop_is_a_trajectory_at_a_rate():
-    robot = ma.Automaton.of_controls(
-        ma.Unicycle(), {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)}
-    )
-    controller = ma.RecedingHorizon(ma.Problem(robot, [0, 0, 0], [1.25, 0, 0]), step=0.5)
-    for x in (0.0, 0.5, 1.0):
-        _, log = controller.step([x, 0, 0])
-    points = ma.ros_messages(log.piece, step=0.1, model=robot.model)["trajectory"]["points"]
-    assert [point["transforms"][0]["translation"]["x"] for point in points][-1] == 1.25
 
 
 def test_a_car_has_ackermann_commands_and_a_unicycle_none():
@@ -192,15 +181,6 @@ def test_a_bag_reads_back_as_the_messages(name, tmp_path):
         assert same(read if isinstance(wanted, list) else read[0], wanted)
 
 
-def test_a_drive_on_a_road_is_a_bag(tmp_path):
-    pytest.importorskip("rosbags")
-    drive = drive_on_lanes(tmp_path)
-    ma.save_ros2_bag(drive, tmp_path / "bag")
-    _, found = read_bag(tmp_path / "bag")
-    last = [message for _, topic, message in found if topic == "/ackermann_cmd"][-1]
-    assert last.drive.speed == pytest.approx(drive.driven.trims[-1].reduced_state[0], rel=1e-6)
-
-
 def test_a_bag_is_replaced_and_other_folders_are_kept(tmp_path):
     pytest.importorskip("rosbags")
     folder = tmp_path / "bag"
@@ -226,21 +206,6 @@ def test_a_trajectory_of_nav_msgs_has_the_fields_of_its_release():
     assert set(DEFINITIONS) - set(store.types) == {
         "ackermann_msgs/msg/AckermannDrive", TYPES["ackermann_cmd"],
     }  # fmt: skip
-
-
-def test_a_trajectory_of_nav_msgs_is_what_the_others_say():
-    messages = ma.ros_messages(inertia(), step=0.5)
-    trajectory, drive = messages["nav_trajectory"], messages["ackermann_cmd"]
-    assert trajectory["header"] == messages["path"]["header"]
-    for point, at, command, twist in zip(
-        trajectory["points"], messages["path"]["poses"], drive, messages["cmd_vel"], strict=True
-    ):
-        assert (point["header"], point["pose"]) == (at["header"], at["pose"])
-        assert point["velocity"] == twist["twist"]
-        assert point["acceleration"]["linear"]["x"] == command["drive"]["acceleration"]
-        assert np.isnan(list(point["effort"]["force"].values())).all()
-    alone = ma.ros_messages(parking_plan(), step=0.5)["nav_trajectory"]["points"][0]
-    assert np.isnan(alone["acceleration"]["linear"]["x"])
 
 
 def test_topics_and_frames_of_a_fleet_begin_with_the_name(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -179,14 +178,6 @@ def test_cost_multipliers_outlive_a_library_file(tmp_path):
     problem = Problem(again, [0, 0, 0], [0.5, 0, 0], start_trim="heading 0")
     costs = [problem.maneuver_cost(one) / one.duration for one in again.maneuvers]
     np.testing.assert_allclose(costs, [1.0, 2.0, 1.0, 5.0], rtol=1e-12)
-
-
-def test_a_cost_multiplier_of_a_part_is_for_no_mprim(tmp_path):
-    automaton = automaton_of_mprim(read_mprim(write(tmp_path, "a.mprim", MPRIM)))
-    first, *others = automaton.maneuvers
-    half = replace(automaton, maneuvers=(replace(first, cost_multiplier=0.5), *others))
-    with pytest.raises(InvalidLibrary, match=r"multiplier 0\.5; a file of SBPL primitives needs"):
-        mprim_of_automaton(half)
 
 
 @pytest.mark.parametrize("costly", [1, 9])

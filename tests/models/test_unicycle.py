@@ -34,17 +34,6 @@ def test_spatial_twist_is_the_adjoint_of_the_body_twist(state, control):
     )
 
 
-@given(state=STATES, control=CONTROLS, t=st.floats(0.0, 10.0))
-def test_both_twists_give_the_same_flow(state, control, t):
-    body = Unicycle().body_velocity(np.zeros(0), control)
-    np.testing.assert_allclose(
-        flow(state, control, duration=t),
-        (SE2(state) @ SE2.exp(t * body)).pose,
-        rtol=0.0,
-        atol=1e-12,
-    )
-
-
 @settings(max_examples=30)
 @given(state=STATES, control=CONTROLS)
 def test_flow_agrees_with_an_ode_solver(state, control):

@@ -27,21 +27,6 @@ def test_controls_are_steps_between_the_switching_times():
     assert turn_rate.get_xlabel() == "time [s]"
 
 
-def test_one_axes_takes_all_controls_in_different_styles():
-    ax = Figure().add_subplot()
-    drawn = draw_controls(ax, parking_plan(), labels=["speed", "turn rate"])
-    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["speed", "turn rate"]
-    ax.figure.canvas.draw()
-    legend, inner = ax.get_legend().get_window_extent(), ax.get_window_extent()
-    assert legend.x0 >= inner.x1  # beside the curves, and within the page
-    assert legend.x1 <= ax.figure.bbox.x1
-    dashes = [str(artists.steps.get_linestyle()[0]) for artists in drawn]
-    assert dashes[0] != dashes[1]
-    low, high = ax.get_ylim()
-    assert low < -0.25
-    assert high > 1.5
-
-
 def test_axes_and_labels_must_match_the_controls():
     with pytest.raises(ValueError, match="got 3 axes and 0 labels, need 1 or 2 axes"):
         draw_controls(Figure().subplots(3, 1), parking_plan())

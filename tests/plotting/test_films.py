@@ -20,7 +20,7 @@ from maneuver_automaton.receding_horizon import Disturbance
 from tests.fleet import robots
 from tests.plotting.cases import parking_plan, result_of, slalom_problem
 from tests.plotting.fleets import crossing
-from tests.plotting.loops import LOOPS, moments, parking_loop, pushed_loop, unfinished_loop
+from tests.plotting.loops import moments, parking_loop, pushed_loop, unfinished_loop
 
 NAMES = ("traffic", "old", "jumps", "ahead", "trails", "bodies", "dots", "clock")
 STILL = Plan([1.0, 2.0, 0.0], (), durations=[])
@@ -110,15 +110,6 @@ class TestLoops:
             (path,) = parts_of(shown)["traffic"].get_paths()
             assert np.allclose(path.get_extents().get_points().mean(axis=0), [x, -0.3])
         assert shown.figure.axes[0].get_ylim()[0] < -0.7
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("name", ["unfinished", "empty", "helpless"])
-    def test_frames_cover_the_loop(self, name, tmp_path):
-        loop = LOOPS[name]()
-        save_film(loop, tmp_path / "loop.gif")
-        assert [other.name for other in tmp_path.iterdir()] == ["loop.gif"]
-        with Image.open(tmp_path / "loop.gif") as pictures:
-            assert pictures.n_frames == picture_times(loop.times[0], loop.times[-1]).size
 
 
 class TestFleets:

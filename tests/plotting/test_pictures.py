@@ -13,7 +13,6 @@ from PIL import Image
 from maneuver_automaton.collision import Box
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, simulate_fleet
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.plotting import Look, draw_plane, figure_of, save_picture
 from maneuver_automaton.plotting.cast import cast_of
 from maneuver_automaton.plotting.pages import DPI
@@ -32,14 +31,11 @@ from tests.plotting.cases import (
     result_of,
     slalom_problem,
 )
-from tests.plotting.fleets import answer, crossing, fleet_of, no_answer, row_of
+from tests.plotting.fleets import crossing, fleet_of, no_answer, row_of
 from tests.plotting.loops import (
     LOOPS,
-    helpless_loop,
-    parking_loop,
     pushed_loop,
     straight_loop,
-    unfinished_loop,
 )
 from tests.quickly import quick_are
 
@@ -89,30 +85,11 @@ class TestFiles:
         save_picture(with_body(plan, body), tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
 
-    def test_a_result_without_a_plan_is_written(self, tmp_path):
-        result = PlanResult(
-            problem=Problem(ROBOT, [0, 0, 0], [3, 1, 0]),
-            status=PlanStatus.OUT_OF_BUDGET,
-            reason="no plan within 5 s",
-        )
-        save_picture(result, tmp_path / "plan.png")
-        assert_picture(tmp_path / "plan.png")
-        with pytest.raises(ValueError, match="holds no plan: no plan within 5 s"):
-            save_picture(result, tmp_path / "alternatives.png", view="alternatives")
-
     def test_scenes_are_written(self, tmp_path):
         plan = parking_plan()
         goals = [Goal(pose=plan.end, tolerance_m=0.1), Goal(pose=[2, 0, 1], free_heading=True)]
         problem = slalom_problem(plan, goal=goals)
         save_picture(result_of(plan, problem=problem), tmp_path / "plan.png")
-        assert_picture(tmp_path / "plan.png")
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("columns", [3, 4])
-    def test_expanded_nodes_are_drawn_if_they_are_known(self, columns, tmp_path):
-        nodes = np.random.default_rng(1).normal(size=(200, columns))
-        result = dataclasses.replace(result_of(parking_plan()), nodes=nodes)
-        save_picture(result, tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
 
     @pytest.mark.parametrize("name", quick_are(["parking", "empty"], LOOPS))
@@ -135,14 +112,6 @@ class TestFiles:
         document |= {"status": "no_plan", "reason": "all tried", "cost": None}
         save_picture(stated(document, None), tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
-
-    @pytest.mark.slow
-    @pytest.mark.parametrize("count", [0, 1, 12])
-    def test_alternatives_are_written(self, count, tmp_path):
-        words = [plan_of(["spin", "straight", "spin"], [0.5 + 0.2 * k, 1, 1]) for k in range(count)]
-        result = result_of(parking_plan(), others=words)
-        save_picture(result, tmp_path / "alternatives.png", view="alternatives")
-        assert_picture(tmp_path / "alternatives.png")
 
     @pytest.mark.slow
     def test_the_same_result_gives_the_same_bytes_and_text_stays_text(self, tmp_path):
@@ -266,23 +235,6 @@ class TestLoops:
             assert left < x < right
             assert low < y < high
 
-    def test_value_and_cost_have_a_constant_sum(self):
-        loop = parking_loop()
-        cost = figure_of(loop).axes[1]
-        spent, total = cost.lines[:2]
-        assert np.allclose(total.get_ydata(), loop.cost)
-        assert np.allclose(spent.get_ydata()[[0, -1]], [0.0, loop.cost])
-        assert np.allclose(total.get_xdata(), loop.times)
-
-    def test_how_a_loop_ended(self):
-        for loop, said in (
-            (parking_loop(), "goal reached"),
-            (unfinished_loop(), "the goal is not reached after 2 steps"),
-            (helpless_loop(), "recursive feasibility: "),
-        ):
-            assert texts_of(figure_of(loop))[0].startswith(said)
-        assert texts_of(figure_of(parking_loop()))[1].startswith("cost 4.66158 · duration 4 s")
-
 
 class TestFleets:
     def test_paths_bodies_and_ends_are_where_the_plans_are(self):
@@ -304,17 +256,6 @@ class TestFleets:
         expected = [there.pose_at(t)[:2] for t in times if 0.0 < t < 4.0]
         expected += [back.pose_at(t)[:2] for t in times if 0.5 < t < 5.5]
         np.testing.assert_allclose(middles, expected, atol=1e-9)
-
-    def test_a_moved_fleet_has_the_moved_picture(self):
-        by, result = SE2([3.0, -2.0, 0.7]), row_of(3)
-        plans = result.plans.values()
-        moved = [plan_of(p.word, p.durations, start=(by @ SE2(p.start)).pose) for p in plans]
-        answers = [answer(plan, footprint=Box([0.6, 0.4])) for plan in moved]
-        _, here = drawn(result)
-        _, there = drawn(fleet_of(answers, names=["a", "b", "c"]))
-        paths = here["bodies"].get_paths(), there["bodies"].get_paths()
-        for one, other in zip(*paths, strict=True):
-            np.testing.assert_allclose(by.act(one.vertices), other.vertices, atol=1e-9)
 
 
 def fleet_loop(**more):

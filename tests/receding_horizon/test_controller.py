@@ -9,14 +9,13 @@ import pytest
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning import plan
-from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
+from maneuver_automaton.problem import Bounds, Horizon, Problem
 from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
 from maneuver_automaton.receding_horizon.rest_of_plan import missed
-from tests.receding_horizon.loops import AHEAD, EFFORT, NEAR, SPIN_TOO, parking_loop, straight
+from tests.receding_horizon.loops import AHEAD, EFFORT, NEAR, parking_loop, straight
 from tests.search.cases import (
     REEDS_SHEPP,
     TABLE_2,
-    helicopter,
     robot,
     without_rest,
 )
@@ -59,17 +58,6 @@ class TestOneStep:
         assert step.control is None
         assert (step.value, step.plan.word, step.applied) == (0.0, (), 1.0)
 
-    def test_the_best_of_several_goals(self):
-        goals = [Goal(pose=[-9.0, 0.0, 0.0]), Goal(pose=[0.0, 0.0, 0.0])]
-        problem = Problem(
-            robot(AHEAD), [-2.0, 0.0, 0.0], goals, cost=EFFORT, horizon=Horizon(time=4.0)
-        )
-        loop = controller(problem)
-        for pose in ([-2.0, 0.0, 0.0], [-1.0, 0.0, 0.0]):
-            _, step = loop.step(pose)
-            assert step.goal_index == 1
-            assert missed(step.plan, goals[1]) <= 1e-9
-
     def test_the_certificate_of_an_exhaustive_search(self):
         _, step = controller().step([0.0, 1.0, 0.0])
         assert step.exhaustive
@@ -102,27 +90,6 @@ class TestElapsed:
         assert second.accumulated_cost == pytest.approx(elapsed)
         assert second.violations == ()
         assert not second.replanned
-
-    @pytest.mark.parametrize("elapsed", [4.0, 7.5, 100.0])
-    def test_longer_than_the_plan(self, elapsed):
-        loop = controller(straight())
-        _, first = loop.step([-2.0, 0.0, 0.0])
-        control, second = loop.step(first.plan.pose_at(elapsed), elapsed=elapsed)
-        assert control.tolist() == [0.0, 0.0]
-        assert second.arrived
-        assert (second.value, second.accumulated_cost) == (0.0, 2.0)
-        assert second.violations == ()
-
-    @pytest.mark.parametrize("elapsed", [0.5, 100.0])
-    def test_the_vehicle_stood_still_meanwhile(self, elapsed):
-        loop = controller()
-        loop.step([0.0, 1.0, 0.0])
-        _, second = loop.step([0.0, 1.0, 0.0], elapsed=elapsed)
-        assert missed(second.plan, loop.problem.goals[0]) <= 1e-9
-        assert second.plan.duration == pytest.approx(8.0)
-        assert second.value == pytest.approx(4.6615840195)
-        assert [one.guarantee for one in second.disturbed] == [Guarantee.DECREASE]
-        assert second.violations == ()
 
     @pytest.mark.parametrize("elapsed", [-0.1, math.nan, math.inf])
     def test_no_time(self, elapsed):
@@ -295,28 +262,6 @@ class TestHold:
         assert all(inside) or all(within(pose, NEAR) for pose in ends)
 
 
-class TestSpace:
-    """A helicopter: SE(2) x R."""
-
-    @pytest.mark.parametrize(
-        ("horizon", "cost"),
-        [(Horizon(), Cost(time=1.0)), (Horizon(time=10.0), EFFORT)],
-        ids=["free", "fixed"],
-    )
-    def test_it_gets_there(self, horizon, cost):
-        problem = Problem(helicopter(), [0.0] * 4, [5.0, 3.0, 1.0, 2.0], cost=cost, horizon=horizon)
-        loop = controller(problem, step=2.0)
-        pose = problem.start
-        for _ in range(6):
-            _, step = loop.step(pose)
-            assert missed(step.plan, problem.goals[0]) <= 1e-9 * 10
-            assert step.violations == ()
-            if step.arrived:
-                break
-            pose = step.predicted
-        assert step.arrived
-
-
 class TestSwitches:
     COST = Cost(length=1.0, switch=0.1, direction_change=0.3)
 
@@ -338,19 +283,6 @@ class TestSwitches:
             spent += step.applied_cost
             _, step = loop.step(step.predicted)
         assert spent <= first.value + 1e-9
-
-    def test_rest_appended_for_the_price_of_a_switch(self):
-        cost = Cost(effort=1.0, switch=0.2)
-        loop = controller(straight(4.0, cost=cost))
-        _, step = loop.step([-4.0, 0.0, 0.0])
-        _, step = loop.step(step.predicted)
-        assert step.violations == ()
-
-
-def test_spin_library_turns_the_long_way_round_if_it_must():
-    problem = Problem(robot(SPIN_TOO), [0.0, 0.0, 1.0], [0.0, 0.0, 0.0], cost=EFFORT)
-    _, step = controller(problem).step(problem.start)
-    assert step.value == pytest.approx(2.0 * math.pi - 1.0)
 
 
 class TestLowerBound:

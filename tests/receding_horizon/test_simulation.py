@@ -146,14 +146,6 @@ class TestParking:
         assert loop.steps_bound == 5
         assert len(loop.steps) <= loop.steps_bound
 
-    def test_the_word_that_the_paper_names(self):
-        assert loop_of("parking_loop_reversed_spin").steps[0].plan.word == (
-            "spin",
-            "straight",
-            "anticlockwise",
-            "rest",
-        )
-
     @pytest.mark.parametrize("controls", [None, REVERSED_SPIN])
     def test_from_a_dearer_word_it_replans_and_ends_cheaper(self, controls):
         problem = parking_loop(controls)
@@ -264,13 +256,6 @@ class TestDisturbances:
         twist = loop.driven[0].trims[0].body_velocity
         planned = loop.steps[0].plan.trims[0].body_velocity
         assert twist.tolist() == pytest.approx((planned * [0.9, 1.0, 1.1]).tolist())
-
-    def test_a_step_late_without_noise_changes_nothing(self):
-        late = simulate(parking_loop(), step=1.0, disturbance=Disturbance(delay=1))
-        prompt = simulate(parking_loop(), step=1.0)
-        assert np.abs(late.poses - prompt.poses).max() <= 1e-9
-        assert late.cost == pytest.approx(prompt.cost)
-        assert list(late.violations) == []
 
     def test_a_step_late_the_push_is_seen_a_step_later(self):
         upset = Disturbance(delay=1, pushes={0: (0.1, 0.1, 0.1)})

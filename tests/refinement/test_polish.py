@@ -20,11 +20,8 @@ from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.scene import BodyPart, Polished, PolishSettings
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.driving import drive
-from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.closure import closed
 from maneuver_automaton.refinement.gear_sequences import (
-    car_library,
-    gear_sequences,
     without_shuffles,
 )
 from maneuver_automaton.refinement.guesses import (
@@ -131,26 +128,6 @@ def test_a_polished_motion_is_exact_clean_and_inside_its_limits() -> None:
     assert stroke.duration == motion.duration
 
 
-@pytest.mark.slow
-def test_gear_sequences_differ_and_come_in_order() -> None:
-    car = car_library(wheelbase=2.8, max_steering=0.75)
-    slot = [Box([4.689, 1.942], [x, 0.0]) for x in (-5.0, 8.0)]
-    problem = Problem(car, [-1.0, 3.0, 0.0], [0.0, 0.0, 0.0], obstacles=slot, footprint=BODY)
-    asked = gear_sequences(
-        problem,
-        [car, car_library(wheelbase=2.8, max_steering=0.75, share=0.8)],
-        lambda plan: timed(plan, pace_of_car(CAR)).duration,
-        budget=UNLIMITED,
-        keep=3,
-    )
-    drives = [next(asked), *asked]
-    assert drives
-    estimates = [one.estimate for one in drives[1:]]
-    assert estimates == sorted(estimates)
-    assert not any(a.resembles(b) for k, a in enumerate(drives) for b in drives[:k])
-    assert all(SE2(one.plan.end).pose == pytest.approx([0.0, 0.0, 0.0], abs=1e-9) for one in drives)
-
-
 def least_clearance(poses: np.ndarray, obstacle: Box) -> float:
     """Least distance of the body from an obstacle."""
     ring = shapely.Polygon(obstacle.corners)
@@ -164,32 +141,6 @@ def wide():
     bend = ((1.0, kappa, arc), (1.0, -kappa, 2 * arc), (1.0, kappa, arc))
     rest = (14.0 - float(plan(*bend).end[0])) / 2.0
     return car_guess(CAR, plan((1.0, 0.0, rest), *bend, (1.0, 0.0, rest)), intervals=STEPS)
-
-
-def is_free(motion) -> bool:
-    """Whether the body touches the box of `swerve` at no sample, by shapely."""
-    poses = motion.course.pose[:, None]
-    corners = SE2(poses).act(np.asarray(convex_pieces(BODY)[0][0]))
-    return not shapely.intersects(shapely.polygons(corners), shapely.box(6.9, -1.4, 9.9, 0.6)).any()
-
-
-@pytest.mark.slow
-def test_what_the_solver_did_not_finish_counts_if_it_is_sound() -> None:
-    """Thirty iterations of fifty lead near the best motion, which was thrown away."""
-    best = polish_guesses(swerve(), [wide()], budget=UNLIMITED, accepts=is_free)
-    few = PolishSettings(max_iterations=30)
-    again = polish_guesses(
-        swerve(),
-        [wide()],
-        settings=few,
-        budget=UNLIMITED,
-        most_iterations=3000,
-        accepts=is_free,
-    )
-    assert all(one.status != "solved" for one in again.attempts)
-    assert again.motion is not None
-    assert again.motion.error < 1e-9
-    assert again.motion.duration == pytest.approx(best.motion.duration, rel=0.02)
 
 
 def test_work_is_counted_in_iterations() -> None:

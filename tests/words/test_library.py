@@ -13,11 +13,10 @@ from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.primitives import Trim
 from maneuver_automaton.words import steer
 from maneuver_automaton.words.library import library_of
 from tests.reference_words import candidates
-from tests.search.automata import joined_end, linked, model_of_kinds
+from tests.search.automata import joined_end, linked
 
 REST, AHEAD, LEFT, RIGHT = [0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 1.0], [0.8, 0, -1.0]
 SIDE, SPIN, BACK = [0.2, 0.7, 0], [0.0, 0, 1.3], [-0.5, 0, 0.2]
@@ -85,15 +84,3 @@ def test_a_moved_problem_has_the_moved_answer(goal, by):
     )
     best, moved = here[0], there[0]
     assert moved.cost == pytest.approx(best.cost, abs=1e-6)
-
-
-def test_trims_without_a_way_between_them_are_named():
-    trims = tuple(
-        Trim(name=name, body_velocity=[v, 0, 0], control=[0, 0], reduced_state=[v])
-        for name, v in (("rest", 0.0), ("fast", 2.0))
-    )
-    library = library_of(Automaton(model_of_kinds(), trims))
-    assert candidates(library, [0, 0, 0], [1, 0, 0], start_trim=0, goal_trim=1) == []
-    with pytest.raises(ValueError) as error:
-        library.chain(0, 1)
-    assert str(error.value) == "no maneuvers lead from 'rest' to 'fast'"

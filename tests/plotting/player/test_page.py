@@ -241,15 +241,6 @@ def test_values_show_themselves():
     assert ROBOT._repr_png_()[1:4] == b"PNG"
 
 
-def test_a_page_is_saved(tmp_path):
-    player = parking_plan().player(title="Parking")
-    player.save(tmp_path / "new" / "a.html")
-    assert (tmp_path / "new" / "a.html").read_text(encoding="utf-8") == player.html
-    with pytest.raises(ValueError) as error:
-        player.save(tmp_path / "a.gif")
-    assert str(error.value) == "player: got the file name a.gif, need one ending in .html"
-
-
 def test_other_values_are_refused():
     with pytest.raises(TypeError) as error:
         player_of(3)
