@@ -283,6 +283,3 @@ def test_the_gap_of_a_step_is_that_which_is_measured_anew(seed):
         }
         anew = gap_between(courses, keep=fleet.margin, frame=(start[0], start[1], 0.0))
         assert step.gap_m == anew.distance
-
-
-# -- what is left of a plan

@@ -245,6 +245,3 @@ def test_joined_and_priced_by_hand():
     assert word.durations.tolist() == [1.5, 2.0, 1.0]
     assert with_cost(word, query).cost == pytest.approx(4.5 + 2 * 0.2 + 2 * 0.7)
     assert with_cost(query.word_of([], 0), query).cost == 0.0
-
-
-# --- queries ---
