@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import expm
-from scipy.optimize import minimize
+from scipy.optimize import least_squares, minimize
 
 from maneuver_automaton._arrays import Array, wrapped
 
@@ -52,6 +52,13 @@ def word_end(twists: ArrayLike, times: ArrayLike, displacements: ArrayLike | Non
     return np.array([matrix[0, -1], matrix[1, -1], heading, *matrix[2:-1, -1]])
 
 
+def off_goal(end: ArrayLike, goal: ArrayLike) -> Array:
+    """End minus goal, the heading modulo a full turn."""
+    off = np.asarray(end, dtype=np.float64) - np.asarray(goal, dtype=np.float64)
+    off[2] = wrapped(off[2])
+    return off
+
+
 def plain_end(twists: ArrayLike, times: ArrayLike, displacements: ArrayLike | None = None) -> Array:
     """`word_end` in complex numbers, heading not wrapped: quick enough for differences."""
     rows = np.asarray(twists, dtype=np.float64)
@@ -68,6 +75,37 @@ def plain_end(twists: ArrayLike, times: ArrayLike, displacements: ArrayLike | No
             heading += moves[i, 2]
             altitude += moves[i, 3] if moves.shape[1] == 4 else 0.0
     return np.array([place.real, place.imag, heading, altitude])[: rows.shape[1]]
+
+
+def jacobian(
+    twists: ArrayLike,
+    times: ArrayLike,
+    displacements: ArrayLike | None = None,
+    *,
+    step: float = 1e-5,
+) -> Array:
+    """Derivatives (dof, n) of the end by the times, by central differences."""
+    t = np.asarray(times, dtype=np.float64)
+    columns = []
+    for shift in step * np.eye(t.size):
+        later = plain_end(twists, t + shift, displacements)
+        earlier = plain_end(twists, t - shift, displacements)
+        columns.append((later - earlier) / (2.0 * step))
+    return np.array(columns).T
+
+
+def hessian(
+    twists: ArrayLike, times: ArrayLike, price: ArrayLike, displacements: ArrayLike | None = None
+) -> Array:
+    """Second derivatives (n, n) of ``price . end`` by the times, by differences of differences."""
+    t = np.asarray(times, dtype=np.float64)
+    p, step = np.asarray(price, dtype=np.float64), 1e-4
+    rows = []
+    for shift in step * np.eye(t.size):
+        later = jacobian(twists, t + shift, displacements, step=step)
+        earlier = jacobian(twists, t - shift, displacements, step=step)
+        rows.append(p @ (later - earlier) / (2.0 * step))
+    return np.array(rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,3 +221,92 @@ def words_of(n_trims: int, length: int) -> Iterator[tuple[int, ...]]:
     for word in itertools.product(range(n_trims), repeat=length):
         if all(a != b for a, b in itertools.pairwise(word)):
             yield word
+
+
+def brute_force(
+    twists: Array,
+    rates: Array,
+    goal: Array,
+    *,
+    lengths: Sequence[int],
+    total: float | None = None,
+    at_most: float | None = None,
+    starts: int = 30,
+    longest: float = 7.0,
+    rng: np.random.Generator,
+) -> list[tuple[tuple[int, ...], Array, float]]:
+    """(word, times, cost) of every local optimum of every word of the given lengths."""
+    found = []
+    for length in lengths:
+        for word in words_of(len(twists), length):
+            rows = list(word)
+            one = Word(twists[rows], rates[rows], goal, total=total, at_most=at_most)
+            optima = one.local_optima(starts=starts, longest=longest, rng=rng)
+            found.extend((word, times, one.cost(times)) for times in optima)
+    return sorted(found, key=lambda row: row[2])
+
+
+def steering_roots(
+    twists: ArrayLike,
+    goal: ArrayLike,
+    displacements: ArrayLike | None = None,
+    *,
+    starts: int,
+    longest: float,
+    rng: np.random.Generator,
+) -> list[Array]:
+    """Times that meet the goal, by root finding from random starts; turns in [0, one turn)."""
+    rows = np.asarray(twists, dtype=np.float64)
+    with np.errstate(divide="ignore"):
+        periods = 2.0 * np.pi / np.abs(rows[:, 2])
+    reach = np.minimum(periods, longest)
+    found: list[Array] = []
+    for _ in range(starts):
+        solved = least_squares(
+            lambda t: off_goal(plain_end(rows, t, displacements), goal),
+            rng.uniform(0.0, 1.0, len(rows)) * reach,
+            jac=lambda t: jacobian(rows, t, displacements),
+            xtol=1e-15,
+            ftol=1e-15,
+            gtol=1e-15,
+        )
+        if np.abs(solved.fun).max() > 1e-10:
+            continue
+        turning = np.isfinite(periods)
+        times = solved.x.copy()
+        times[turning] = np.mod(times[turning], periods[turning])
+        times[turning & (periods - times < 1e-8)] = 0.0
+        times[np.abs(times) < 1e-8] = 0.0
+        if times.min() < 0.0:
+            continue
+        if not any(np.abs(times - other).max() < TIE * (1.0 + times.max()) for other in found):
+            found.append(times)
+    return found
+
+
+def multipliers(word: Word, times: Array) -> Array:
+    """Prices of the conditions that best explain `times` as optimal."""
+    _, matrix = word.conditions(times)
+    return np.asarray(np.linalg.lstsq(matrix.T, -word.rates, rcond=1e-10)[0])
+
+
+def least_reduced_cost(
+    library: Array, rates: Array, word: Word, times: Array, prices: Array, *, samples: int = 200
+) -> float:
+    """Smallest reduced cost of all trims at a grid of moments, ends included.
+
+    A trim is inserted for a moment, and for minus a moment: the difference is its effect.
+    """
+    least = np.inf
+    step = 1e-6
+    for i, time in enumerate(times):
+        for at in np.linspace(0.0, time, samples):
+            for trim, rate in zip(library, rates, strict=True):
+                rows = np.insert(word.twists, i, [word.twists[i], trim], axis=0)
+                split = np.concatenate([times[:i], [at, step, time - at], times[i + 1 :]])
+                longer = Word(rows, np.zeros(len(rows)), word.goal, total=word.total)
+                later = longer.conditions(split)[0]
+                split[i + 1] = -step
+                earlier = longer.conditions(split)[0]
+                least = min(least, rate + float(prices @ (later - earlier)) / (2.0 * step))
+    return float(least)

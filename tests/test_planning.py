@@ -559,9 +559,6 @@ def test_more_trims_than_words_can_take():
     )
 
 
-# --- alternatives, budgets, repetition ---
-
-
 # --- laws ---
 
 
