@@ -252,3 +252,27 @@ def test_numba_functions_of_a_user_are_compiled_as_without_the_package():
         for first in (False, True)
     }
     assert len(answers) == 1
+
+
+def test_the_lock_of_a_process_that_is_gone_is_taken(tmp_path):
+    lock = tmp_path / "lock"
+    assert _compile_all._locked(lock, [])
+    assert not _compile_all._locked(lock, [])
+    os.utime(lock, (0.0, 0.0))
+    _compile_all._report(lock, None, ["one"], ["one", "other"])  # its process is at work
+    assert not _compile_all._locked(lock, [])
+    os.utime(lock, (0.0, 0.0))
+    assert _compile_all._locked(lock, [])
+
+
+def test_kernels_that_another_process_compiles_are_waited_for(tmp_path, monkeypatch):
+    lock, compiled = tmp_path / _compile_all.LOCK, []
+    monkeypatch.setattr(_compile_all, "kernel_folder", lambda: tmp_path)
+    monkeypatch.setattr(_compile_all, "compile_kernels", lambda names, **_: compiled.append(names))
+    monkeypatch.setattr(_compile_all.time, "sleep", lambda _: lock.unlink())  # the other is done
+    monkeypatch.delenv(_compile_all.WORKER, raising=False)
+    for others, own in (("ab", "ab"), ("abc", "b"), ("ab", "bc")):
+        assert _compile_all._locked(lock, others)
+        _compile_all.compile_missing(own)
+        assert not lock.exists()
+    assert compiled == ["bc"]

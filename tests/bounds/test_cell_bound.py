@@ -8,7 +8,7 @@ import pytest
 
 import maneuver_automaton as ma
 from maneuver_automaton.bounds import cell_proofs, pose_scene
-from maneuver_automaton.bounds.cells import first_cells
+from maneuver_automaton.bounds.cells import finer, first_cells, on_finer
 from maneuver_automaton.bounds.families import motions_of
 from maneuver_automaton.bounds.levels import _goal_cells, _in_the_plane, _nodes_of
 from maneuver_automaton.bounds.program import program_of, slope
@@ -91,6 +91,18 @@ def test_a_function_raised_at_a_node_that_carries_flow_is_refused():
     node = (0, *nodes[int(weights.argmax())])
     value[node] += 0.01 * value[node]
     assert slope(cells, columns, motions, value) > 1.001
+
+
+def test_a_finer_level_holds_the_same_function():
+    problem = among(WALL)
+    scene, program, _ = solved(problem, steps=20)
+    cells, value = program.cells, program.value.astype(float)
+    halved = finer(cells, cells.active > 0, scene)
+    same = on_finer(cells, halved, value)
+    rng = np.random.default_rng(2)
+    for pose in rng.uniform(-3, 3, (50, 3)):
+        coarse = cells.value_at(value, cells.coordinates(pose))
+        assert halved.value_at(same, halved.coordinates(pose)) == pytest.approx(coarse, abs=1e-9)
 
 
 @pytest.mark.parametrize(

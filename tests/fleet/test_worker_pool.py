@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from maneuver_automaton.budget import Budget
 from maneuver_automaton.fleet import plan_fleet
+from maneuver_automaton.fleet.vehicle import vehicles_of
+from maneuver_automaton.fleet.workers import Done, PoolTask, WorkerPool
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet import fleets
 from tests.scenario.test_vehicles import SCENARIOS
@@ -54,3 +57,10 @@ def test_bad_places_of_work_are_refused(more, message):
         pytest.importorskip("distributed")
     with pytest.raises(ValueError, match=message):
         plan_fleet(fleets.crossing(), **more)
+
+
+def test_nothing_comes_of_what_a_signal_broke_off():
+    fleet = fleets.random_fleet(4, 3)
+    pool = WorkerPool(fleet, vehicles_of(fleet), 2, lambda function, pieces: iter(()))
+    tasks = [PoolTask((k,), {}, "alone") for k in range(4)]
+    assert list(pool.each(tasks, Budget.from_now(1.0))) == [Done(None)] * 4

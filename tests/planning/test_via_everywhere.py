@@ -121,7 +121,6 @@ def test_with_inertia_it_passes_without_a_rest_and_rests_where_it_is_told_to(fre
     assert moved.cost == pytest.approx(found.cost, rel=1e-5)
 
 
-@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_trailer_whose_speed_is_a_control_stops_for_no_time():
     one = base(VEHICLES["car_with_trailer"]).problem
