@@ -185,29 +185,6 @@ def test_obstacles_are_told_of(folder, capsys):
     assert "turning points:" in printed
 
 
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_check_says_what_is_touched(folder, capsys):
-    Path("x.yaml").write_text(AMONG.replace("[2.0, 0.0, 0.0]", "[1.0, 0.2, 0.0]"))
-    assert run(["check", "x.yaml"]) == 1
-    rows = [line for line in capsys.readouterr().out.splitlines() if "keeps clear" in line]
-    assert [("yes" in row, "NO" in row) for row in rows] == [(True, False), (False, True)]
-    assert "the vehicle touches obstacle 'obstacle 1'" in rows[1]
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_check_says_how_far_the_body_reaches(folder, capsys):
-    body = "{rectangle_m: [4.0, 2.0], reference_m: [-1.5, 0.25]}"
-    Path("x.yaml").write_text(
-        AMONG.replace("{disc_m: 0.2}", body).replace("[2.0, 0.0", "[9.0, 0.0")
-    )
-    run(["check", "x.yaml"])
-    (row,) = [line for line in capsys.readouterr().out.splitlines() if "body: seen" in line]
-    assert "note" in row
-    assert "0.5 m behind to 3.5 m ahead, 1.25 m right to 0.75 m left" in row
-
-
 def test_the_shifted_example_has_the_same_plan(folder):
     for name in ("example10", "example10_shifted"):
         assert run(["plan", str(SCENARIOS / f"{name}.yaml"), "--out", name, "--no-plot"]) == 0
@@ -398,19 +375,6 @@ def test_convert_lists_the_trims(folder):
     assert run(["convert", str(SCENARIOS / "parking_min_time.yaml"), "new/y.yaml"]) == 0
     assert "{name: spin, control: [0.0, 1.0]}" in Path("new/y.yaml").read_text()
     assert len(load_scenario("new/y.yaml").problem.automaton) == 5
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_plot_draws_from_the_file_alone(folder):
-    assert run(["plan", "x.yaml", "--no-plot", "--quiet"]) == 0
-    Path("x.yaml").unlink()
-    assert run(["plot", "out/plan.json"]) == 0
-    assert Path("out/plan.png").exists()
-    assert run(["plot", "out/plan.json", "--out", "a/b.svg"]) == 0
-    assert Path("a/b.svg").exists()
-    assert run(["plot", "out/plan.json", "--out", "a", "--animate"]) == 0
-    assert Path("a/plan.gif").exists()
 
 
 def test_a_page_on_demand(folder, capsys):

@@ -10,14 +10,11 @@ from matplotlib.animation import FFMpegWriter
 from PIL import Image
 
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import Box, Disc, Motion, Obstacle
-from maneuver_automaton.fleet import simulate_fleet
+from maneuver_automaton.collision import Disc
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import film_of, save_film
 from maneuver_automaton.plotting import films as film
 from maneuver_automaton.plotting.films import MOST_FRAMES, TRAIL_S, picture_times
-from maneuver_automaton.receding_horizon import Disturbance
-from tests.fleet import robots
 from tests.plotting.cases import parking_plan, result_of, slalom_problem
 from tests.plotting.fleets import crossing
 from tests.plotting.loops import moments, parking_loop, pushed_loop, unfinished_loop
@@ -101,16 +98,6 @@ class TestLoops:
         assert parts["ahead"].get_segments() == []
         assert parts["clock"].get_text() == "4.00 s · goal reached"
 
-    def test_obstacles_stand_and_move_around_the_loop(self):
-        bar, disc = Box([1.0, 0.2], [0.0, -0.6]), Disc(0.1)
-        passing = Obstacle(disc, motion=Motion([0.0, 4.0], [[-1, -0.3, 0], [1, -0.3, 0]]))
-        shown = film_of(of_body(parking_loop(), Box([0.5, 0.3]), (Obstacle(bar), passing)))
-        for time, x in ((1.0, -0.5), (3.0, 0.5)):
-            shown.show(time)
-            (path,) = parts_of(shown)["traffic"].get_paths()
-            assert np.allclose(path.get_extents().get_points().mean(axis=0), [x, -0.3])
-        assert shown.figure.axes[0].get_ylim()[0] < -0.7
-
 
 class TestFleets:
     def test_the_film_shows_where_all_are(self):
@@ -129,22 +116,6 @@ class TestFleets:
         assert len(parts["bodies"].get_paths()) == 1  # the other has left
         cart, door = parts["traffic"].get_facecolor()[:, 3]
         assert door < 0.2 < cart
-
-    def test_a_loop_shows_the_plans_ahead(self):
-        noise = Disturbance(position_m=0.01, heading_rad=0.01)
-        fleet = robots.crossing(tolerance=0.1, margin=0.2)
-        log = simulate_fleet(fleet, step=0.5, steps=40, first_time_limit=1.0, disturbance=noise)
-        shown = film_of(log)
-        parts = parts_of(shown)
-        shown.show(0.7)
-        assert parts["clock"].get_text().startswith("0.70 s · step 1 · V = ")
-        ends = [line[-1] for line in parts["ahead"].get_segments()]
-        for problem in log.problem.problems:
-            goal = problem.goals[0].pose[:2]
-            assert min(np.hypot(*(end - goal)) for end in ends) < 0.2
-        shown.show(100.0)
-        assert parts["clock"].get_text().endswith("all have arrived")
-        assert parts["ahead"].get_segments() == []
 
 
 class TestFormats:

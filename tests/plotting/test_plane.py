@@ -83,16 +83,6 @@ def test_turns_on_the_spot_are_arcs_about_their_place():
     assert radii[1] > 1.2 * radii[0]  # they do not cover each other
 
 
-def test_without_a_footprint_a_dart_grows_with_the_path():
-    sizes = []
-    for duration in (1.0, 10.0):
-        plan = plan_of(["straight", "clockwise"], [duration, duration])
-        _, artists = drawn(plan)
-        assert outlines(artists["bodies"]) == outlines(artists["swept"]) == []
-        sizes.append(np.ptp(outlines(artists["darts"])[0], axis=0).max())
-    assert sizes[1] > 5.0 * sizes[0]
-
-
 @given(by=st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0), st.floats(-3.0, 3.0)))
 @settings(max_examples=10)
 def test_a_moved_problem_has_a_moved_picture(by):
