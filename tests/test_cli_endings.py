@@ -10,7 +10,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +51,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     Path("none.yaml").write_text(AHEAD_ONLY)
     Path("bad.yaml").write_text("schema: 2")
     return tmp_path
+
+
+@pytest.fixture(autouse=True)
+def in_front() -> Iterator[None]:
+    """Not as a process in the background, which ignores Ctrl-C, and so do its children."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def written(name: str = "plan.json") -> dict[str, object]:

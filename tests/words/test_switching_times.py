@@ -16,7 +16,7 @@ from tests import reference
 from tests.quickly import quick_are
 
 AHEAD, BACK, LEFT, RIGHT = [1.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 1.0], [1.0, 0, -1.0]
-SPIN, SPIN_BACK, FAST_SPIN = [0.0, 0, 1.0], [0.0, 0, -1.0], [0.0, 0, 2.0]
+SPIN, SPIN_BACK = [0.0, 0, 1.0], [0.0, 0, -1.0]
 
 
 def random_words(n_words, *, total, seed):
