@@ -437,6 +437,7 @@ def test_options_reach_the_planner(folder, capsys):
     assert capsys.readouterr().err == "x.yaml: out_of_budget: no plan within 0.25 s\n"
 
 
+@pytest.mark.slow
 def test_compiling_is_announced(folder, capsys, monkeypatch):
     plan = planning.plan
 

@@ -56,6 +56,7 @@ def test_what_is_proven_of_short_words_is_said(capsys):
     )
 
 
+@pytest.mark.slow
 def test_the_factor_is_drawn(capsys):
     options = ("--max-trims", "4", "--radius", "2", "--plot")
     assert design(FILE, *options) == 0

@@ -57,8 +57,8 @@ def test_pictures_are_the_same_wherever_they_are_drawn(tmp_path):
 @pytest.mark.parametrize(
     ("what", "said"),
     [
-        pytest.param("write, {path!r}, 'drawn'", "True", marks=pytest.mark.slow),
-        ("fail, {path!r}", "False"),
+        ("write, {path!r}, 'drawn'", "True"),
+        pytest.param("fail, {path!r}", "False", marks=[pytest.mark.slow, pytest.mark.exhaustive]),
     ],
 )
 def test_what_fails_is_told(what, said, tmp_path):

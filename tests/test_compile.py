@@ -332,6 +332,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_what_kernels_share_is_compiled_once_and_handed_records_by_their_address(tmp_path):
     (tmp_path / "example_sharing.py").write_text(SHARING)
     code = "import runpy; runpy.run_module('example_sharing', run_name='__main__')"

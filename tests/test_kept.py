@@ -42,6 +42,7 @@ def test_many_owners_in_turn_do_not_evict_each_other(worked):
     assert len(done) == 50
 
 
+@pytest.mark.slow
 def test_results_go_with_their_owner(worked):
     done, work = worked
     owner = Owner()

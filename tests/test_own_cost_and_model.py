@@ -71,6 +71,7 @@ def test_words_do():
     assert asked["stated"].bound.kind == asked["built in"].bound.kind == "exhaustive"
 
 
+@pytest.mark.slow
 def test_bounds_on_cells_hold_for_every_cost():
     aside = replace(problem(BUILT_IN, obstacles=()), goals=ma.Goal([0.0, 1.5, 0.0]))
     cheapest = ma.plan(aside, time_limit=60.0).cost

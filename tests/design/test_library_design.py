@@ -40,6 +40,7 @@ def test_three_are_enough_without_reverse():
     assert designed.words.boxes == 0
 
 
+@pytest.mark.slow
 def test_words_of_five_trims_lose_nothing_and_words_of_four_little():
     five = ma.design_library(LEVELS, max_trims=5, radius=15.0)
     assert five.factor == 1.0

@@ -25,7 +25,7 @@ def swept(plan):
     )
 
 
-@BOTH
+@pytest.mark.parametrize("covered", [oblong, pytest.param(pond, marks=pytest.mark.slow)])
 def test_all_inside_the_headland_is_worked(covered):
     done = covered()
     field = done.problem

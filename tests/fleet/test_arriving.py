@@ -101,6 +101,7 @@ def test_a_moved_fleet_ends_beside_the_moved_one():
     assert within(here.plans["a"].end, beside_its_goal().problems[0].goals[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("tolerance", "gap"), [(0.05, 0.6)])
 def test_where_no_place_is_left_there_is_no_plan(tolerance, gap):
     fleet = beside_its_goal(tolerance=tolerance, gap=gap, stays=0.0)

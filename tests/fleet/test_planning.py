@@ -200,6 +200,7 @@ def test_bounds_hold_for_every_vehicle():
         assert (np.abs(poses[:, :2]) <= 5.0 + 1e-9).all()
 
 
+@pytest.mark.slow
 def test_one_stands_aside_in_a_bay_until_the_other_has_passed():
     """A corridor for one, with a bay that is on nobody's way: searched for, not stumbled upon."""
     rows = [

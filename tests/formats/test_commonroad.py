@@ -222,6 +222,7 @@ def test_static_obstacles_stand_where_they_began(tmp_path):
     assert statement.road.present(1e6)
 
 
+@pytest.mark.slow
 @needs_data
 def test_the_given_scenarios_are_read():
     found = {file.stem: read_commonroad(file)[0].road for file in SCENARIOS.glob("*.xml")}

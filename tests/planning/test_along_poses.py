@@ -128,6 +128,7 @@ def test_among_obstacles():
     assert result.reason.startswith("pose 1 on the way: the vehicle touches")
 
 
+@pytest.mark.slow
 def test_with_inertia_it_passes_in_motion_or_stops():
     car = ma.load_stock_library("second_order_car")
     passing = ma.Problem(car, [0, 0, 0], [20, 0, 0], via=ma.Via([10, 0, 0]))

@@ -91,6 +91,7 @@ def test_a_plan_has_the_best_of_its_times():
     assert again is None or here.cost_of(again) > result.cost * (1.0 - 2e-3)
 
 
+@pytest.mark.slow
 @compiled_only
 def test_plans_with_maneuvers_have_slopes_too():
     here = ma.load_scenario("scenarios/robot_with_inertia.yaml").problem

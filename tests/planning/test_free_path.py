@@ -90,6 +90,7 @@ def test_a_bend_beside_which_something_moves():
         assert verify(among, found.plan).passed
 
 
+@pytest.mark.slow
 def test_a_moved_bend_has_the_moved_plan():
     problem = with_library(FAMILIES["bend"](np.random.default_rng(5), 0.2))
     by = SE2([300.0, -50.0, 2.0])

@@ -115,6 +115,7 @@ def limited():
     return plan(posed(replace(CAR, max_lateral_acceleration=MOST)), time_limit=200.0)
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_limit_costs_what_optimal_control_says(limited):
     rows = driven(CAR, limited.plan)

@@ -111,6 +111,7 @@ def test_another_map_has_another_workspace():
     assert planner.workspace.on(other.obstacles) is not planner.workspace
 
 
+@pytest.mark.slow
 def test_a_planner_is_copied_and_sent_to_other_processes():
     search = SearchSettings(max_expansions=200, improve=False)
     wall = Box([1.0, 1.0], [2.0, 0.5])

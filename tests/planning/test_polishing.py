@@ -136,6 +136,7 @@ def test_plans_past_what_moves_are_polished():
     assert words.plan.word == plain.plan.word
 
 
+@pytest.mark.slow
 def test_a_moved_scene_and_a_later_start_have_the_moved_polished_plan():
     here, by = plan(posed(crossing()), time_limit=60.0), SE2([-30.0, 12.0, 2.2])
     moved = plan(posed(crossing()).moved(by), time_limit=60.0)

@@ -284,6 +284,7 @@ def test_a_plan_made_before_is_driven(tmp_path):
     assert kept[0].decision.controls[0].tolist() == result.decision.controls[0].tolist()
 
 
+@pytest.mark.slow
 def test_a_drive_takes_the_time_that_a_goal_leaves():
     lane = Lanelet(1, [[0, 2], [400, 2]], [[0, -2], [400, -2]])
     goal = GoalRegion(
@@ -323,6 +324,7 @@ def test_the_judge_sees_contacts_and_the_edge(tmp_path):
     assert (off.off_road, off.edge_m) == (True, 0.0)
 
 
+@pytest.mark.slow
 @needs_data
 def test_a_tight_junction_is_driven_with_the_steering_that_the_car_has():
     file = DATA / "commonroad" / "scenarios" / "DEU_Muc-11_1_T-1.xml"

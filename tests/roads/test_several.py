@@ -171,6 +171,7 @@ class TestLoop:
             past = replace(scenes[name], traffic=(*scenes[name].traffic, *others))
             assert judged(past, vehicle, one.driven).clean
 
+    @pytest.mark.slow
     def test_a_moved_road_has_the_moved_loop(self, scenes, drive):
         by, one = SE2(np.array([30.0, -20.0, 1.1])), drive
         other = drive_roads({name: scene.moved(by) for name, scene in scenes.items()})

@@ -146,6 +146,7 @@ def test_dear_ground_in_the_open_is_worth_a_detour():
     assert seen == pytest.approx(result.cost, rel=5e-3, abs=0.1)
 
 
+@pytest.mark.slow
 @compiled_only
 def test_a_moved_problem_has_the_moved_plan(through):
     moved = ma.plan(through.problem.moved(SE2([30.0, -7.0, 2.0])), time_limit=600.0)

@@ -232,6 +232,7 @@ def test_a_long_motion_is_told_apart_on_the_bar():
     ]
 
 
+@pytest.mark.slow
 def test_values_show_themselves():
     plan = parking_plan()
     result = replace(result_of(plan), problem=slalom_problem(plan))
