@@ -100,10 +100,9 @@ def test_words_of_five_trims_are_shortest_paths():
     assert np.abs(lengths - reeds_shepp_length(goals)).max() < 1e-9
 
 
-@pytest.mark.parametrize("seed", range(1))
-def test_boxes_enclose_the_goals_in_them(seed):
-    rng = np.random.default_rng(seed)
-    low = random_goals(300, seed=seed + 10)
+def test_boxes_enclose_the_goals_in_them():
+    rng = np.random.default_rng(0)
+    low = random_goals(300, seed=10)
     special = rng.choice([0.0, 1.0, 2.0, -2.0], size=(100, 3)) * [1.0, 1.0, math.pi / 2]
     low[:100] = special - 10.0 ** rng.uniform(-4.0, -1.0, size=(100, 3))
     size = 10.0 ** rng.uniform(-3.0, -0.3, size=low.shape)

@@ -35,9 +35,9 @@ def states_of(path):
 
 
 @quiet
-@pytest.mark.parametrize("step", [0.1])
-def test_states_are_those_of_the_middle_at_the_steps_of_the_scenario(step, tmp_path):
+def test_states_are_those_of_the_middle_at_the_steps_of_the_scenario(tmp_path):
     pytest.importorskip("commonroad.common.solution")
+    step = 0.1
     recorded = car(7, x=60.0, y=2.0, speed=8.0, steps=40, step=step)
     drive = drive_on_lanes(tmp_path, *LANES, recorded, problem(321), step=step)
     named = RoadBenchmark(scenario="ZAM_Lanes-1_1_T-1", version="2020a", problem=321)

@@ -60,12 +60,11 @@ def test_noise_within_the_tubes(scene):
     assert all(off <= 0.05 for step in log.steps for off in step.off_plan.values())
 
 
-@pytest.mark.parametrize("seed", [1])
-def test_beside_each_other_at_the_margin(seed):
+def test_beside_each_other_at_the_margin():
     """No plan that starts nearer can be proven: both drive back to the plans that they hold."""
     ends = ([0, 0, 0], [8, 0, 0]), ([0, 0.702, 0], [8, 0.702, 0])
     fleet = FleetProblem([problem_of(*one, tolerance=0.1) for one in ends], margin=0.1)
-    log = loop_of(fleet, disturbance=NOISE, seed=seed)
+    log = loop_of(fleet, disturbance=NOISE, seed=1)
     assert log.reached
     assert_free(log)
     assert all(off <= 0.05 for step in log.steps for off in step.off_plan.values())
@@ -333,9 +332,9 @@ def test_who_has_inertia_drives_maneuvers_that_can_be_left():
 # -- going on after a break
 
 
-@pytest.mark.parametrize("after", [6])
-def test_a_loop_that_was_broken_off_goes_on_where_it_was(after, tmp_path):
+def test_a_loop_that_was_broken_off_goes_on_where_it_was(tmp_path):
     """With the noise that it would have had, pushes included, also from a file."""
+    after = 6
     upset = Disturbance(position_m=0.003, heading_rad=0.003, pushes={5: (0.05, 0.05, 0.1)})
     fleet = crossing(tolerance=0.1, leaves=(True, False))
     first = plan_fleet(fleet, time_limit=60.0, max_rounds=0)

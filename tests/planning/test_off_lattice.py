@@ -10,7 +10,7 @@ import pytest
 import shapely
 from shapely.affinity import rotate, translate
 
-from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.collision import Box
 from maneuver_automaton.formats.lattice import Lattice, Move, automaton_of_lattice
 from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.groups import SE2
@@ -89,10 +89,8 @@ def on_grid(result):
     ("goal", "there"),
     [([4.0, 0.0, 0.0], (8, 0, "heading 0")), ([3.0, 1.5, -QUARTER], (6, 3, "heading 3"))],
 )
-@pytest.mark.parametrize("walled", [True])
-def test_a_goal_on_the_lattice_is_reached_at_the_least_cost(goal, there, walled):
-    obstacles = (Obstacle(WALL),) if walled else ()
-    problem = Problem(library(), [0, 0, 0], goal, footprint=BODY, obstacles=obstacles, search=WORK)
+def test_a_goal_on_the_lattice_is_reached_at_the_least_cost(goal, there):
+    problem = Problem(library(), [0, 0, 0], goal, footprint=BODY, obstacles=WALL, search=WORK)
     result = plan(problem, time_limit=60.0)
     assert result.status is PlanStatus.FOUND, result.reason
     np.testing.assert_allclose(result.plan.end[:2], goal[:2], atol=1e-9)
@@ -100,11 +98,10 @@ def test_a_goal_on_the_lattice_is_reached_at_the_least_cost(goal, there, walled)
     assert on_grid(result) < 1e-9
     names = {one.name for one in problem.automaton.maneuvers}
     assert set(result.plan.word) <= names
-    wall = shapely.box(1.8, -1.5, 2.2, 1.5) if walled else None
+    wall = shapely.box(1.8, -1.5, 2.2, 1.5)
     best = least_cost(problem.automaton, "heading 0", there, wall)
     assert result.cost == pytest.approx(best, rel=1e-9)
-    if wall is not None:
-        assert not any(body_at(p).intersects(wall) for p in result.plan.sample().pose)
+    assert not any(body_at(p).intersects(wall) for p in result.plan.sample().pose)
 
 
 def test_the_lattice_lies_under_the_start():

@@ -72,7 +72,6 @@ def boxes_of(figure):
 
 
 class TestFiles:
-    @pytest.mark.parametrize("body", [CAR])
     @pytest.mark.parametrize(
         "plan",
         [
@@ -81,8 +80,8 @@ class TestFiles:
             plan_of(["straight", "clockwise"] * 40, [0.5] * 80),
         ],
     )
-    def test_plans_are_written(self, plan, body, tmp_path):
-        save_picture(with_body(plan, body), tmp_path / "plan.png")
+    def test_plans_are_written(self, plan, tmp_path):
+        save_picture(with_body(plan, CAR), tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
 
     def test_scenes_are_written(self, tmp_path):
