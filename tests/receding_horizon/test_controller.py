@@ -12,7 +12,7 @@ from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Bounds, Horizon, Problem
 from maneuver_automaton.receding_horizon import Guarantee, Origin, RecedingHorizon, within
 from maneuver_automaton.receding_horizon.rest_of_plan import missed
-from tests.receding_horizon.loops import AHEAD, EFFORT, NEAR, parking_loop, straight
+from tests.receding_horizon.loops import AHEAD, NEAR, parking_loop, straight
 from tests.search.cases import (
     REEDS_SHEPP,
     TABLE_2,
@@ -63,20 +63,6 @@ class TestOneStep:
         assert step.exhaustive
         assert step.lower_bound == step.value
         assert step.gap == 0.0
-
-    def test_the_tie_rule_within_a_word(self):
-        # 1.7 for 0.2 s and 1.6 for 0.8 s: either order is optimal, the costlier one comes first
-        problem = Problem(
-            robot({"rest": (0.0, 0.0), "slow": (1.6, 0.0), "fast": (1.7, 0.0)}),
-            [-1.62, 0.0, 0.0],
-            [0.0, 0.0, 0.0],
-            cost=EFFORT,
-            horizon=Horizon(time=1.0),
-        )
-        _, step = controller(problem, step=0.1).step(problem.start)
-        assert step.plan.word == ("fast", "slow")
-        assert step.plan.durations.tolist() == pytest.approx([0.2, 0.8])
-        assert step.applied_cost == pytest.approx(0.289)
 
 
 class TestElapsed:
