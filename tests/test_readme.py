@@ -58,6 +58,7 @@ LONG = {  # pages whose code, and words in commands that, take seconds
     "exact_pose",
     "gear_changes",
     "keep_away",
+    "on_the_way",
     "primitives",
     "replanning",
     "smoothing",

@@ -57,6 +57,7 @@ def test_the_edge_of_a_feasible_set_is_where_the_time_is_up(figures):
     np.testing.assert_allclose(np.concatenate(edges), 1.5, atol=0.02)
 
 
+@pytest.mark.slow
 def test_what_was_studied_is_drawn(figures, tmp_path):
     studies = figures["studies"]
     problem = problem_of(even(5), MIXED, intervals=4, goal=[0.0, 0.0, 0.0])

@@ -108,6 +108,7 @@ def test_what_is_wrong_is_told_in_one_line(text, said, tmp_path, capsys):
     assert "internal error" not in err
 
 
+@pytest.mark.slow
 def test_a_field_without_room_has_no_plan(tmp_path, capsys):
     path = written(tmp_path, FIELD.replace("headland_m: 12.0", "headland_m: 2.0"))
     asked = ["cover", str(path), "--out", str(tmp_path / "out"), "--no-plot"]

@@ -63,6 +63,7 @@ def test_only_flights_among_heights_need_space():
     assert str(error.value) == "a picture in space: the unicycle has no altitude"
 
 
+@pytest.mark.slow
 def test_loops_and_fleets_fly_too(tmp_path):
     one, other = flight(), flight(plan=flight().plan.moved(SE2xR([0.0, -6.0, 0.0, 1.0])))
     fleet = fleet_of([one, other], names=["a", "b"])

@@ -170,6 +170,7 @@ def test_held_in_the_goal_beside_a_wall():
     assert list(loop.collisions) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0])
 def test_a_moved_scene_has_the_moved_loop(seed):
     problem = replace(seeded(seed), bounds=Bounds())

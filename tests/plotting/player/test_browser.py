@@ -78,6 +78,8 @@ def test_the_page_plays_what_was_planned(tmp_path):
             assert page.locator("#layers input").count() == 1
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_the_page_of_a_fleet_plays_all_and_picks_one(tmp_path):
     result = crossing()
     result.player(title="Crossing").save(tmp_path / "fleet.html")
@@ -185,6 +187,8 @@ def test_a_closed_loop_is_played_as_its_file_says(tmp_path):
         np.testing.assert_allclose(shown, [step["pose"] for step in steps], atol=MILLIMETRE)
 
 
+@pytest.mark.exhaustive
+@pytest.mark.slow
 def test_the_page_of_a_fleets_loop_plays_what_was_driven(tmp_path):
     log = simulate_fleet(
         robots(tolerance=0.1), step=0.5, steps=40, first_time_limit=1.0, joins_s={"b": 1.0}
