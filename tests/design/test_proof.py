@@ -39,6 +39,7 @@ def test_no_goal_has_a_greater_factor_than_the_proven_one(max_trims):
     assert ratios.min() >= 1.0 - 1e-9
 
 
+@pytest.mark.exhaustive
 @pytest.mark.slow
 def test_the_worst_goal_has_the_factor_that_is_stated():
     found = proof(3, scale=2.0)

@@ -14,7 +14,7 @@ import pytest
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.groups import SE2, SE2xR
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
@@ -203,22 +203,6 @@ def test_the_bound_knows_every_trim_of_a_large_library():
                       cost=Cost(effort=1.0))  # fmt: skip
     result = plan(problem, time_limit=LIMIT)
     assert result.lower_bound <= 4.0 + 1e-9  # straight to the left at 0.5 m/s, for 16 s
-
-
-def test_the_lattice_and_altitude():
-    glider = Automaton.of_controls(
-        UserModel(name="glider", group=SE2xR, control_names=("speed", "turn", "climb"),
-                  velocity=lambda z, u: [u[0], 0.0, u[1], u[2]]),
-        {"level": (1.0, 0.0, 0.0), "left up": (1.0, 1.0, 0.3), "right down": (1.0, -1.0, -0.3)},
-    )  # fmt: skip
-    problem = Problem(glider, [0, 0, 0, 0], [3, 1, 0, 0.1], search=SearchSettings(method="lattice"))
-    try:
-        result = plan(problem, time_limit=LIMIT)
-    except ValueError as error:
-        if "lattice" in str(error):
-            return  # refused, and told why
-        raise
-    assert result.plan is None or result.plan.end[3] == pytest.approx(0.1)
 
 
 @pytest.mark.slow

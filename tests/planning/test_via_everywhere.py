@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
-from maneuver_automaton.groups import SE2
-from tests.inertia import CAR, resting
 from tests.matrix.scenes import base
 from tests.matrix.vehicles import VEHICLES
 from tests.planning.test_along_poses import ROBOT, START, dubins, planned
@@ -83,42 +81,6 @@ def test_other_vehicles(name):
     start, goal = [0.0, 0.0, 0.0, *(0.0 for _ in space)], [20.0, 0.0, 0.0, *space]
     way = ma.Via([8.0, 1.0, 0.1, *(0.5 for _ in space)])
     planned(ma.Problem(library, start, goal, via=way))
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-@pytest.mark.parametrize("free", [False, True])
-def test_with_inertia_it_passes_without_a_rest_and_rests_where_it_is_told_to(free):
-    """A car that knows no trim but rest: without polishing it goes from rest to rest."""
-    robot = resting(CAR)
-    poses = [[6.0, 3.0, 0.5], [12.0, 3.5, -0.4]]
-
-    def passing(place, *, polish=True, **given):
-        via = [
-            ma.Via((place @ SE2(np.array(one))).pose, free_heading=free, **given) for one in poses
-        ]
-        ends = [(place @ SE2(np.array(one))).pose for one in ([0.0, 0.0, 0.0], [18.0, 0.0, 0.0])]
-        search = ma.SearchSettings(max_expansions=500, polish=polish)
-        result = ma.plan(ma.Problem(robot, *ends, via=via, search=search), time_limit=60.0)
-        speeds = [
-            float(np.abs(result.plan.sample().reduced_state[:, 0])[
-                np.searchsorted(result.plan.sample().time, one.time, side="right") - 1
-            ])
-            for one in result.via
-        ]  # fmt: skip
-        return result, speeds
-
-    here = SE2(np.zeros(3))
-    rests, _ = passing(here, polish=False)
-    found, speeds = passing(here)
-    assert found.cost < 0.8 * rests.cost
-    assert min(speeds) > 1.0
-    if free:
-        stops, speeds = passing(here, stop=True)
-        assert found.cost < stops.cost
-        assert max(speeds) < 1e-6
-    moved, _ = passing(SE2(np.array([400.0, -90.0, 2.0])))
-    assert moved.cost == pytest.approx(found.cost, rel=1e-5)
 
 
 @pytest.mark.slow

@@ -58,3 +58,18 @@ def test_a_label_longer_than_its_axes_is_in_lines():
     label = "angular acceleration [rad/s²]"
     draw_over_time(column[0], Track(np.zeros(3), ()), [], label=label, colors=INK)
     assert "\n" in column[0].get_ylabel()
+
+
+def test_one_axes_takes_all_controls_in_different_styles():
+    ax = Figure().add_subplot()
+    drawn = draw_controls(ax, parking_plan(), labels=["speed", "turn rate"])
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["speed", "turn rate"]
+    ax.figure.canvas.draw()
+    legend, inner = ax.get_legend().get_window_extent(), ax.get_window_extent()
+    assert legend.x0 >= inner.x1  # beside the curves, and within the page
+    assert legend.x1 <= ax.figure.bbox.x1
+    dashes = [str(artists.steps.get_linestyle()[0]) for artists in drawn]
+    assert dashes[0] != dashes[1]
+    low, high = ax.get_ylim()
+    assert low < -0.25
+    assert high > 1.5

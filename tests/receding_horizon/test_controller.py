@@ -58,12 +58,6 @@ class TestOneStep:
         assert step.control is None
         assert (step.value, step.plan.word, step.applied) == (0.0, (), 1.0)
 
-    def test_the_certificate_of_an_exhaustive_search(self):
-        _, step = controller().step([0.0, 1.0, 0.0])
-        assert step.exhaustive
-        assert step.lower_bound == step.value
-        assert step.gap == 0.0
-
 
 class TestElapsed:
     @pytest.mark.parametrize("elapsed", [0.0, 0.25, 0.5, 1.0, 1.5, 1.9])

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +21,6 @@ from tests import scenes
 from tests.reference_lattice import cost_table
 from tests.search.cases import compiled_only
 
-ROOT = Path(__file__).parents[2]
 HALF, HEADINGS, CELL = 7, 12, 0.31
 ODD = np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 1.13], [0.9, 0.0, -1.27], [-0.7, 0.1, 0.3]])
 RATES = np.array([1.0, 1.171, 1.313, 1.557])
@@ -120,22 +117,6 @@ def test_nothing_is_left_behind_when_writing_fails(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "replace", full)
     assert kept_in(tmp_path).any()
     assert list(tmp_path.iterdir()) == []
-
-
-@compiled_only
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_two_processes_at_once_keep_one_whole_table(tmp_path):
-    order = (
-        "from tests.search.test_cost_to_go import kept_in; from pathlib import Path; import sys;"
-        "kept_in(Path(sys.argv[1]))"
-    )
-    running = [
-        subprocess.Popen([sys.executable, "-c", order, str(tmp_path)], cwd=ROOT) for _ in range(2)
-    ]
-    assert [process.wait(120) for process in running] == [0, 0]
-    assert len(list(tmp_path.iterdir())) == 1
-    assert np.array_equal(kept_in(tmp_path), kept_in(tmp_path / "anew"))
 
 
 def test_a_free_heading_costs_the_least_of_all_headings():

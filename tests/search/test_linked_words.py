@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import least_squares
 
-from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
@@ -19,7 +17,7 @@ from maneuver_automaton.search.linked_words import scan_linked_words
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_setup import word_setup
 from tests.inertia import car_automaton, unicycle_automaton
-from tests.search.cases import compiled_only, lasting
+from tests.search.cases import compiled_only
 
 pytestmark = compiled_only  # whole searches; their kernels have tests of their own
 
@@ -55,32 +53,6 @@ def test_nothing_cheaper_is_found_by_brute_force(goal):
     one = problem(goal, automaton=unicycle_automaton(SMALL))
     best = searched(one).solutions[0]
     assert best.cost <= by_brute_force(one, 4, 6) + 1e-6
-
-
-@pytest.mark.exhaustive
-@pytest.mark.slow
-def test_all_words_of_three_trims_are_listed():
-    one = problem([2.0, 1.5, 0.7], automaton=unicycle_automaton(SMALL))
-    result = searched(one, alternatives=None, max_trims=3)
-    assert result.complete
-    setup = word_setup(one, one.goals[0], most_trims=99)
-    rng = np.random.default_rng(1)
-    for word in itertools.product((1, 2, 3), repeat=3):
-        if word[0] == word[1] or word[1] == word[2]:
-            continue
-        both = [lasting(s) for s in result.solutions]
-        mine = [times for trims, times in both if trims == word]
-
-        def miss(t, word=word):
-            gap = np.array(setup.plan(word, np.abs(t)).end - one.goals[0].pose)
-            gap[2] = wrapped(gap[2])
-            return gap
-
-        for _ in range(6):
-            root = least_squares(miss, rng.exponential(1.5, 3), xtol=1e-14, ftol=1e-14)
-            times = np.abs(root.x)
-            if root.cost < 1e-20 and (times < 2 * np.pi / 0.8).all():
-                assert min(np.abs(row - times).max() for row in mine) < 1e-5
 
 
 @compiled_only

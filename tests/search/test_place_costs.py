@@ -124,7 +124,6 @@ def test_in_a_corridor_a_car_keeps_to_the_middle(through):
     assert result.lower_bound <= result.cost
 
 
-@pytest.mark.exhaustive
 @pytest.mark.slow
 @compiled_only
 def test_dear_ground_in_the_open_is_worth_a_detour():

@@ -356,3 +356,16 @@ def test_too_many_trims_are_refused(problem, most):
     message = rf"max_trims is \d+, need at most {most}; use insertion for more"
     with pytest.raises(ValueError, match=message):
         search(problem)
+
+
+def test_start_equal_to_goal():
+    still = replace(parking(), start=np.zeros(3))
+    rest = best(still)
+    assert names(still, rest) == ("rest",)
+    assert rest.durations.tolist() == [8.0]
+    assert rest.cost == 0.0
+    free = best(replace(parking(time=None), start=np.zeros(3)))
+    assert free.trims.size == 0
+    assert free.cost == 0.0
+    whole_turn = replace(parking(time=None), start=np.array([0.0, 0.0, -4.0 * np.pi]))
+    assert best(whole_turn).trims.size == 0
