@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from maneuver_automaton.automaton.cutting import NOTHING, committed, head_of
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Zone
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.formats.closed_loop_json import (
+    closed_loop_to_dict,
     load_steps,
     save_closed_loop,
 )
@@ -479,3 +481,10 @@ class TestAmongWhatMoves:
         assert step.decision is Decision.PLANNED
         _, step = controller.step([0.0, 0.0, 0.0], elapsed=0.0)
         assert Guarantee.SAFETY not in [one.guarantee for one in step.violations]
+
+
+def test_the_log_can_be_written():
+    loop = simulate(posed(), step=0.5, time_limit=1.0)
+    document = json.loads(json.dumps(closed_loop_to_dict(loop), allow_nan=False))
+    assert document["reached"] is True
+    assert document["steps"][0]["control"] == loop.steps[0].control.tolist()
