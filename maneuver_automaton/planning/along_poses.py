@@ -18,7 +18,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -50,6 +50,8 @@ POLISHED = 0.7  # of the time left, for polishing the plan as a whole
 VARIED = 0.6  # of the time left then, for free headings and places
 THINNED = 3  # of so many arrivals one stays where improved ones come in
 SECTORS = 12  # of headings, in each of which the best arrival is improved
+TURNED = 0.03  # [rad] of their borders, off headings that lie on them but for rounding
+ALIKE = 1e-6  # [m, rad] between arrivals that are one
 FINE = 1e-4  # of a heading or place, as a share of where it was looked for, at the last
 NARROWER = 0.3  # of a step in which a heading or place gained nothing
 GAIN = 1e-7  # share of a cost that is a gain
@@ -291,8 +293,10 @@ class _Search:
         chains: dict[tuple[int, ...], float] = {}
         for n, row in enumerate(rows):
             through = ahead[n] + back[n]
-            headings = np.array([self.arrivals[a][1].pose[2] for a in row])
-            sectors = np.floor(headings * SECTORS / (2.0 * math.pi)).astype(int) % SECTORS
+            headings = np.array([self.arrivals[a][1].pose[2] for a in row]) - problem.start[2]
+            sectors = (
+                np.floor((headings + TURNED) * SECTORS / (2.0 * math.pi)).astype(int) % SECTORS
+            )
             for sector in set(sectors.tolist()):
                 at = int(np.argmin(np.where(sectors == sector, through, np.inf)))
                 picked = [at]
@@ -311,12 +315,9 @@ class _Search:
                 if not why_goal_blocked(problem, Goal(pose)):
                     more[k].append(Arrival(pose))
         return [
-            replace(
-                way,
-                arrivals=tuple({to.key: to for to in (*more[k], *way.arrivals[::THINNED])}.values())
-                if way.is_free
-                else way.arrivals,
-            )
+            replace(way, arrivals=_distinct((*more[k], *way.arrivals[::THINNED])))
+            if way.is_free
+            else way
             for k, way in enumerate(self.ways)
         ]
 
@@ -523,7 +524,7 @@ class _Search:
             for to in self.ways[best.passed[n]].arrivals
             if (to.trim == here.trim) != np.array_equal(to.pose, here.pose)
         ]
-        for to in sorted(others, key=lambda one: float(np.abs(one.pose - here.pose).sum())):
+        for to in sorted(others, key=here.off):
             if self.legs.is_over(budget):
                 break
             best = _cheaper(best, self._with(best, n, to, budget))
@@ -590,6 +591,15 @@ class _Search:
         if any(one.status is PlanStatus.OUT_OF_BUDGET for one in self.failed.values()):
             status = PlanStatus.OUT_OF_BUDGET
         return status, f"from {begin} to {end}: {result.reason}"
+
+
+def _distinct(arrivals: Iterable[Arrival]) -> tuple[Arrival, ...]:
+    """Arrivals without those that come after one like them."""
+    found: list[Arrival] = []
+    for one in arrivals:
+        if not any(one.trim == other.trim and one.off(other) <= ALIKE for other in found):
+            found.append(one)
+    return tuple(found)
 
 
 def _cheaper(chain: Chain, other: Chain | None) -> Chain:

@@ -58,6 +58,13 @@ class Arrival:
         """Equal for equal arrivals."""
         return self.pose.tobytes(), self.trim
 
+    def off(self, other: Arrival) -> float:
+        """How far [m, rad] another one is: the larger of the distance and the turn."""
+        apart = np.array(self.pose - other.pose)
+        turn = math.remainder(float(apart[2]), 2.0 * math.pi)
+        apart[2] = 0.0
+        return max(float(np.linalg.norm(apart)), abs(turn))
+
 
 def arrivals_of(
     problem: Problem, number: int
@@ -110,7 +117,7 @@ def _places(problem: Problem, number: int) -> Iterator[Array]:
             pose[places] = via.gate[0] + share * (via.gate[1] - via.gate[0])
             yield pose
     for k in range(AROUND if via.tolerance_m else 0):
-        angle = 2.0 * math.pi * k / AROUND
+        angle = float(problem.start[2]) + 2.0 * math.pi * k / AROUND
         pose = np.array(via.pose)
         pose[:2] += (1.0 - INSIDE) * via.tolerance_m * np.array([math.cos(angle), math.sin(angle)])
         yield pose
@@ -157,7 +164,11 @@ def _headings(problem: Problem, number: int) -> list[float]:
     first = angles[0] if angles else float(problem.start[2])
     count = headings_tried(problem)
     angles += [first + 2.0 * math.pi * k / count for k in range(count)]
-    return list(dict.fromkeys(math.remainder(angle, 2.0 * math.pi) for angle in angles))
+    from_start = [math.remainder(angle - problem.start[2], 2.0 * math.pi) for angle in angles]
+    return [
+        float(problem.start[2]) + angle
+        for angle in {round(one, 9): one for one in from_start}.values()
+    ]
 
 
 def _of_single_trims(problem: Problem, way: Array, side: float) -> list[float]:
@@ -235,7 +246,10 @@ def freedoms(problem: Problem, via: Via) -> Iterator[tuple[Callable[[Array, floa
         length = float(np.linalg.norm(via.gate[1] - via.gate[0]))
         yield along((via.gate[1] - via.gate[0]) / length), length / 2.0
     if via.tolerance_m:
-        for direction in np.eye(len(places)):
+        ahead, left = math.cos(problem.start[2]), math.sin(problem.start[2])
+        directions = np.eye(len(places))
+        directions[:2, :2] = [[ahead, left], [-left, ahead]]
+        for direction in directions:
             yield along(direction), via.tolerance_m
 
 

@@ -90,12 +90,14 @@ def test_the_best_heading_at_the_first_depends_on_the_third():
 
 
 def test_a_moved_problem_has_the_moved_plan():
-    via = [ma.Via([3, 3], free_heading=True), ma.Via([6, 1, -0.4], stay_s=1.5)]
-    problem = ma.Problem(ROBOT, START, [9, 0, 0], via=via)
+    via = [ma.Via([3, 3], free_heading=True, tolerance_m=0.3), ma.Via([6, 1], free_heading=True)]
+    post = ma.Disc(0.3, [5, 1.2])
+    problem = ma.Problem(ROBOT, START, [9, 0, 0], via=via, obstacles=post, footprint=ma.Disc(0.2))
     by = ma.SE2([4.0, -7.0, 2.0])
-    result, moved = planned(problem), planned(problem.moved(by))
-    assert moved.cost == pytest.approx(result.cost, rel=1e-4)
-    assert moved.via[0].pose[:2].tolist() == pytest.approx(by.act(np.array([3.0, 3.0])).tolist())
+    result, moved = planned(problem, 30), planned(problem.moved(by), 30)
+    assert moved.cost == pytest.approx(result.cost, rel=1e-9)
+    ends = [by.act(one.pose[:2]).tolist() for one in result.via]
+    assert [one.pose[:2].tolist() for one in moved.via] == [pytest.approx(end) for end in ends]
 
 
 def test_an_order_that_is_free_is_the_best_of_all():
