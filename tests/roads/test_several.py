@@ -184,7 +184,7 @@ class TestLoop:
         Path("road.xml").write_text(
             commonroad(*LANES, problem(100, x=10.0), problem(101, x=11.0), problem(102, x=60.0))
         )
-        drive = drive_roads(scenes_of("road.xml"), time_limit=1.0)
+        drive = drive_roads(scenes_of("road.xml"), time_limit=10.0)
         for name, other in (("100", "101"), ("101", "100")):
             one = drive.results[name]
             assert (one.status, len(one.steps)) == ("touched", 0)
