@@ -131,6 +131,19 @@ def writing(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def printed(written: Path, file: Path, *, as_json: bool) -> Iterator[None]:
+    """With --json, print a file once it is written, and nothing else to standard output."""
+    if not as_json:
+        yield
+        return
+    if file.is_dir():
+        raise InvalidScenario(f"--json: prints the document of one file, and {file} is a folder")
+    with contextlib.redirect_stdout(sys.stderr):
+        yield
+    sys.stdout.write(written.read_text(encoding="utf-8"))
+
+
+@contextlib.contextmanager
 def naming(path: Path, about: str = "") -> Iterator[None]:
     """Name the file, and the part of it that is meant, where a value of it is refused."""
     try:
