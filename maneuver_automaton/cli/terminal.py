@@ -185,10 +185,7 @@ def counted(advance: Advance) -> Callable[[int, int], None]:
 
 @contextlib.contextmanager
 def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> Iterator[None]:
-    """A clock that runs while something is computed of which no one knows how long it takes.
-
-    What `more` says takes the place of `what`, and is asked for again and again: one line.
-    """
+    """A clock while something is computed; what `more` says now is shown instead of `what`."""
     if quiet or _shown or not has_terminal():
         yield
         return

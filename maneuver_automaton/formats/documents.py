@@ -112,20 +112,7 @@ def vehicle_entry(model: Model) -> ModelEntry:
 
 
 def read_document(path: Path | str, *kinds: str) -> dict[str, Any]:
-    """What a plan.json, closed_loop.json or statistics.json holds, of whichever kind it is.
-
-    Parameters
-    ----------
-    path : Path or str
-    *kinds : str
-        Those that it may be, by their names in `KINDS`; any if left out.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, is none of these, or states what it may not: file, field, value
-        met, and what would be right.
-    """
+    """The content of a result file of one of these kinds, by their names in `KINDS`, or of any."""
     file = file_of(kinds[0]) if kinds else "plan.json"
     value = parsed(path, file)
     kind = kind_of(value) or "plan"

@@ -131,10 +131,7 @@ def save_fleet(
 
 
 def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
-    """The result of a plan.json of several vehicles, in the world that it was planned in.
-
-    What the file claims is not proven again; `verify_fleet` does that.
-    """
+    """The result of a plan.json of several vehicles; `verify_fleet` proves what it claims again."""
     document = read_of_fleet(path, "fleet", fleet)
     stated = document["vehicles"]
     results = {

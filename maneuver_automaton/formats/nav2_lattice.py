@@ -190,11 +190,7 @@ def automaton_of_nav2_lattice(
 
 
 def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
-    """An automaton of lattice primitives as a file; the date is left out.
-
-    The motion model is `omni` if a primitive goes aside, else `diff` if one turns on the spot, else
-    `ackermann`.
-    """
+    """An automaton of lattice primitives as a file, which leaves its date out."""
     lattice = lattice_of_automaton(automaton, kind=KIND)
     label = automaton.name or "automaton"
     moves = []

@@ -388,10 +388,7 @@ def _plan_of_file(document: Any, place: str, model: Model | None = None) -> Plan
 
 
 def load_result(path: Path | str, problem: Problem) -> PlanResult:
-    """The result of a plan.json; the file states neither body nor obstacles, the `problem` does.
-
-    Alternatives with maneuvers are left out: the file does not say how they move.
-    """
+    """The result of a plan.json of this `problem`; alternatives with maneuvers are left out."""
     return result_of(read_document(path, "plan"), problem, place=str(path))
 
 

@@ -328,10 +328,7 @@ def show_presence(drawn: PathCollection, colors: Sequence[Color], there: Sequenc
 
 
 def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
-    """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
-
-    There are at most so many steps between them, and one more.
-    """
+    """A few round times (n,) [s] from `begin` to `end`, which are the first and the last."""
     if not end > begin:
         return np.array([begin])
     tens = 10.0 ** np.floor(np.log10((end - begin) / most))

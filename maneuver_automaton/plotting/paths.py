@@ -244,10 +244,7 @@ def _steps_of(ax: Axes, cast: Cast, one: Actor) -> dict[str, Any]:
 
 
 def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
-    """Legend entries of the only vehicle of a cast: its trims, its body, its steps.
-
-    In a film the trims alone, if they are few.
-    """
+    """Legend entries of a vehicle alone: trims, body, steps; in a film trims, if few."""
     one = cast.actors[0]
     entries = [*trim_entries(one.track, cast.colors)]
     if moving:
@@ -273,10 +270,7 @@ def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
 
 
 def trim_entries(track: Track, colors: Mapping[str, Color]) -> Entries:
-    """Legend entries of the trims of a `track` that can be seen, in order.
-
-    Of how they move, if they are many.
-    """
+    """Legend entries of the trims of a `track` that can be seen, or of how they move if many."""
     symbols = {piece.name: _symbol(piece) for piece in reversed(track.pieces)}
     seen = {name: twist for name, twist in track.twists.items() if name in track.seen}
     return [

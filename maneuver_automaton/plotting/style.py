@@ -96,10 +96,7 @@ def plain(legend: Legend, entries: Entries) -> Legend:
 
 
 def outer_legend(ax: Axes, entries: Entries, *, above: bool = False) -> Legend:
-    """A legend on the right of `ax`, or `above` it, never over what is drawn.
-
-    The axes make room for it unless a layout engine does, or too little of them were left.
-    """
+    """A legend right of `ax`, or above it, which makes room unless a layout engine does."""
     figure = ax.get_figure(root=True)
     assert figure is not None
     wide, high = figure.get_size_inches()
