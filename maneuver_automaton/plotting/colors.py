@@ -130,7 +130,7 @@ def _unlike(color: Color, taken: Sequence[Color]) -> Color:
 
 def _rounded(color: Color) -> Color:
     red, green, blue = (round(min(max(c, 0.0), 1.0), 4) for c in color)
-    return (red, green, blue)
+    return red, green, blue
 
 
 MOST_TRIMS = 12  # which have a colour and a name each

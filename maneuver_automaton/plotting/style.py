@@ -46,12 +46,10 @@ def count_from_near(ax: Axes, place: Array) -> None:
     for axis, coordinate in ((ax.xaxis, place[0]), (ax.yaxis, place[1])):
         if abs(coordinate) >= FAR_M:
             origin = float(round(coordinate, -3))
-            axis.set_major_formatter(_counted_from(origin))
+            axis.set_major_formatter(
+                FuncFormatter(lambda tick, _, origin=origin: f"{tick - origin:.6g}")
+            )
             axis.set_label_text(f"{axis.get_label_text()} from {origin:.0f}")
-
-
-def _counted_from(origin: float) -> FuncFormatter:
-    return FuncFormatter(lambda tick, _: f"{tick - origin:.6g}")
 
 
 def shortened(text: str, length: int = NAME_LENGTH) -> str:
