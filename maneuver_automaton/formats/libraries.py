@@ -20,7 +20,7 @@ MOST_LIBRARY_BYTES = 500_000_000
 
 File: TypeAlias = (
     sbpl_mprim.MprimFile
-    | nav2_lattice.Nav2Lattice
+    | nav2_lattice.Nav2File
     | commonroad_primitives.RoadPrimitives
     | tuple[aroc.ArocPrimitive, ...]
 )
@@ -88,7 +88,7 @@ WRITTEN: Mapping[str, tuple[type, Callable[[Automaton], Any], Callable[[Any, Pat
         commonroad_primitives.save_commonroad_primitives,
     ),
     NAV2_JSON: (
-        nav2_lattice.Nav2Lattice,
+        dict,
         nav2_lattice.nav2_lattice_of_automaton,
         nav2_lattice.save_nav2_lattice,
     ),
