@@ -158,19 +158,9 @@ def opened(path: Path, parts: Parts) -> exports.ResultFile:
     return file
 
 
-NEEDED = (
-    "name",
-    "group",
-    "control_names",
-    "reduced_names",
-    "control_limits",
-    "reduced_limits",
-    "part_names",
-    "velocity",
-    "dynamics",
-    "body_velocity",
-    "reduced_dynamics",
-    "part_poses",
+NEEDED = (  # of a model
+    *("name", "group", "control_names", "reduced_names", "control_limits", "reduced_limits"),
+    *("part_names", "velocity", "dynamics", "body_velocity", "reduced_dynamics", "part_poses"),
 )
 
 

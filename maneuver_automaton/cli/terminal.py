@@ -126,18 +126,6 @@ def has_terminal() -> bool:
     return sys.stderr.isatty()
 
 
-def make_room() -> None:
-    """Take the bar from the terminal, for lines and the bar of the compiler."""
-    for bar in _shown:
-        bar.stop()
-
-
-def come_back() -> None:
-    """Show the bar again."""
-    for bar in _shown:
-        bar.start()
-
-
 @contextlib.contextmanager
 def _live(bar: Any) -> Iterator[None]:
     with bar:
@@ -221,7 +209,8 @@ def announced(*, quiet: bool = False) -> Iterator[None]:
             compiler_began()
             self.depth += 1
             if self.depth == 1:
-                make_room()
+                for bar in _shown:
+                    bar.stop()
             if not self.said:
                 complain(COMPILING)
             self.said = True
@@ -230,7 +219,8 @@ def announced(*, quiet: bool = False) -> Iterator[None]:
             compiler_ended()
             self.depth -= 1
             if self.depth == 0:
-                come_back()
+                for bar in _shown:
+                    bar.start()
 
     with event.install_listener("numba:compile", Announcement()):
         yield

@@ -127,34 +127,18 @@ def outer_legend(ax: Axes, entries: Entries, *, above: bool = False) -> Legend:
     return plain(legend, entries)
 
 
-UNITS = {
-    "speed": "m/s",
-    "lateral_speed": "m/s",
-    "speed_ahead": "m/s",
-    "speed_aside": "m/s",
-    "climb": "m/s",
-    "turn_rate": "rad/s",
-    "steering": "rad",
-    "steering_rate": "rad/s",
-    "front_steering": "rad",
-    "rear_steering": "rad",
-    "articulation": "rad",
-    "articulation_rate": "rad/s",
-    "acceleration": "m/s²",
-    "angular_acceleration": "rad/s²",
-    "climb_acceleration": "m/s²",
-    "hitch": "rad",
-    "hitch_2": "rad",
-    "hitch_3": "rad",
-    "tilt": "rad",
-    "lateral_tilt": "rad",
-    "tilt_rate": "rad/s",
-    "lateral_tilt_rate": "rad/s",
-    "heading_cos": "1",
-    "heading_sin": "1",
-    "force": "N",
-    "torque": "N m",
+_BY_UNIT = {
+    "m/s": "speed lateral_speed speed_ahead speed_aside climb",
+    "rad/s": "turn_rate steering_rate articulation_rate tilt_rate lateral_tilt_rate",
+    "rad": "steering front_steering rear_steering articulation hitch hitch_2 hitch_3 tilt "
+    "lateral_tilt",
+    "m/s²": "acceleration climb_acceleration",
+    "rad/s²": "angular_acceleration",
+    "1": "heading_cos heading_sin",
+    "N": "force",
+    "N m": "torque",
 }
+UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
 ARROW = " → "
 POLISHED = "polished"  # what planning calls a motion by optimal control
 
