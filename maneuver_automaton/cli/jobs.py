@@ -50,7 +50,6 @@ class JobResult:
     name: str  # of the scenario
     result: Any  # what is drawn; None: nothing
     document: Mapping[str, Any]
-    several: bool = False  # vehicles: the document names the files that it was made from
     done: bool  # whether all is as asked
     status: str
     complaints: tuple[str, ...] = ()  # a line each
@@ -119,7 +118,7 @@ class Job:
             write_document(
                 outcome.document,
                 file,
-                source=source if outcome.several else None,
+                source=source if "vehicles" in outcome.document else None,
                 interrupted=stopped(),
             )
             for name in PICTURES[self.command] if outcome.result is not None else ():
