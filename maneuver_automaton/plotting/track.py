@@ -331,6 +331,14 @@ def placed(outlines: Sequence[Array], poses: Array) -> list[Array]:
     return [corners for outline in outlines for corners in frames.act(outline)]
 
 
+def solids_at(outline: Array, poses: Array) -> Any:
+    """Shapely geometries (n,) of an outline, or of a point, at `poses` (n, dof) in the plane."""
+    import shapely
+
+    corners = SE2(poses[:, None, :3]).act(outline)
+    return shapely.points(corners[:, 0]) if len(outline) == 1 else shapely.polygons(corners)
+
+
 STRAIGHT_RAD, DETOUR = 1e-9, 1e-12  # turn, and way over chord, of a piece drawn by its two ends
 
 
