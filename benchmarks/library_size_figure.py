@@ -20,7 +20,7 @@ from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.plotting.colors import SEQUENCE
 from maneuver_automaton.plotting.look import Look
 from maneuver_automaton.plotting.pages import plain_page, write_figure
-from maneuver_automaton.plotting.style import outer_legend, tidy
+from maneuver_automaton.plotting.style import tidy
 
 WIDTH, HEIGHT = 9.6, 3.4  # [in] of the page, and below its title
 COST, MEDIAN, SLOWEST = SEQUENCE[0], SEQUENCE[2], SEQUENCE[1]
@@ -113,7 +113,10 @@ def draw_library_sizes(cost_axes: Axes, time_axes: Axes, sizes: LibrarySizes) ->
         _number_trims(ax, sizes.trims)
     _number_costs(cost_axes, sizes.costs)
     _whole_decades(time_axes, np.concatenate([sizes.medians_s, sizes.slowest_s]))
-    outer_legend(time_axes, [(slowest, "99th percentile"), (medians, "median")], above=True)
+    time_axes.legend(
+        [slowest, medians], ["99th percentile", "median"], loc="lower left",
+        bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False, fontsize=8.0,
+    )  # fmt: skip
     return LibrarySizeArtists(costs=costs, medians=medians, slowest=slowest)
 
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
+import dataclasses
+import importlib
 import inspect
-import math
-import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Annotated, Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from maneuver_automaton.cli.guard import BAD_INPUT, FOUND, complain, exits
 from maneuver_automaton.cli.help_texts import ending
 from maneuver_automaton.cli.streams import safe_streams
-from maneuver_automaton.errors import InvalidScenario
 
 PRINTED = (["schema"],)  # commands that do nothing but print
 KINDS: dict[str, Any] = {  # of values, by what stands for them; of others a text
@@ -171,32 +168,159 @@ for group, said in {
     )
     app.add_typer(GROUPS[group], name=group)
 
-Given: TypeAlias = SimpleNamespace  # arguments and options of a command, by their names
-Work: TypeAlias = Callable[[Given], int]
+
+class Command(NamedTuple):
+    """A command: what does it, the entries of the table that it has, and what it is for."""
+
+    work: str  # FILE.FUNCTION of this folder, which takes the entries by name
+    known: str  # an entry that the command knows by another name is NAME:ENTRY
+    said: str
 
 
-def command(name: str, known: str = "") -> Callable[[Work], Work]:
-    """Register the command that follows, with those entries of the table that it has.
+COMMANDS = {
+    "cache show": Command(
+        "file_commands.show_cache",
+        "",
+        "List what is kept on disk to be quicker the next time: compiled kernels, tables.",
+    ),
+    "cache clear": Command(
+        "file_commands.clear_cache", "", "Remove it; it is made again when it is needed."
+    ),
+    "compile": Command(
+        "file_commands.compile_all",
+        "jobs:processes",
+        "Compile all kernels now; an installation that is not editable brings those of first "
+        "plans.",
+    ),
+    "plan": Command(
+        "jobs.plan",
+        "file out time_limit alternatives plot animate quiet jobs beside case model gap "
+        f"{LOOK} html scheduler:dask leave as_json",
+        "Plan the problem of a file, or of every file of a folder.\n\n"
+        "A folder that was interrupted goes on where it was when the same command is called again.",
+    ),
+    "cover": Command(
+        "cover_command.cover_file",
+        "file:field out beside width_m:width headland_m:headland origin:corner "
+        "time_limit:turn_limit plot quiet jobs:turns model as_json",
+        "Cover a field in swaths, with turns inside its headland, as one plan.\n\n"
+        "Writes plan.json, field.png and field.geojson.",
+    ),
+    "mpc": Command(
+        "jobs.mpc",
+        "file steps seed out time_limit gap alternatives plot animate quiet jobs beside case seeds "
+        f"scheduler:dask resume model {LOOK} html as_json",
+        "Drive a scenario, or every one of a folder, in closed loop: plan, drive a step, plan "
+        "again.\n\n"
+        "A folder that was interrupted goes on where it was when the same command is called again.",
+    ),
+    "check": Command(
+        "check_command.check_file",
+        "file beside case model leave:leaves",
+        "Report symmetry, consistency and feasibility, without a plan.\n\n"
+        "FILE may be a plan.json: its plans are proven again, in the world of the file that they "
+        "were planned from, which is that of --with or, of several vehicles, the one that they "
+        "name. So is what was driven in a closed_loop.json, of one vehicle or several, on roads "
+        "too.",
+    ),
+    "automaton build": Command(
+        "automaton_command.build",
+        "file:library out quiet jobs:solved scheduler:dask_build",
+        "Write the library of a scenario, or of a build file, as a file.\n\n"
+        "It is DIR/library.json, or DIR itself if it ends in .json. A build that was killed goes "
+        "on where it was when it is called again.",
+    ),
+    "automaton design": Command(
+        "automaton_command.design",
+        "file:build_file out quiet plot:factor within most max_trims radius_m:radius",
+        "Write the smallest library whose words lose no more than a factor, which is proven.\n\n"
+        "It is DIR/library.json, or DIR itself if it ends in .json. The options hold instead of "
+        "what the file says. Of a library with maneuvers, the --most are kept whose ends are "
+        "spread best.",
+    ),
+    "automaton show": Command(
+        "automaton_command.show",
+        "file:library coverage model",
+        "List the trims and maneuvers of a scenario, a library or another file of primitives.",
+    ),
+    "automaton draw": Command(
+        "automaton_command.draw",
+        f"file:library out model {LOOK}",
+        "Draw the trims and maneuvers of a scenario, a library or another file of primitives.\n\n"
+        "The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of "
+        "the maneuvers stands beside it, its name ending in _maneuvers.",
+    ),
+    "convert": Command(
+        "file_commands.convert",
+        "source target beside case",
+        "Write a problem as a scenario, its trims listed, or a map or primitives in another "
+        "format.\n\n"
+        "OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with "
+        "becomes a Nav2 map: OUT and an image beside it. Primitives end in .json (a library), "
+        ".nav2.json (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or "
+        "a folder or .zip exported by AROC.",
+    ),
+    "example": Command(
+        "file_commands.example",
+        "name out:copy",
+        "Write one of the scenarios that come with the package, with its maps, or list them.",
+    ),
+    "plot": Command(
+        "result_commands.plot",
+        f"file:result out:picture animate {LOOK} html beside:world",
+        "Draw a plan.json, or a closed_loop.json, again: PLAN.png beside it, or the file "
+        "given.\n\n"
+        "With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html. "
+        "These files state neither body nor obstacles: --with its scenario, all is drawn as plan "
+        "and mpc do. A closed loop alone is drawn as an arc from step to step.",
+    ),
+    "export": Command(
+        "result_commands.export",
+        "file:result kind:to out:exported beside:driven_in case model step rate origin",
+        "Write a plan.json, or a closed_loop.json, for another program.\n\n"
+        "It goes to PLAN.csv, PLAN.geojson, PLAN.rrd, PLAN_ros2 or PLAN_commonroad.xml beside it, "
+        "or to the file given. --with its scenario it holds the body and what is around it; a "
+        "closed loop and a solution for CommonRoad need that.",
+    ),
+    "schema": Command(
+        "file_commands.print_schema",
+        "document",
+        "Print the JSON Schema of scenario files, for editors, or of a file that is written.",
+    ),
+}
+TOGETHER = {  # arguments that travel as one value of `inputs`, made where the last is given
+    "parts": ("Parts", "case"),
+    "look": ("LookOptions", "title"),
+    "budgets": ("Budgets", "gap"),
+    "options": ("Options", "budgets"),
+}
 
-    An entry that the command knows by another name is `name:entry`.
-    """
 
-    def register(work: Work) -> Work:
-        words = (word.partition(":") for word in known.split())
-        parameters = [TABLE[entry or word].parameter(word) for word, _, entry in words]
+def _register(name: str, command: Command) -> None:
+    """Have Typer know a command; what does it is loaded when it is called."""
+    words = (word.partition(":") for word in command.known.split())
+    parameters = [TABLE[entry or word].parameter(word) for word, _, entry in words]
 
-        @exits
-        def run(**given: Any) -> int:
-            return work(Given(**given))
+    @exits
+    def run(**given: Any) -> int:
+        home, _, function = command.work.partition(".")
+        module = importlib.import_module(f"{__package__}.{home}")
+        for group, (kind, mark) in TOGETHER.items():
+            if mark in given:
+                value = getattr(importlib.import_module(f"{__package__}.inputs"), kind)
+                keys = [one.name for one in dataclasses.fields(value) if one.name in given]
+                given[group] = value(**{key: given.pop(key) for key in keys})
+        code: int = getattr(module, function)(**given)
+        return code
 
-        run.__doc__ = work.__doc__
-        vars(run)["__signature__"] = inspect.Signature(parameters)
-        run.__annotations__ = {one.name: one.annotation for one in parameters}
-        group, _, last = name.rpartition(" ")
-        GROUPS[group].command(last, epilog=ending(name))(run)
-        return work
+    vars(run)["__signature__"] = inspect.Signature(parameters)
+    run.__annotations__ = {one.name: one.annotation for one in parameters}
+    group, _, last = name.rpartition(" ")
+    GROUPS[group].command(last, help=command.said, epilog=ending(name))(run)
 
-    return register
+
+for name, command in COMMANDS.items():
+    _register(name, command)
 
 
 def run(argv: list[str]) -> int:
@@ -231,255 +355,3 @@ def every_command(
     ] = False,
 ) -> None:
     """Options before the name of a command."""
-
-
-def _parts(given: Given) -> Any:
-    from maneuver_automaton.cli.inputs import Parts
-
-    return Parts(beside=given.beside, case=given.case, model=getattr(given, "model", None))
-
-
-def _look(given: Given) -> Any:
-    from maneuver_automaton.cli.inputs import LookOptions
-
-    return LookOptions(title=given.title, size=given.size, style=given.style)
-
-
-@command("cache show")
-def cache_show(_: Given) -> int:
-    """List what is kept on disk to be quicker the next time: compiled kernels, tables."""
-    from maneuver_automaton.cli import file_commands
-
-    return file_commands.show_cache()
-
-
-@command("cache clear")
-def cache_clear(_: Given) -> int:
-    """Remove it; it is made again when it is needed."""
-    from maneuver_automaton.cli import file_commands
-
-    return file_commands.clear_cache()
-
-
-@command("compile", "jobs:processes")
-def compile_all(given: Given) -> int:
-    """Compile all kernels now; an installation that is not editable brings those of first plans."""
-    from maneuver_automaton.cli import file_commands
-
-    return file_commands.compile_all(jobs=given.jobs)
-
-
-@contextlib.contextmanager
-def _document(written: Path, given: Given) -> Iterator[None]:
-    """Where --json is asked for, print a file once it is written, and nothing else to stdout."""
-    if not given.as_json:
-        yield
-        return
-    if given.file.is_dir():
-        raise InvalidScenario(
-            f"--json: prints the document of one file, and {given.file} is a folder"
-        )
-    with contextlib.redirect_stdout(sys.stderr):
-        yield
-    sys.stdout.write(written.read_text(encoding="utf-8"))
-
-
-def _run_jobs(name: str, document: str, given: Given) -> int:
-    from maneuver_automaton.cli.inputs import Budgets, Options
-    from maneuver_automaton.cli.jobs import run_jobs
-
-    def stated(*names: str) -> dict[str, Any]:
-        return {name: getattr(given, name) for name in names if hasattr(given, name)}
-
-    if name == "mpc" and given.alternatives:
-        raise InvalidScenario(
-            f"--alternatives: got {given.alternatives}, but a closed loop keeps one plan a step; "
-            "leave it out, or ask plan for them"
-        )
-    options = Options(
-        budgets=Budgets(**stated("time_limit", "gap", "alternatives", "steps")),
-        look=_look(given),
-        scheduler=given.dask,
-        **stated("plot", "animate", "html", "quiet", "leave", "jobs", "seed", "seeds", "resume"),
-    )
-    with _document(given.out / document, given):
-        return run_jobs(name, given.file, given.out, options, _parts(given))
-
-
-@command(
-    "plan",
-    "file out time_limit alternatives plot animate quiet jobs beside case model gap "
-    f"{LOOK} html dask leave as_json",
-)
-def plan(given: Given) -> int:
-    """Plan the problem of a file, or of every file of a folder.
-
-    A folder that was interrupted goes on where it was when the same command is called again.
-    """
-    return _run_jobs("plan", "plan.json", given)
-
-
-@command(
-    "cover",
-    "file:field out beside width headland origin:corner time_limit:turn_limit plot quiet "
-    "jobs:turns model as_json",
-)
-def cover(given: Given) -> int:
-    """Cover a field in swaths, with turns inside its headland, as one plan.
-
-    Writes plan.json, field.png and field.geojson.
-    """
-    from maneuver_automaton.cli.cover_command import cover_file
-
-    with _document(given.out / "plan.json", given):
-        return cover_file(given)
-
-
-@command(
-    "mpc",
-    "file steps seed out time_limit gap alternatives plot animate quiet jobs beside case seeds "
-    f"dask resume model {LOOK} html as_json",
-)
-def mpc(given: Given) -> int:
-    """Drive a scenario, or every one of a folder, in closed loop: plan, drive a step, plan again.
-
-    A folder that was interrupted goes on where it was when the same command is called again.
-    """
-    document = "closed_loop.json" if given.seeds is None else "statistics.json"
-    return _run_jobs("mpc", document, given)
-
-
-@command("check", "file beside case model leave:leaves")
-def check(given: Given) -> int:
-    """Report symmetry, consistency and feasibility, without a plan.
-
-    FILE may be a plan.json: its plans are proven again, in the world of the file that they were
-    planned from, which is that of --with or, of several vehicles, the one that they name. So is
-    what was driven in a closed_loop.json, of one vehicle or several, on roads too.
-    """
-    from maneuver_automaton.cli import check_command
-
-    return check_command.check_file(given.file, parts=_parts(given), leave=given.leave)
-
-
-@command("automaton build", "file:library out quiet jobs:solved dask:dask_build")
-def automaton_build(given: Given) -> int:
-    """Write the library of a scenario, or of a build file, as a file.
-
-    It is DIR/library.json, or DIR itself if it ends in .json. A build that was killed goes on
-    where it was when it is called again.
-    """
-    from maneuver_automaton.cli import automaton_command
-
-    return automaton_command.build(
-        given.file, given.out, jobs=given.jobs, scheduler=given.dask, quiet=given.quiet
-    )
-
-
-@command("automaton design", "file:build_file out quiet plot:factor within most max_trims radius")
-def automaton_design(given: Given) -> int:
-    """Write the smallest library whose words lose no more than a factor, which is proven.
-
-    It is DIR/library.json, or DIR itself if it ends in .json. The options hold instead of what the
-    file says. Of a library with maneuvers, the --most are kept whose ends are spread best.
-    """
-    from maneuver_automaton.cli import automaton_command
-
-    stated = {key: getattr(given, key) for key in ("within", "most", "max_trims")}
-    stated["radius_m"] = given.radius
-    instead = {key: value for key, value in stated.items() if value is not None}
-    return automaton_command.design(
-        given.file, given.out, instead=instead, quiet=given.quiet, plot=given.plot
-    )
-
-
-@command("automaton show", "file:library coverage model")
-def automaton_show(given: Given) -> int:
-    """List the trims and maneuvers of a scenario, a library or another file of primitives."""
-    from maneuver_automaton.cli import automaton_command
-
-    return automaton_command.show(given.file, coverage=given.coverage, model_text=given.model)
-
-
-@command("automaton draw", f"file:library out model {LOOK}")
-def automaton_draw(given: Given) -> int:
-    """Draw the trims and maneuvers of a scenario, a library or another file of primitives.
-
-    The picture is DIR/automaton.png, or DIR itself if it ends in .png, .pdf or .svg; that of the
-    maneuvers stands beside it, its name ending in _maneuvers.
-    """
-    from maneuver_automaton.cli import automaton_command
-
-    return automaton_command.draw(given.file, given.out, look=_look(given), model_text=given.model)
-
-
-@command("convert", "source target beside case")
-def convert(given: Given) -> int:
-    """Write a problem as a scenario, its trims listed, or a map or primitives in another format.
-
-    OUT ends in .yaml or .yml, or, for a map, in .map (MovingAI). A map without --with becomes
-    a Nav2 map: OUT and an image beside it. Primitives end in .json (a library), .nav2.json
-    (Nav2), .mprim (SBPL) or .xml (CommonRoad); IN is one of these, a scenario, or a folder or
-    .zip exported by AROC.
-    """
-    from maneuver_automaton.cli import file_commands
-
-    return file_commands.convert(given.source, given.target, parts=_parts(given))
-
-
-@command("example", "name out:copy")
-def example(given: Given) -> int:
-    """Write one of the scenarios that come with the package, with its maps, or list them."""
-    from maneuver_automaton.cli import file_commands
-
-    if given.name is None:
-        return file_commands.list_scenarios()
-    return file_commands.write_scenario(given.name, given.out)
-
-
-@command("plot", f"file:result out:picture animate {LOOK} html beside:world")
-def plot(given: Given) -> int:
-    """Draw a plan.json, or a closed_loop.json, again: PLAN.png beside it, or the file given.
-
-    With --animate it is an animation, PLAN.gif; with --html a page that plays it, PLAN.html. These
-    files state neither body nor obstacles: --with its scenario, all is drawn as plan and mpc do. A
-    closed loop alone is drawn as an arc from step to step.
-    """
-    from maneuver_automaton.cli import result_commands
-
-    return result_commands.plot(
-        given.file,
-        given.out,
-        animate=given.animate,
-        html=given.html,
-        look=_look(given),
-        beside=given.beside,
-    )
-
-
-@command("export", "file:result to out:exported beside:driven_in case model step rate origin")
-def export(given: Given) -> int:
-    """Write a plan.json, or a closed_loop.json, for another program.
-
-    It goes to PLAN.csv, PLAN.geojson, PLAN.rrd, PLAN_ros2 or PLAN_commonroad.xml beside it, or to
-    the file given. --with its scenario it holds the body and what is around it; a closed loop and a
-    solution for CommonRoad need that.
-    """
-    from maneuver_automaton.cli import result_commands
-
-    step, rate = given.step, given.rate
-    if rate is not None:
-        if step is not None or not 0.0 < rate < math.inf:
-            raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
-        step = 1.0 / rate
-    return result_commands.export(
-        given.file, given.to, given.out, parts=_parts(given), step=step, origin=given.origin
-    )
-
-
-@command("schema", "document")
-def schema(given: Given) -> int:
-    """Print the JSON Schema of scenario files, for editors, or of a file that is written."""
-    from maneuver_automaton.cli import file_commands
-
-    return file_commands.print_schema(given.document)

@@ -32,9 +32,7 @@ MOST_ROWS = 200  # trims, and maneuvers, that `show` lists
 EVERY_POSE = "every pose can be reached in free space, by words of any length"
 
 
-def build(
-    file: Path, out: Path, *, jobs: int = 1, scheduler: str | None = None, quiet: bool = False
-) -> int:
+def build(file: Path, out: Path, *, jobs: int, scheduler: str | None, quiet: bool) -> int:
     """Write the library of a scenario, or of a build file."""
     path = target(out, "library.json")
     if build_file.is_build_file(file):
@@ -90,12 +88,12 @@ def _print_library(path: Path, automaton: Automaton, *, quiet: bool) -> None:
         console().print(said, soft_wrap=True)
 
 
-def show(file: Path, *, coverage: bool = False, model_text: str | None = None) -> int:
+def show(file: Path, *, coverage: bool, model: str | None) -> int:
     """List trims, maneuvers and what they can do."""
-    automaton = automaton_of(file, model_text)
-    model, out = automaton.model, console()
-    columns = ["", "trim", *model.reduced_names, *model.control_names]
-    columns += ["v_x [m/s]", "v_y [m/s]", "turn rate [rad/s]", "v_z [m/s]"][: model.group.dof]
+    automaton, out = automaton_of(file, model), console()
+    its = automaton.model
+    columns = ["", "trim", *its.reduced_names, *its.control_names]
+    columns += ["v_x [m/s]", "v_y [m/s]", "turn rate [rad/s]", "v_z [m/s]"][: its.group.dof]
     rows = [
         [
             str(k + 1),
@@ -110,7 +108,7 @@ def show(file: Path, *, coverage: bool = False, model_text: str | None = None) -
     if automaton.maneuvers:
         out.print(_maneuver_table(automaton))
         _print_more(len(automaton.maneuvers))
-    out.print(f"  {model.name}, {_count(automaton)}")
+    out.print(f"  {its.name}, {_count(automaton)}")
     for line in report_lines(validate(automaton)):
         out.print(f"  {line}", soft_wrap=True)
     if coverage:
@@ -142,9 +140,9 @@ def coverage_lines(automaton: Automaton) -> list[str]:
     ]
 
 
-def draw(file: Path, out: Path, *, look: LookOptions, model_text: str | None = None) -> int:
+def draw(file: Path, out: Path, *, look: LookOptions, model: str | None) -> int:
     """Draw the trims, and beside them the maneuvers."""
-    automaton, name = named_automaton(file, model_text)
+    automaton, name = named_automaton(file, model)
     path = target(out, "automaton.png")
     make_folder(path.parent)
     plotting = ready_to_draw()
@@ -203,13 +201,13 @@ def _count(automaton: Automaton) -> str:
 
 
 def design(
-    file: Path, out: Path, *, instead: Mapping[str, float], quiet: bool, plot: bool = False
-) -> int:
-    """Write the smallest library that a design file asks for, and say what is proven of it.
-
-    Of a library with maneuvers, those are kept whose ends spread best.
-    """
-    path = target(out, "library.json")
+    file: Path, out: Path, *, quiet: bool, plot: bool,
+    within: float | None, most: int | None, max_trims: int | None, radius_m: float | None,
+) -> int:  # fmt: skip
+    """Write the smallest library that a design file asks for, and say what is proven of it."""
+    path, stated = target(out, "library.json"), {"within": within, "most": most}
+    stated |= {"max_trims": max_trims, "radius_m": radius_m}
+    instead = {key: value for key, value in stated.items() if value is not None}
     if file.suffix == ".json":
         return _disperse(file, path, instead=instead, quiet=quiet)
     from maneuver_automaton.design.library_design import design_of_file

@@ -35,11 +35,11 @@ TRIM_TOLERANCE = 1e-7  # [m, rad] between trim and ODE solver
 UNDECIDED = (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
 
 
-def check_file(path: Path, *, parts: Parts, leave: bool = False) -> int:
+def check_file(file: Path, *, parts: Parts, leave: bool) -> int:
     """Print the report of a problem, of a fleet, or of plans, and return the exit code."""
-    if (proven := findings_of_plans(path, parts, leave=leave)) is not None:
+    if (proven := findings_of_plans(file, parts, leave=leave)) is not None:
         return reported(*proven)
-    scenario = problem_of(path, parts)
+    scenario = problem_of(file, parts)
     if not isinstance(scenario, Scenario):
         return reported(scenario.name, _of_fleet(scenario))
     problem = scenario.problem

@@ -50,11 +50,7 @@ class Finding:
 
 
 def findings(path: Path, parts: Parts, *, leave: bool = False) -> tuple[str, list[Finding]] | None:
-    """The name of what was planned or driven, and what holds of it; None of no result file.
-
-    What one vehicle did needs the file of --with, and its plan may `leave` a start in contact;
-    files of several vehicles name theirs.
-    """
+    """Name and findings of a result file; None of any other; a plan may `leave` a contact."""
     if path.suffix.lower() != ENDING or not kind_of(parsed(path)):
         return None
     file = opened(path, parts)

@@ -118,7 +118,7 @@ def scenario_folder() -> Path:
     raise InvalidScenario(f"example: {package} came without its scenarios; need to install it anew")
 
 
-def list_scenarios() -> int:
+def _list_scenarios() -> int:
     """List the scenarios with a line each, and the command that they are for."""
     found = {name: _content(path) for name, path in sorted(_scenarios().items())}
     width = max(map(len, found))
@@ -130,8 +130,10 @@ def list_scenarios() -> int:
     return FOUND
 
 
-def write_scenario(name: str, out: Path | None) -> int:
+def example(name: str | None, out: Path | None) -> int:
     """Write a scenario, and the files that it names, as NAME.yaml, as the file or into a folder."""
+    if name is None:
+        return _list_scenarios()
     source = _source(name)
     target = Path() / source.name if out is None else out
     if target.is_dir() or (out is not None and not out.suffix):
@@ -287,7 +289,7 @@ def _write_scenario(scenario: Scenario | FleetScenario, source: Path, target: Pa
     write_text_atomically(target, text)
 
 
-def print_schema(document: str | None = None) -> int:
+def print_schema(document: str | None) -> int:
     """Print the JSON Schema of scenario files, or of a kind of document."""
     if document is not None and document not in KINDS:
         raise InvalidScenario(f"--document: got {document!r}, need {', '.join(KINDS)}")

@@ -55,7 +55,6 @@ def planned(job: Job, scenario: FleetScenario) -> JobResult:
         name=name,
         result=result,
         document=fleet_to_dict(result, name=name),
-        several=True,
         done=whole,
         status=result.status.value,
         complaints=() if whole else (f"{result.status.value}: {why}{reason_of(result)}",),
@@ -91,12 +90,10 @@ def driven(job: Job, scenario: FleetScenario) -> JobResult:
     if not log.reached:
         when = ", when the loop was interrupted" if stopped() else ""
         complaints.append(f"{log.status}: {log.reason}{when}")
-
     return JobResult(
         name=name,
         result=log,
         document=fleet_loop_to_dict(log, verdict, name=name),
-        several=True,
         done=log.reached and verdict.passed and not broken,
         status=log.status,
         complaints=tuple(complaints),

@@ -56,10 +56,7 @@ def states_several(path: Path, parts: Parts) -> bool:
 def problem_of(
     path: Path, parts: Parts | None = None, *, remark: bool = True
 ) -> Scenario | FleetScenario:
-    """The problem of a file, or its fleet, completed by `parts`; no drive on roads.
-
-    What is legal in it, but hardly meant, is remarked on.
-    """
+    """The problem or fleet of a file, completed by `parts`; remarks on what is hardly meant."""
     parts = parts or Parts()
     own = None if parts.model is None else user_model(parts.model)
     found = load_scenario(path, beside=parts.beside, case=parts.case, model=own)
@@ -82,10 +79,7 @@ def scenario_of(path: Path, parts: Parts | None = None) -> Scenario:
 
 
 def automaton_of(path: Path, model: str | None = None) -> Automaton:
-    """The automaton of a library (.json), of primitives in another format, or of a scenario.
-
-    `model`, MODULE:OBJECT, is the vehicle of a library or scenario for a user's own.
-    """
+    """The automaton of a library, of primitives, or of a scenario, which may be a user's own."""
     return named_automaton(path, model)[0]
 
 
@@ -131,6 +125,19 @@ def writing(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
+def printed(written: Path, file: Path, *, as_json: bool) -> Iterator[None]:
+    """With --json, print a file once it is written, and nothing else to standard output."""
+    if not as_json:
+        yield
+        return
+    if file.is_dir():
+        raise InvalidScenario(f"--json: prints the document of one file, and {file} is a folder")
+    with contextlib.redirect_stdout(sys.stderr):
+        yield
+    sys.stdout.write(written.read_text(encoding="utf-8"))
+
+
+@contextlib.contextmanager
 def naming(path: Path, about: str = "") -> Iterator[None]:
     """Name the file, and the part of it that is meant, where a value of it is refused."""
     try:
@@ -151,28 +158,15 @@ def opened(path: Path, parts: Parts) -> exports.ResultFile:
     return file
 
 
-NEEDED = (
-    "name",
-    "group",
-    "control_names",
-    "reduced_names",
-    "control_limits",
-    "reduced_limits",
-    "part_names",
-    "velocity",
-    "dynamics",
-    "body_velocity",
-    "reduced_dynamics",
-    "part_poses",
+NEEDED = (  # of a model
+    *("name", "group", "control_names", "reduced_names", "control_limits", "reduced_limits"),
+    *("part_names", "velocity", "dynamics", "body_velocity", "reduced_dynamics", "part_poses"),
 )
 
 
 @functools.lru_cache(maxsize=8)
 def user_model(text: str) -> Model:
-    """The model OBJECT of the module MODULE, which is looked for in the current folder first.
-
-    A class or a function that needs no parameters is called.
-    """
+    """The model OBJECT, or what it makes, of MODULE, looked for in the current folder first."""
     module_name, _, name = text.partition(":")
     if not (module_name and name):
         raise _wrong(f"got {text!r}, need MODULE:OBJECT, such as boats:BOAT")

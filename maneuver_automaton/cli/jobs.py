@@ -18,6 +18,7 @@ from maneuver_automaton.cli.inputs import (
     Options,
     Parts,
     make_folder,
+    printed,
     problem_of,
     refuse_unknown,
     states_several,
@@ -49,7 +50,6 @@ class JobResult:
     name: str  # of the scenario
     result: Any  # what is drawn; None: nothing
     document: Mapping[str, Any]
-    several: bool = False  # vehicles: the document names the files that it was made from
     done: bool  # whether all is as asked
     status: str
     complaints: tuple[str, ...] = ()  # a line each
@@ -118,7 +118,7 @@ class Job:
             write_document(
                 outcome.document,
                 file,
-                source=source if outcome.several else None,
+                source=source if "vehicles" in outcome.document else None,
                 interrupted=stopped(),
             )
             for name in PICTURES[self.command] if outcome.result is not None else ():
@@ -145,8 +145,25 @@ class Job:
                 draw(outcome.result, outcome.name, out / DOCUMENTS[self.command], options)
 
 
-def run_jobs(command: str, path: Path, out: Path, options: Options, parts: Parts) -> int:
-    """Run `plan` or `mpc` of a file or of a folder; the exit code."""
+def plan(*, file: Path, out: Path, parts: Parts, options: Options, as_json: bool) -> int:
+    """Plan a file, or all of a folder; the exit code."""
+    with printed(out / "plan.json", file, as_json=as_json):
+        return _run("plan", file, out, options, parts)
+
+
+def mpc(*, file: Path, out: Path, parts: Parts, options: Options, as_json: bool) -> int:
+    """Close the loop of a file, or of all of a folder; the exit code."""
+    if alternatives := options.budgets.alternatives:
+        raise InvalidScenario(
+            f"--alternatives: got {alternatives}, but a closed loop keeps one plan a step; "
+            "leave it out, or ask plan for them"
+        )
+    document = "closed_loop.json" if options.seeds is None else "statistics.json"
+    with printed(out / document, file, as_json=as_json):
+        return _run("mpc", file, out, options, parts)
+
+
+def _run(command: str, path: Path, out: Path, options: Options, parts: Parts) -> int:
     if path.is_dir():
         return _run_folder(command, path, out, options, parts)
     return _run_file(Job(command=command, path=path, parts=parts, options=options), out)

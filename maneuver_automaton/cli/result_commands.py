@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -61,10 +62,15 @@ def export(
     out: Path | None,
     *,
     parts: Parts,
-    step: float | None = None,
-    origin: str | None = None,
+    step: float | None,
+    rate: float | None,
+    origin: str | None,
 ) -> int:
     """Write the plans or loops of `file` in a format; say where a goal was not reached."""
+    if rate is not None:
+        if step is not None or not 0.0 < rate < math.inf:
+            raise InvalidScenario(f"--rate: got {rate}, need a positive number, and no --step")
+        step = 1.0 / rate
     if kind not in FORMATS:
         raise InvalidScenario(f"--to: got {kind!r}, need one of {', '.join(FORMATS)}")
     form = FORMATS[kind]
@@ -125,8 +131,8 @@ def plot(
     *,
     animate: bool,
     look: LookOptions,
-    html: bool = False,
-    beside: Path | None = None,
+    html: bool,
+    beside: Path | None,
 ) -> int:
     """Draw a plan.json or closed_loop.json again, still, in motion, or as a page that plays it."""
     if animate and html:

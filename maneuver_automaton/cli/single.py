@@ -140,7 +140,6 @@ def _driven(loop: ClosedLoop, name: str) -> JobResult:
         if one.guarantee is not Guarantee.DECREASE  # what noise does, in every other step
     ]
     missed = [] if loop.reached else [f"{loop.status}: {loop.reason}"]
-
     return JobResult(
         name=name,
         result=loop,
@@ -165,7 +164,6 @@ def _statistics(job: Job, scenario: Scenario, how: dict[str, Any]) -> JobResult:
             scheduler=options.scheduler,
             progress=counted(advance),
         )
-
     return JobResult(
         name=scenario.name,
         result=None,  # the motion of no loop is kept

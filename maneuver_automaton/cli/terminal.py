@@ -126,18 +126,6 @@ def has_terminal() -> bool:
     return sys.stderr.isatty()
 
 
-def make_room() -> None:
-    """Take the bar from the terminal, for lines and the bar of the compiler."""
-    for bar in _shown:
-        bar.stop()
-
-
-def come_back() -> None:
-    """Show the bar again."""
-    for bar in _shown:
-        bar.start()
-
-
 @contextlib.contextmanager
 def _live(bar: Any) -> Iterator[None]:
     with bar:
@@ -185,10 +173,7 @@ def counted(advance: Advance) -> Callable[[int, int], None]:
 
 @contextlib.contextmanager
 def waiting(what: str, *, quiet: bool, more: Callable[[], str] = lambda: "") -> Iterator[None]:
-    """A clock that runs while something is computed of which no one knows how long it takes.
-
-    What `more` says takes the place of `what`, and is asked for again and again: one line.
-    """
+    """A clock while something is computed; what `more` says now is shown instead of `what`."""
     if quiet or _shown or not has_terminal():
         yield
         return
@@ -224,7 +209,8 @@ def announced(*, quiet: bool = False) -> Iterator[None]:
             compiler_began()
             self.depth += 1
             if self.depth == 1:
-                make_room()
+                for bar in _shown:
+                    bar.stop()
             if not self.said:
                 complain(COMPILING)
             self.said = True
@@ -233,7 +219,8 @@ def announced(*, quiet: bool = False) -> Iterator[None]:
             compiler_ended()
             self.depth -= 1
             if self.depth == 0:
-                come_back()
+                for bar in _shown:
+                    bar.start()
 
     with event.install_listener("numba:compile", Announcement()):
         yield

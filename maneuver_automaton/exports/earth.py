@@ -52,15 +52,7 @@ def degrees_of(places: ArrayLike, *, origin: ArrayLike) -> Array:
 
 
 def metres_of(degrees: ArrayLike, *, origin: ArrayLike) -> Array:
-    """Places (..., 2) [m] east and north of an origin, of longitudes and latitudes (..., 2) [deg].
-
-    What `degrees_of` makes of them is where they were.
-
-    Raises
-    ------
-    ValueError
-        As `degrees_of`.
-    """
+    """Places (..., 2) [m] of longitudes and latitudes (..., 2) [deg]; undoes `degrees_of`."""
     longitude, foot, axes = _plane_at(origin)
     turned, latitude = np.moveaxis(np.radians(as_array("degrees", degrees, last=2)), -1, 0)
     seen: Array = (_on_ellipsoid(turned - longitude, latitude) - foot) @ axes.T

@@ -12,7 +12,6 @@ import numpy as np
 
 from maneuver_automaton._arrays import as_array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.closed_loop_json import load_closed_loop
 from maneuver_automaton.formats.commonroad import is_road
@@ -28,7 +27,6 @@ from maneuver_automaton.formats.plan_json import (
 from maneuver_automaton.models import Model
 from maneuver_automaton.recording import Mover, Recording, recording_of
 from maneuver_automaton.recording.plans import stated
-from maneuver_automaton.recording.values import mover_of, world_of
 from maneuver_automaton.roads import RoadFleetResult, RoadPlanResult, road_planner
 from maneuver_automaton.roads.plans import plan_of_controls
 from maneuver_automaton.roads.several import judged_together, nearest_pairs
@@ -196,9 +194,12 @@ def load_recording(
         return _alone(file)
     if file.roads and not file.several:
         return _on_road(file)
-    if file.kind == "plan":
-        return _planned(file)
     recording = recording_of(file.result())
+    if file.kind == "plan" and file.scenario is not None:
+        (mover,), status = recording.movers, recording.status
+        if not mover.has_plan:
+            raise InvalidScenario(f"{file.path}: holds no plan, its status is {status!r}")
+        _check_start(file.path, mover.pieces[0], file.scenario.problems[0].start)
     return replace(recording, title=file.scenario.name) if file.scenario else recording
 
 
@@ -268,22 +269,6 @@ def _alone(file: ResultFile) -> Recording:
         movers = tuple(Mover(name=name, pieces=(plan,)) for name, plan in plans.items())
         return Recording(kind="fleet", title="", movers=movers)
     return replace(stated(file.document, load_plan(file.path)), title="")
-
-
-def _planned(file: ResultFile) -> Recording:
-    """The plan of a plan.json in the world of its scenario."""
-    scenario = file.scenario
-    assert isinstance(scenario, Scenario)
-    plan = load_plan(file.path, model=scenario.problem.automaton.model)
-    if file.document["automaton_hash"] != automaton_hash(scenario.problem.automaton):
-        raise InvalidScenario(
-            f"{file.path}: automaton_hash: this plan was made with another library than that of "
-            "--with"
-        )
-    _check_start(file.path, plan, scenario.problem.start)
-    mover = mover_of(scenario.problem, plan, cost=file.document.get("cost"))
-    world = world_of(scenario.problem)
-    return Recording(kind="plan", title=scenario.name, movers=(mover,), world=world)
 
 
 def _on_road(file: ResultFile) -> Recording:

@@ -144,11 +144,7 @@ class _Agreement:
         return False
 
     def announce(self, k: int, found: OwnPlan) -> None:
-        """A vehicle drives another plan, agreed or not; it is repeated until each acknowledges it.
-
-        Who has not received it asks in vain for another plan of its own: the vehicle refuses, as
-        that is proven past its old one.
-        """
+        """A vehicle drives another plan, agreed or not: repeated until all acknowledge it."""
         for j in self.expected:
             if j == k:
                 continue

@@ -339,10 +339,7 @@ def _until(one: FleetCourse, other: FleetCourse, begin: float, keep: float) -> f
 def one_at_a_time(
     vehicles: Sequence[FleetMember], order: Sequence[int], margin: float, budget: Budget
 ) -> HeldPlans:
-    """Plans of those in an order, of whom each drives past all others where they stand.
-
-    Only those that have arrived where not all do; nobody has made room for them then.
-    """
+    """Plans in an order, each past others where they stand; those that arrive, if not all do."""
     return _Floor(vehicles, margin, budget).run(order)
 
 

@@ -64,10 +64,7 @@ class Levels:
 
     @functools.cached_property
     def bands(self) -> tuple[HeightBand, ...]:
-        """Stretches of time, for ever in both directions, each with heights that are not left.
-
-        Source: interval arithmetic; what is linear lies between its ends.
-        """
+        """Stretches of time, for ever in both directions, each with bounds of the heights in it."""
         spread = float(np.ptp(self.altitude))
         most = max(spread / BANDS, self.body[1] - self.body[0], THIN) * (1.0 + 1e-9)
         found: list[HeightBand] = []
@@ -111,10 +108,7 @@ class Levels:
 
 
 def levels_of(problem: Problem, plan: Plan | None = None) -> Levels | None:
-    """Those of a vehicle that drives a plan, or stands at its start; None if it has no height.
-
-    In the plane a body whose height is not stated counts at all heights.
-    """
+    """Heights of a vehicle on a plan, or at its start; None if it counts at all heights."""
     low, high = problem.body_height
     in_plane = problem.start.size == 3
     if plan is not None and not in_plane:
@@ -220,10 +214,7 @@ def where_it_stays(body: Obstacle) -> Obstacle:
 
 
 def standing_still(body: Obstacle) -> Obstacle:
-    """A body that never moves, as what stands there; any other as it is.
-
-    Searches are led round the one, and only past the other.
-    """
+    """A body that never moves as a static one, round which searches are led; any other as it is."""
     motion = body.motion
     if motion is None or len(motion.time) > 1 or body.presence != (-math.inf, math.inf):
         return body

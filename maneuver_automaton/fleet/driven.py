@@ -125,10 +125,7 @@ def verify_driven(log: FleetLog) -> DrivenVerdict:
 
 
 def whole_pieces(log: FleetLog, name: str) -> dict[int, Plan]:
-    """The pieces that a vehicle drove by step, each with a trim: if it did nothing, where it stood.
-
-    What it carries then stands as it did at the end of the piece before.
-    """
+    """The pieces that a vehicle drove by step; in those in which it did nothing, it stands."""
     problem = log.problem.problems[log.problem.names.index(name)]
     automaton, pieces = problem.automaton, dict[int, Plan]()
     if problem.start_trim is not None or automaton.rest is not None:

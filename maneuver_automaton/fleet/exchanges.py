@@ -53,10 +53,7 @@ def go_on(now: Moment) -> None:
 
 
 def exchange(now: Moment) -> None:
-    """Some look for better plans, one after another: who looked in vain least often first.
-
-    Among these who may gain most: what its way alone would have saved when it looked last.
-    """
+    """Some look for better plans in turn: those who looked in vain least, who may gain most."""
     state, settings = now.state, now.state.settings
     able = [
         k

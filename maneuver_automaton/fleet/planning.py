@@ -103,7 +103,7 @@ def plan_fleet(
     ... )
     >>> there = Problem(robot, [0, 0, 0], [4, 0, 0], footprint=Disc(0.3))
     >>> across = Problem(robot, [2, -2, 0], [2, 2, 0], footprint=Disc(0.3))
-    >>> result = plan_fleet(FleetProblem([there, across]), time_limit=2.0, max_rounds=3)
+    >>> result = plan_fleet(FleetProblem([there, across]), time_limit=60.0, max_rounds=3)
     >>> result.status.value, result.clearance_m > 0.0
     ('found', True)
     """

@@ -39,10 +39,7 @@ LEAST = 1e-3  # [m] kept even then
 
 
 def let_in(now: Moment) -> None:
-    """Let in those that are new, if they keep apart from all: with their first plan, or at rest.
-
-    Who could not be is refused for now.
-    """
+    """Let in, with their first plan or at rest, who keeps apart from all; refuse others for now."""
     agreement, at_first = now.state.agreement, now.state.last is None
     for k in [k for k in now.poses if k not in now.held]:
         vehicle = now.vehicles[k]
@@ -91,10 +88,7 @@ def note_arrivals(now: Moment) -> None:
 
 
 def rejoin(now: Moment) -> None:
-    """Those off their plans by no more than their tubes rejoin them; the others' are void.
-
-    The farthest first: where time gets short, the others drive on beside their plans.
-    """
+    """Those within their tubes rejoin their plans, the farthest first; plans of others are void."""
     now.off = {k: now.offset_from(k, found) for k, found in now.held.items()}
     _note_pressed(now)
     tube = now.state.settings.tube_m
@@ -302,10 +296,7 @@ def _off(poses: SE2, wanted: SE2) -> Array:
 
 
 def stop(now: Moment, broken_down: set[int]) -> None:
-    """Who breaks down stops as soon as it can; plans that would hit it are void.
-
-    Who did so before, and is beside where it was to stop, stops there.
-    """
+    """Who breaks down stops as soon as it can, or where it was to; plans it is hit by are void."""
     new = broken_down - now.state.broken
     tube = now.state.settings.tube_m
     beyond = {k for k in now.state.broken & set(now.held) if now.off[k] > tube}

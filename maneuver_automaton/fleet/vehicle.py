@@ -243,10 +243,7 @@ class FleetMember:
         ]
 
     def plan_alone(self, budget: Budget, *, bounded: bool = True, hurried: bool = False) -> None:
-        """Find its way past past obstacles, by itself, and a few others beside it.
-
-        And below which cost there is none, if that is wanted; `hurried` takes it as it is found.
-        """
+        """Find its way, and a few others beside it, past static obstacles; `hurried`: as found."""
         blocked = blocked_ends(self.aimed)
         if blocked is not None:
             self.why_none = blocked.reason
@@ -452,10 +449,7 @@ class FleetMember:
 
     @functools.cached_property
     def aims(self) -> tuple[tuple[int, Goal], ...]:
-        """Where it may end past past obstacles, each with its goal's number.
-
-        The goals themselves, or else poses within their tolerances; the goals where none is free.
-        """
+        """Goals, or else free poses within their tolerances, each with its goal's number."""
         goals = tuple(enumerate(self.problem.goals))
         if not all(why_goal_blocked(self.problem, goal) for goal in self.problem.goals):
             return goals

@@ -197,10 +197,7 @@ def nearest_obstacle(
     levels: Levels | None = None,
     enough: float = 0.0,
 ) -> Least:
-    """The least distance of a body to obstacles until a time [s]: in space, if `levels` are given.
-
-    A lower bound, made sharp enough to tell on which side of `enough` [m] it is.
-    """
+    """A lower bound of the distance to obstacles until a time [s], sharp at `enough` [m]."""
     plan = plan_of_motion(motion, until, since=since, levels=levels)
     reach = (0.0, 0.0) if levels is None else levels.reach
     return least_of(plan, shapes, obstacles, reach=reach, enough=enough)

@@ -1,4 +1,4 @@
-"""Who does the work of a fleet: this process, others beside it, or a worker for each vehicle.
+"""Who does the work of a fleet: this process, others beside it, or those of a cluster.
 
 Whoever works keeps the vehicles, so that only plans travel, as numbers of the automaton. Who knows
 the fleet's problem makes the same plan of them, to the last bit: the answers are the same anywhere.
@@ -6,6 +6,7 @@ the fleet's problem makes the same plan of them, to the last bit: the answers ar
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import pickle
@@ -40,11 +41,9 @@ from maneuver_automaton.fleet.vehicle import (
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.words.word import Word
 
-KEPT = 2  # fleets whose vehicles a process keeps
+KEPT, KEPT_PLANS = 2, 4  # fleets whose vehicles a process keeps, and plans of each of these
 LEAST_LIMIT = 1e-3  # [s] a limit is positive
 PIECES = 2  # sent to each process at a time, so that none waits long for another
-REFERENCE = 12  # bytes that name a plan that is known already: number of the vehicle, and of it
-SETTINGS = 64  # bytes of the other numbers of a request
 
 
 def encoded(vehicle: FleetMember, found: OwnPlan) -> bytes:
@@ -158,45 +157,12 @@ def answered(
     return Proposal(found, after_head(vehicle, head, there.alone))
 
 
-class SentRequest(NamedTuple):
-    """A request as it is sent: plans by number, and those that are new as bytes."""
-
-    base: int
-    others: tuple[tuple[int, int, float], ...]  # number of a vehicle, of its plan, distance to keep
-    new: dict[int, tuple[int, bytes]]  # by its number: whose it is, and the plan
-    terms: Terms
-    limit_s: float
-
-
-class VehicleWorker:
-    """What stands on the other side: one vehicle, and the plans of others that it was told."""
-
-    def __init__(self, fleet: FleetProblem, number: int) -> None:
-        self.number = number
-        self.vehicles = vehicles_of(fleet)
-        self.known: dict[int, OwnPlan] = {}
-        prepare_vehicles([self.vehicles[number]])
-
-    def ask(self, sent: SentRequest) -> tuple[bytes | None, bytes | None]:
-        """The answer to a request; plans that are not named in it are forgotten."""
-        for name, (owner, said) in sent.new.items():
-            self.known[name] = decoded(self.vehicles[owner], said)
-        used = {sent.base, *(name for _, name, _ in sent.others)}
-        self.known = {name: found for name, found in self.known.items() if name in used}
-        others = tuple(ToPass(j, self.known[name], own) for j, name, own in sent.others)
-        request = PlanRequest(self.number, self.known[sent.base], others, sent.terms)
-        vehicle, budget = self.vehicles[self.number], Budget.from_now(sent.limit_s)
-        proposal = answered(vehicle, request, budget, lambda one: one.course.after(sent.terms.time))
-        found, alone = (None if one is None else encoded(vehicle, one) for one in proposal)
-        return found, alone
-
-
 class DaskWorkers:
-    """A worker of its own for every vehicle of a fleet, on the processes of a Dask cluster.
+    """The processes of a Dask cluster, which look for the plans of a fleet's vehicles.
 
-    Each keeps the fleet's problem, looks for the plans of its vehicle, and is told the plans that
-    this one expects of the others. Under counted work the loop is that of one process, to the last
-    bit. Whose worker is gone drives the plan that it holds, and looks for no other one.
+    A request is a start, words and durations: any process that knows the fleet answers it, and
+    another one if that is lost. Under counted work the loop is that of one process, to the last
+    bit. Who gets no answer drives the plan that it holds, and looks for no other one.
 
     Parameters
     ----------
@@ -204,91 +170,90 @@ class DaskWorkers:
     client : distributed.Client
         Of a cluster with processes; see the extra ``distributed``.
     patience_s : float
-        A worker that does not answer so long after its time limit is taken for gone [s].
+        Who has no answer so long after its time limit gets none any more [s].
     """
 
     def __init__(self, fleet: FleetProblem, client: Any, *, patience_s: float = 30.0) -> None:
+        self.fleet, self.client, self.patience_s = fleet, client, patience_s
         self.vehicles = vehicles_of(fleet)
-        self.patience_s = patience_s
-        problem = client.scatter(fleet, broadcast=True)
-        places = sorted(client.scheduler_info(n_workers=-1)["workers"])
-        if not places:
-            raise ValueError("workers: the cluster has none, need at least one")
-        begun = [
-            client.submit(
-                VehicleWorker,
-                problem,
-                one.number,
-                actor=True,
-                workers=[places[one.number % len(places)]],
-                allow_other_workers=False,
-                pure=False,
-            )
-            for one in self.vehicles
-        ]
-        self.actors: list[Any] = [one.result() for one in begun]
         self.gone: dict[int, str] = {}  # by the number of the vehicle, and why
-        self._names: dict[OwnPlan, int] = {}  # plans that somebody knows
-        self._next = 0
-        self._told: list[set[int]] = [set() for _ in self.vehicles]
+        self._token = os.urandom(16).hex()
         self._counts = {"worker_messages": 0, "worker_plans": 0, "worker_bytes": 0}
+        if not client.scheduler_info(n_workers=-1)["workers"]:
+            raise ValueError("workers: the cluster has none, need at least one")
+        client.run(_knows, self._token, fleet)
 
     @property
     def counts(self) -> dict[str, int]:
-        """Messages, plans in them, and bytes, both ways."""
+        """Messages, plans in them, and bytes of these, both ways."""
         return dict(self._counts)
 
     def ask(self, questions: Sequence[PlanRequest], budget: Budget) -> list[Proposal | None]:
         """The answers in order; all look at the same time. None from who is gone."""
         limit_s = max(budget.left, 0.0)
-        under_way = [self._sent(one, limit_s) for one in questions]
-        return [
-            self._answer(one.number, sent, limit_s)
-            for one, sent in zip(questions, under_way, strict=True)
-        ]
+        sent = [None if one.number in self.gone else self._sent(one) for one in questions]
+        begun = [None if one is None else self._begun(None, one, limit_s) for one in sent]
+        return [self._answer(one, future, limit_s) for one, future in zip(sent, begun, strict=True)]
 
-    def _sent(self, request: PlanRequest, limit_s: float) -> Any:
+    def _sent(self, request: PlanRequest) -> _SentRequest:
         k = request.number
-        if k in self.gone:
-            return None
-        new: dict[int, tuple[int, bytes]] = {}
-        names = []
-        for owner, found in [(k, request.base), *((j, one) for j, one, _ in request.others)]:
-            name = self._names.get(found)
-            if name is None:
-                name = self._names[found] = self._next
-                self._next += 1
-            names.append(name)
-            if name not in self._told[k] and name not in new:
-                new[name] = (owner, encoded(self.vehicles[owner], found))
-        others = tuple(
-            (j, name, own) for (j, _, own), name in zip(request.others, names[1:], strict=True)
-        )
-        self._told[k] = set(names)
-        used = set().union(*self._told)
-        self._names = {found: name for found, name in self._names.items() if name in used}
-        self._count([said for _, said in new.values()], REFERENCE * len(names) + SETTINGS)
-        try:
-            return self.actors[k].ask(SentRequest(names[0], others, new, request.terms, limit_s))
-        except Exception as error:  # noqa: BLE001, whatever it is, the worker is gone
-            self.gone[k] = str(error)
-            return None
+        base = encoded(self.vehicles[k], request.base)
+        others = tuple((j, encoded(self.vehicles[j], one), own) for j, one, own in request.others)
+        self._count([base, *(said for _, said, _ in others)])
+        return _SentRequest(k, base, others, request.terms)
 
-    def _answer(self, k: int, under_way: Any, limit_s: float) -> Proposal | None:
-        if under_way is None:
+    def _begun(self, fleet: FleetProblem | None, sent: _SentRequest, limit_s: float) -> Any:
+        return self.client.submit(_answered, self._token, fleet, sent, limit_s, pure=False)
+
+    def _answer(self, sent: _SentRequest | None, future: Any, limit_s: float) -> Proposal | None:
+        if sent is None:
             return None
         try:
-            said = under_way.result(timeout=limit_s + self.patience_s)
-        except Exception as error:  # noqa: BLE001, the same
-            self.gone[k] = str(error) or f"no answer in {limit_s + self.patience_s:g} s"
+            most = limit_s + self.patience_s
+            said = future.result(timeout=most)
+            if said is None:  # a process that has begun since
+                said = self._begun(self.fleet, sent, limit_s).result(timeout=most)
+        except Exception as error:  # noqa: BLE001, whatever it is, nobody answers
+            self.gone[sent.number] = str(error) or f"no answer in {most:g} s"
             return None
-        self._count([one for one in said if one is not None], 0)
-        return Proposal(*(None if one is None else decoded(self.vehicles[k], one) for one in said))
+        self._count([one for one in said if one is not None])
+        vehicle = self.vehicles[sent.number]
+        return Proposal(*(None if one is None else decoded(vehicle, one) for one in said))
 
-    def _count(self, plans: Sequence[bytes], more: int) -> None:
+    def _count(self, plans: Sequence[bytes]) -> None:
         self._counts["worker_messages"] += 1
         self._counts["worker_plans"] += len(plans)
-        self._counts["worker_bytes"] += sum(map(len, plans)) + more
+        self._counts["worker_bytes"] += sum(map(len, plans))
+
+
+class _SentRequest(NamedTuple):
+    """A request as it is sent, its plans as bytes."""
+
+    number: int
+    base: bytes
+    others: tuple[tuple[int, bytes, float], ...]  # number of a vehicle, its plan, distance to keep
+    terms: Terms
+
+
+def _knows(token: str, fleet: FleetProblem) -> None:
+    """In another process: have a fleet ready, before a clock runs."""
+    _fleet_here(token, fleet)
+
+
+def _answered(
+    token: str, fleet: FleetProblem | None, sent: _SentRequest, limit_s: float
+) -> tuple[bytes | None, bytes | None] | None:
+    """In another process: the answer to a request; None if the fleet is not known here."""
+    here = _fleet_here(token, fleet)
+    if here is None:
+        return None
+    number, base, others, terms = sent
+    passed = tuple(ToPass(j, here.plan(j, said), own) for j, said, own in others)
+    request = PlanRequest(number, here.plan(number, base), passed, terms)
+    vehicle, budget = here.vehicles[number], Budget.from_now(limit_s)
+    proposal = answered(vehicle, request, budget, lambda one: one.course.after(terms.time))
+    found, alone = (None if one is None else encoded(vehicle, one) for one in proposal)
+    return found, alone
 
 
 # -- a fleet's plans, in pieces of work
@@ -301,10 +266,7 @@ for longer, or at once."""
 
 
 class PoolTask(NamedTuple):
-    """A piece of work: whose plans are asked for, and past which.
-
-    It changes nothing but what it returns, and what it finds out of those vehicles alone.
-    """
+    """A piece of work: whose plans are asked for, past which; it learns of those vehicles alone."""
 
     numbers: tuple[int, ...]
     held: HeldPlans
@@ -382,11 +344,7 @@ class WorkerPool:
             list(self.gathered(_served, [_Parcel(self._token, self.fleet)] * self.jobs))
 
     def each(self, tasks: Sequence[PoolTask], budget: Budget) -> Iterator[Done]:
-        """What comes of pieces of work, in their order; nothing of those that a signal broke off.
-
-        What is learned of a vehicle alone counts for none of the other pieces: those about it come
-        before.
-        """
+        """What comes of pieces of work, in order; nothing of those that a signal broke off."""
         if self.gathered is None or len(tasks) < 2:
             for task in tasks:
                 yield done(Turns(self.vehicles, self.fleet.margin, budget), task)
@@ -421,38 +379,43 @@ class WorkerPool:
                 yield reply
 
 
-class _KnownFleet(NamedTuple):
-    """What a process keeps of a fleet."""
+class _FleetHere:
+    """What a process keeps of a fleet: its vehicles, and the plans that were sent last."""
 
-    margin: float  # [m]
-    vehicles: list[FleetMember]
-    last: dict[int, tuple[bytes, OwnPlan]]  # sent last, with all that is prepared for them
+    def __init__(self, fleet: FleetProblem) -> None:
+        self.margin, self.vehicles = fleet.margin, vehicles_of(fleet)
+        self.plan = functools.lru_cache(KEPT_PLANS * len(fleet))(
+            lambda k, said: decoded(self.vehicles[k], said)
+        )
+        prepare_vehicles(self.vehicles)
 
 
-_FLEETS: dict[str, _KnownFleet] = {}  # the last ones, by their tokens
+_FLEETS: dict[str, _FleetHere] = {}  # the last ones, by their tokens
+
+
+def _fleet_here(token: str, fleet: FleetProblem | None) -> _FleetHere | None:
+    """The fleet of a token; None if it is not known here, and not given."""
+    if token not in _FLEETS and fleet is not None:
+        _FLEETS[token] = _FleetHere(fleet)
+        for old in list(_FLEETS)[:-KEPT]:
+            del _FLEETS[old]
+    return _FLEETS.get(token)
 
 
 def _served(parcel: _Parcel) -> _Reply | None:
     """In another process: the reply to a parcel; None if the fleet is not known here."""
-    if parcel.token not in _FLEETS:
-        if parcel.fleet is None:
-            return None
-        _FLEETS[parcel.token] = _KnownFleet(parcel.fleet.margin, vehicles_of(parcel.fleet), {})
-        prepare_vehicles(_FLEETS[parcel.token].vehicles)
-        for old in list(_FLEETS)[:-KEPT]:
-            del _FLEETS[old]
-    margin, vehicles, last = _FLEETS[parcel.token]
+    here = _fleet_here(parcel.token, parcel.fleet)
+    if here is None:
+        return None
+    vehicles = here.vehicles
     for k, known in parcel.known.items():
         _learn(vehicles[k], known)
     before = [one.expansions for one in vehicles]
     found: list[tuple[dict[int, bytes] | None, int]] = []
     budget = Budget.from_now(max(parcel.seconds, LEAST_LIMIT))
     for task, told in parcel.tasks:
-        for k, said in told.items():
-            if k not in last or last[k][0] != said:
-                last[k] = said, decoded(vehicles[k], said)
-        held = {k: last[k][1] for k in told}
-        plans, queries = done(Turns(vehicles, margin, budget), task._replace(held=held))
+        held = {k: here.plan(k, said) for k, said in told.items()}
+        plans, queries = done(Turns(vehicles, here.margin, budget), task._replace(held=held))
         found.append((None if plans is None else _told(vehicles, plans), queries))
     known_now = {k: _known(vehicles[k]) for k in parcel.known}
     return _Reply(found, known_now, {k: vehicles[k].expansions - before[k] for k in parcel.known})

@@ -228,10 +228,7 @@ def closed_loop_to_dict(loop: ClosedLoop, *, name: str = "") -> LoopDocument:
 def save_closed_loop(
     loop: ClosedLoop, path: Path | str, *, name: str = "", interrupted: bool = False
 ) -> None:
-    """Write closed_loop.json in one step; `interrupted` by a signal it says so.
-
-    The `name` of the scenario heads the pictures that are drawn of the file.
-    """
+    """Write closed_loop.json in one step; the scenario's `name` heads the pictures drawn of it."""
     write_document(closed_loop_to_dict(loop, name=name), path, interrupted=interrupted)
 
 
@@ -245,26 +242,7 @@ def ended_entry(time: float, pose: list[float], value: float, cost: float) -> En
 
 
 def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...], Array]:
-    """The steps of a closed_loop.json, and where the vehicle was before each and at the end.
-
-    Any of the steps is what a `RecedingHorizon` goes on from, with the pose after it.
-
-    Parameters
-    ----------
-    path : Path or str
-    automaton : Automaton
-        The library that the loop was planned with.
-
-    Returns
-    -------
-    steps : tuple of Step
-    poses : (n + 1, dof) array
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, is no closed_loop.json, or belongs to another library.
-    """
+    """Steps of a loop of this library, and where it was before each and at the end (n + 1, dof)."""
     document = read_document(path, "loop")
     if document.get("automaton_hash") != automaton_hash(automaton):
         raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
@@ -303,10 +281,7 @@ def _step_of(row: Mapping[str, Any], automaton: Automaton) -> Step:
 
 
 def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
-    """The closed loop of a closed_loop.json; a file states neither its library nor its obstacles.
-
-    What was driven is each plan from where the vehicle was, and then what disturbed it at once.
-    """
+    """The loop of a file: each plan from where the vehicle was, then what disturbed it at once."""
     steps, poses = load_steps(path, problem.automaton)
     document = read_document(path, "loop")
     passed: list[tuple[Passed, ...]] = [(), *(step.passed for step in steps)]
@@ -458,13 +433,7 @@ def statistics_to_dict(statistics: Statistics) -> StatisticsDocument:
 
 
 def load_statistics(path: Path | str) -> Statistics:
-    """The statistics of a statistics.json.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, or is no statistics.json.
-    """
+    """The statistics of a statistics.json; raises InvalidScenario."""
     document = read_document(path, "statistics")
     with told_of(path):
         return Statistics(outcomes=tuple(map(_outcome_of, document["loops"])))

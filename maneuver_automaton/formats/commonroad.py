@@ -39,7 +39,7 @@ from maneuver_automaton.formats.statement import Statement, simple_polygon
 from maneuver_automaton.formats.text_source import Element, read_xml, root_tag, tags_below_root
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import GoalRegion, Lanelet, RoadBenchmark, RoadScene, RoadStart
-from maneuver_automaton.roads.scene import outlines_of, unwrapped
+from maneuver_automaton.roads.scene import outlines_of
 
 FORMAT = "CommonRoad"
 MOST_BYTES = 50_000_000
@@ -200,7 +200,7 @@ def _traffic(
                         yield _there(shape, (times[0][0], times[0][1] + step), step, name)
             elif len(poses) == len(states):
                 rows = np.array(poses)
-                rows[:, 2] = unwrapped(rows[:, 2].tolist())
+                rows[:, 2] = np.unwrap(rows[:, 2])
                 motion = Motion(times[:, 0], rows)
                 yield from (Obstacle(shape, motion=motion, name=name) for shape in shapes)
             else:

@@ -154,10 +154,7 @@ def commonroad_primitives_text(file: RoadPrimitives) -> str:
 
 
 def vehicle_of(file: RoadPrimitives) -> SecondOrderCar:
-    """The vehicle of a file: one that is known by its name, or the one that its motions show.
-
-    Then the wheelbase is fitted to the changes of the heading, and limits are the largest values.
-    """
+    """The vehicle that a file names, if known; or fitted: its wheelbase, its largest values."""
     if (known := VEHICLES.get(file.vehicle or "")) is not None:
         return known
     crossed, turned = _lengths_and_turns(file)
@@ -186,10 +183,7 @@ def vehicle_of(file: RoadPrimitives) -> SecondOrderCar:
 def automaton_of_commonroad_primitives(
     file: RoadPrimitives, *, vehicle: SecondOrderCar | None = None, name: str = ""
 ) -> Automaton:
-    """The automaton of a file, for a `vehicle` other than `vehicle_of` says if one is given.
-
-    Primitives that were cut at a limit end in trims of their own, which may lead nowhere.
-    """
+    """The automaton of a file; primitives cut at a limit end in trims of their own."""
     model = vehicle_of(file) if vehicle is None else vehicle
     ends = _ends(file)
     pairs = np.unique(np.concatenate(ends), axis=0)
@@ -239,11 +233,7 @@ def deviation_of(file: RoadPrimitives, automaton: Automaton) -> Deviation:
 
 
 def commonroad_primitives_of_automaton(automaton: Automaton) -> RoadPrimitives:
-    """An automaton of a second-order car as a file: one primitive a maneuver, a state each 0.1 s.
-
-    The vehicle is named if it is one that CommonRoad knows; else the file is of the older kind,
-    which names none, and the wheelbase can be told from its motions only.
-    """
+    """A primitive a maneuver, a state each 0.1 s; a file of the older kind names no vehicle."""
     car, label = automaton.model, automaton.name or "automaton"
     if not isinstance(car, SecondOrderCar):
         raise InvalidLibrary(

@@ -74,10 +74,7 @@ def refs(element: Element, tag: str) -> Iterator[int]:
 def stop_lines(
     root: Element, lanelets: Mapping[int, Lanelet], step: float, notes: list[str]
 ) -> Iterator[StopLine]:
-    """Lines at stop signs and traffic lights, at the end of a lanelet where none is stated.
-
-    Where both are at one lanelet, the light holds as long as it is on.
-    """
+    """Lines at stop signs and lights, else at the ends of lanelets; of both, a light that is on."""
     signs, turns = signs_of(root), _turns(root)
     lights = {one.whole("id"): one for one in root.all("trafficLight")}
     at = {one.whole("id"): one for one in root.all("lanelet")}

@@ -112,20 +112,7 @@ def vehicle_entry(model: Model) -> ModelEntry:
 
 
 def read_document(path: Path | str, *kinds: str) -> dict[str, Any]:
-    """What a plan.json, closed_loop.json or statistics.json holds, of whichever kind it is.
-
-    Parameters
-    ----------
-    path : Path or str
-    *kinds : str
-        Those that it may be, by their names in `KINDS`; any if left out.
-
-    Raises
-    ------
-    InvalidScenario
-        If the file cannot be read, is none of these, or states what it may not: file, field, value
-        met, and what would be right.
-    """
+    """The content of a result file of one of these kinds, by their names in `KINDS`, or of any."""
     file = file_of(kinds[0]) if kinds else "plan.json"
     value = parsed(path, file)
     kind = kind_of(value) or "plan"
@@ -242,24 +229,17 @@ def told_of(place: object) -> Iterator[None]:
         raise InvalidScenario(f"{place}: {said}") from error
 
 
-NEED = {  # by the kinds of complaint of pydantic, and by the types of JSON Schema
-    "float_type": "a finite number",
-    "finite_number": "a finite number",
-    "int_type": "a whole number",
-    "string_type": "a text",
-    "bool_type": "true or false",
-    "list_type": "a list",
-    "tuple_type": "a list",
-    "dict_type": "an object",
-    "too_short": "at least one entry",
-    "greater_than": "a positive number",
-    "number": "a finite number",
-    "integer": "a whole number",
-    "string": "a text",
-    "boolean": "true or false",
-    "array": "a list",
-    "object": "an object",
+_MEANT = {  # kinds of complaint of pydantic, and types of JSON Schema
+    "a finite number": "float_type finite_number number",
+    "a whole number": "int_type integer",
+    "a text": "string_type string",
+    "true or false": "bool_type boolean",
+    "a list": "list_type tuple_type array",
+    "an object": "dict_type object",
+    "at least one entry": "too_short",
+    "a positive number": "greater_than",
 }
+NEED = {kind: need for need, kinds in _MEANT.items() for kind in kinds.split()}
 
 
 def _needed(schema: Mapping[str, Any], where: tuple[str | int, ...]) -> str:

@@ -42,25 +42,17 @@ from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, Unicy
 from maneuver_automaton.primitives.turning import connect_hitches, hitch_trims
 from maneuver_automaton.problem import Bounds
 
-_SECOND = {"max_vel": 0.5, "min_vel": -0.5, "max_angular_vel": 0.5, "min_angular_vel": -0.5}
 _BODY = {"size": [0.5, 0.25], "shape": "box"}
+_FIRST = {
+    "dynamics": "unicycle1", "max_vel": 0.5, "min_vel": -0.5, "max_angular_vel": 0.5,
+    "min_angular_vel": -0.5, **_BODY,
+}  # fmt: skip
+_SECOND = {"dynamics": "unicycle2", "max_acc_abs": 0.25, "max_angular_acc": 0.25}
 BUILT_IN: Mapping[str, Mapping[str, Any]] = {
-    "unicycle1_v0": {"dynamics": "unicycle1", **_SECOND, **_BODY},
-    "unicycle1_v1": {"dynamics": "unicycle1", **_SECOND, "min_vel": 0.25, **_BODY},
-    "unicycle1_v2": {
-        "dynamics": "unicycle1",
-        **_SECOND,
-        "min_vel": 0.25,
-        "min_angular_vel": -0.25,
-        **_BODY,
-    },
-    "unicycle2_v0": {
-        "dynamics": "unicycle2",
-        **_SECOND,
-        "max_acc_abs": 0.25,
-        "max_angular_acc": 0.25,
-        **_BODY,
-    },
+    "unicycle1_v0": _FIRST,
+    "unicycle1_v1": _FIRST | {"min_vel": 0.25},
+    "unicycle1_v2": _FIRST | {"min_vel": 0.25, "min_angular_vel": -0.25},
+    "unicycle2_v0": _FIRST | _SECOND,
     "car1_v0": {
         "dynamics": "car_with_trailers",
         "num_trailers": 1,
@@ -76,15 +68,8 @@ BUILT_IN: Mapping[str, Mapping[str, Any]] = {
 }
 _DB_CBS: Mapping[str, Mapping[str, Any]] = {  # the names of its robots, by src/robots.cpp
     "unicycle_first_order_0": BUILT_IN["unicycle1_v0"],
-    "unicycle_first_order_0_sphere": {
-        "dynamics": "unicycle1",
-        "max_vel": 0.5,
-        "min_vel": -0.5,
-        "max_angular_vel": 2.0,
-        "min_angular_vel": -2.0,
-        "shape": "sphere",
-        "radius": 0.4,
-    },
+    "unicycle_first_order_0_sphere": _FIRST
+    | {"max_angular_vel": 2.0, "min_angular_vel": -2.0, "shape": "sphere", "radius": 0.4},
     "unicycle_second_order_0": BUILT_IN["unicycle2_v0"],
     "car_first_order_with_1_trailers_0": BUILT_IN["car1_v0"],
 }

@@ -67,7 +67,7 @@ def fleet_to_dict(result: FleetResult, *, name: str = "") -> FleetDocument:
     >>> robot = Automaton.of_controls(Unicycle(), controls)
     >>> ways = [Problem(robot, [0, y, 0], [4, y, 0], footprint=Disc(0.3)) for y in (0, 2)]
     >>> fleet = FleetProblem(ways, names=["low", "high"])
-    >>> document = fleet_to_dict(plan_fleet(fleet, time_limit=1.0))
+    >>> document = fleet_to_dict(plan_fleet(fleet, time_limit=60.0, max_rounds=0))
     >>> document["kind"], document["status"], list(document["vehicles"]), document["sum_s"]
     ('fleet', 'found', ['low', 'high'], 8.0)
     """
@@ -131,10 +131,7 @@ def save_fleet(
 
 
 def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
-    """The result of a plan.json of several vehicles, in the world that it was planned in.
-
-    What the file claims is not proven again; `verify_fleet` does that.
-    """
+    """The result of a plan.json of several vehicles; `verify_fleet` proves what it claims again."""
     document = read_of_fleet(path, "fleet", fleet)
     stated = document["vehicles"]
     results = {

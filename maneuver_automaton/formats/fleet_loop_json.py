@@ -293,10 +293,7 @@ def _end_of(log: FleetLog, name: str, problem: Problem) -> tuple[float, Array, f
 
 
 def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
-    """The loop of a closed_loop.json, in the world that it was driven in.
-
-    What the file claims is not proven again; `verify_driven` does that.
-    """
+    """The loop of a closed_loop.json of several; `verify_driven` proves what it claims again."""
     document = read_of_fleet(path, "fleet-loop", fleet)
     stated = document["vehicles"]
     problems = dict(zip(fleet.names, fleet.problems, strict=True))

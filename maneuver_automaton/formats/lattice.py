@@ -155,13 +155,7 @@ def arcs(poses: Array) -> tuple[float, float, float]:
 
 
 def cells(move: Move, resolution: float) -> tuple[int, int] | None:
-    """Columns and rows from the start of a primitive to its end; None if it ends beside the grid.
-
-    Examples
-    --------
-    >>> cells(Move(start=0, end=0, poses=[[0, 0, 0], [0.5, -0.1, 0]]), 0.1)
-    (5, -1)
-    """
+    """Columns and rows from start to end of a primitive; None if it ends beside the grid."""
     across = move.poses[-1, :2] / resolution
     whole = np.round(across)
     if np.abs(across - whole).max() > ON_GRID:
@@ -228,17 +222,7 @@ class _LatticeTurn(NamedTuple):
 
 
 def lattice_of_arcs(*, resolution: float, turning_radius: float, spins: bool = False) -> Lattice:
-    """Primitives of a vehicle that drives ahead on arcs of a least radius.
-
-    Parameters
-    ----------
-    resolution : float
-        Side of a cell [m].
-    turning_radius : float
-        Least radius [m].
-    spins : bool
-        Whether it turns on the spot too, to the headings beside its own.
-    """
+    """Primitives that drive ahead on arcs of a least radius [m]; with `spins`, on the spot."""
     if not (resolution > 0.0 and turning_radius > 0.0):
         raise ValueError(
             f"resolution and turning_radius must be positive, got {resolution} m and "
@@ -366,10 +350,7 @@ DIGITS = 12  # after the point, of a level
 
 
 def levels_of(begins: Array, ends: Array, *, apart: float) -> Array:
-    """The levels (k,) of values, rising: those closer than `apart` are one.
-
-    A level is the median of what begins there, and of what ends there where nothing begins.
-    """
+    """Values, rising, less than `apart`: medians of begins, of ends where nothing begins."""
     values = np.unique(np.concatenate([begins, ends]))
     levels = []
     for group in np.split(values, np.flatnonzero(np.diff(values) > apart) + 1):

@@ -20,7 +20,7 @@ MOST_LIBRARY_BYTES = 500_000_000
 
 File: TypeAlias = (
     sbpl_mprim.MprimFile
-    | nav2_lattice.Nav2Lattice
+    | nav2_lattice.Nav2File
     | commonroad_primitives.RoadPrimitives
     | tuple[aroc.ArocPrimitive, ...]
 )
@@ -37,10 +37,7 @@ class PrimitivesRead:
 
 
 def read_primitives(path: Path, model: Model | None = None) -> PrimitivesRead | None:
-    """What a file of motion primitives holds; None if it is in none of these formats.
-
-    Exports of AROC do not state the vehicle: a `model` of their kind takes the place of the fitted.
-    """
+    """What a file of primitives holds, or None; a `model` of AROC's kind is taken, not fitted."""
     try:
         return _read(path, model)
     except (InvalidScenario, InvalidLibrary):
@@ -91,7 +88,7 @@ WRITTEN: Mapping[str, tuple[type, Callable[[Automaton], Any], Callable[[Any, Pat
         commonroad_primitives.save_commonroad_primitives,
     ),
     NAV2_JSON: (
-        nav2_lattice.Nav2Lattice,
+        dict,
         nav2_lattice.nav2_lattice_of_automaton,
         nav2_lattice.save_nav2_lattice,
     ),
@@ -99,10 +96,7 @@ WRITTEN: Mapping[str, tuple[type, Callable[[Automaton], Any], Callable[[Any, Pat
 
 
 def writer_of(target: Path) -> Callable[[Automaton, Path], None] | None:
-    """What writes an automaton to a file with this ending; None if nothing does.
-
-    `.mprim` is SBPL, `.xml` CommonRoad, `.nav2.json` Nav2, and any other `.json` a library.
-    """
+    """What writes an automaton to a file with this ending; of any other .json, a library."""
     name = target.name.lower()
     for ending, (_, file_of, save) in WRITTEN.items():
         if name.endswith(ending):

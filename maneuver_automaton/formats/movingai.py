@@ -39,14 +39,7 @@ from maneuver_automaton.formats.text_source import (
 
 FREE, BLOCKED = ".G", "@OTSW"
 COLUMNS = (
-    "bucket",
-    "map",
-    "width",
-    "height",
-    "start x",
-    "start y",
-    "goal x",
-    "goal y",
+    *("bucket", "map", "width", "height", "start x", "start y", "goal x", "goal y"),
     "optimal length",
 )
 _OTHER = re.compile(f"[^{FREE}{BLOCKED}]")

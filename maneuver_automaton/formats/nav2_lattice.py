@@ -13,20 +13,19 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, NotRequired
+from typing import NotRequired
 
 import numpy as np
 from pydantic import TypeAdapter
 from typing_extensions import TypedDict
 
-from maneuver_automaton._arrays import Array, freeze, wrapped
+from maneuver_automaton._arrays import Array, wrapped
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.errors import InvalidLibrary, InvalidScenario
 from maneuver_automaton.formats.documents import check_value, misstated
-from maneuver_automaton.formats.entries import Flag, Number, Positive, Whole, entry, made, of
+from maneuver_automaton.formats.entries import Flag, Number, Positive, Whole
 from maneuver_automaton.formats.lattice import (
     ON_GRID,
     SPEED,
@@ -55,27 +54,27 @@ DIGITS = 5  # after the point, of what is worked out of poses
 class Nav2Row(TypedDict):
     """A primitive of a file."""
 
-    trajectory_id: Annotated[Whole, of("id")]
-    start_angle_index: Annotated[Whole, of("start")]
-    end_angle_index: Annotated[Whole, of("end")]
-    left_turn: Flag
-    trajectory_radius: Annotated[Number, of("radius")]
-    trajectory_length: Annotated[Number, of("length")]
-    arc_length: Number
-    straight_length: Number
-    poses: list[list[Number]]
+    trajectory_id: Whole
+    start_angle_index: Whole
+    end_angle_index: Whole
+    left_turn: Flag  # true unless it has an arc to the right
+    trajectory_radius: Number  # [m] of its arc, 0 without one
+    trajectory_length: Number  # [m]
+    arc_length: Number  # [m]
+    straight_length: Number  # [m]
+    poses: list[list[Number]]  # [m, m, rad]; the first one is left out where it moves
 
 
 class Nav2Head(TypedDict):
     """What holds of all primitives of a file."""
 
-    motion_model: str
-    turning_radius: Positive
-    grid_resolution: Annotated[Positive, of("resolution")]
-    stopping_threshold: NotRequired[Whole]
+    motion_model: str  # ackermann | diff | omni
+    turning_radius: Positive  # [m]
+    grid_resolution: Positive  # [m]
+    stopping_threshold: NotRequired[Whole]  # of the generator
     num_of_headings: Whole
-    trajectory_distinctness_ratio: NotRequired[Annotated[Number, of("distinctness_ratio")]]
-    heading_angles: Annotated[list[Number], of("headings")]
+    trajectory_distinctness_ratio: NotRequired[Number]  # of the generator, newer files
+    heading_angles: list[Number]  # [rad], rising
     number_of_trajectories: Whole
 
 
@@ -83,48 +82,12 @@ class Nav2File(TypedDict):
     """A file of primitives, as JSON holds it."""
 
     version: NotRequired[Number]
-    date_generated: NotRequired[Annotated[str, of("date")]]
+    date_generated: NotRequired[str]  # YYYY-MM-DD
     lattice_metadata: Nav2Head
     primitives: list[Nav2Row]
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Nav2Primitive:
-    """One primitive, as it stands in the file."""
-
-    id: int
-    start: int
-    end: int
-    left_turn: bool  # true unless it has an arc to the right
-    radius: float  # [m] of its arc, 0 without one
-    length: float  # [m]
-    arc_length: float  # [m]
-    straight_length: float  # [m]
-    poses: Array  # (n, 3) [m, m, rad]; the first one is left out where it moves
-
-    def __post_init__(self) -> None:
-        freeze(self, "poses", last=3)
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Nav2Lattice:
-    """A file of primitives."""
-
-    motion_model: str  # ackermann | diff | omni
-    turning_radius: float  # [m]
-    resolution: float  # [m] of a cell
-    headings: Array  # (k,) [rad], rising
-    primitives: tuple[Nav2Primitive, ...]
-    version: float = 1.0
-    date: str = ""  # YYYY-MM-DD, as it stands in the file
-    stopping_threshold: int | None = None  # of the generator
-    distinctness_ratio: float | None = None  # of the generator, newer files
-
-    def __post_init__(self) -> None:
-        freeze(self, "headings")
-
-
-def read_nav2_lattice(path: Path) -> Nav2Lattice:
+def read_nav2_lattice(path: Path) -> Nav2File:
     """The primitives of a file, as they stand there."""
     text = read_text(path, most=MOST_BYTES, what="lattice primitives")
     try:
@@ -151,50 +114,39 @@ def read_nav2_lattice(path: Path) -> Nav2Lattice:
     if motion not in MOTIONS:
         raise wrong("motion_model", f"got {motion!r:.40}, need one of {', '.join(MOTIONS)}")
     headings, resolution = np.array(angles, dtype=np.float64), float(head["grid_resolution"])
-    primitives = tuple(_primitive(row, headings, resolution, path, k) for k, row in enumerate(rows))
-    _check_order(primitives, headings.size, path)
+    for k, row in enumerate(rows):
+        _check(row, headings, resolution, path, k)
+    _check_order(rows, headings.size, path)
     count = head["number_of_trajectories"]
-    if count != len(primitives):
-        said = f"got {count}, but there are {len(primitives)} primitives"
+    if count != len(rows):
+        said = f"got {count}, but there are {len(rows)} primitives"
         raise wrong("number_of_trajectories", said)
-    more = {"version": float(top.get("version", 1.0)), "date": top.get("date_generated", "")}
-    return made(Nav2Lattice, head, Nav2Head, primitives=primitives, **more)
+    file: Nav2File = top
+    return file
 
 
-def save_nav2_lattice(file: Nav2Lattice, path: Path) -> None:
+def save_nav2_lattice(file: Nav2File, path: Path) -> None:
     """Write primitives, in one step; every number reads back to the last bit."""
-    counts = {
-        "num_of_headings": file.headings.size,
-        "number_of_trajectories": len(file.primitives),
-    }
-    head = entry(Nav2Head, file, **counts)
-    known = {key: value for key, value in head.items() if value is not None}
-    content = entry(Nav2File, file, lattice_metadata=known)
-    stated = {key: value for key, value in content.items() if value != ""}
-    text = json.dumps(stated, indent="\t", allow_nan=False)
-    write_text_atomically(path, text + "\n")
+    write_text_atomically(path, json.dumps(file, indent="\t", allow_nan=False) + "\n")
 
 
 def automaton_of_nav2_lattice(
-    file: Nav2Lattice, *, speed: float = SPEED, turn_rate: float = TURN_RATE, name: str = ""
+    file: Nav2File, *, speed: float = SPEED, turn_rate: float = TURN_RATE, name: str = ""
 ) -> Automaton:
     """The automaton of a file, its times as `automaton_of_lattice` has them."""
+    head = file["lattice_metadata"]
     lattice = Lattice(
-        resolution=file.resolution,
-        headings=file.headings,
-        moves=tuple(_meant(file, one) for one in file.primitives),
-        turning_radius=file.turning_radius,
+        resolution=head["grid_resolution"],
+        headings=np.array(head["heading_angles"]),
+        moves=tuple(_meant(head, one) for one in file["primitives"]),
+        turning_radius=head["turning_radius"],
         name=name,
     )
     return automaton_of_lattice(lattice, speed=speed, turn_rate=turn_rate)
 
 
-def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
-    """An automaton of lattice primitives as a file; the date is left out.
-
-    The motion model is `omni` if a primitive goes aside, else `diff` if one turns on the spot, else
-    `ackermann`.
-    """
+def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2File:
+    """An automaton of lattice primitives as a file, which leaves its date out."""
     lattice = lattice_of_automaton(automaton, kind=KIND)
     label = automaton.name or "automaton"
     moves = []
@@ -212,38 +164,41 @@ def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2Lattice:
         raise InvalidLibrary(
             f"{label}: heading {min(left_out)} has no maneuver; a file of {KIND} needs one for each"
         )
-    primitives = tuple(_described(k, move) for k, move in enumerate(moves))
-    radii = [one.radius for one in primitives if one.radius > 0.0]
+    primitives = [_described(k, move) for k, move in enumerate(moves)]
+    radii = [radius for one in primitives if (radius := one["trajectory_radius"]) > 0.0]
     if lattice.turning_radius is None and not radii:
         raise InvalidLibrary(
             f"{label}: has neither a turning radius nor arcs; a file of {KIND} states one"
         )
-    return Nav2Lattice(
-        motion_model=_motion(moves),
-        turning_radius=min(radii) if lattice.turning_radius is None else lattice.turning_radius,
-        resolution=lattice.resolution,
-        headings=lattice.headings,
-        primitives=primitives,
-    )
+    least = min(radii) if lattice.turning_radius is None else lattice.turning_radius
+    head: Nav2Head = {
+        "motion_model": _motion(moves),
+        "turning_radius": least,
+        "grid_resolution": lattice.resolution,
+        "num_of_headings": lattice.headings.size,
+        "heading_angles": lattice.headings.tolist(),
+        "number_of_trajectories": len(primitives),
+    }
+    return {"version": 1.0, "lattice_metadata": head, "primitives": primitives}
 
 
-def _primitive(
-    row: Nav2Row, headings: Array, resolution: float, path: Path, number: int
-) -> Nav2Primitive:
+def _check(row: Nav2Row, headings: Array, resolution: float, path: Path, number: int) -> None:
+    """Raise where a primitive is not one on the grid, pose after pose."""
+
     def wrong(said: str, *where: str | int) -> InvalidScenario:
         return misstated(path, ("primitives", number, *where), said)
 
-    for key in ("start_angle_index", "end_angle_index"):
-        if not 0 <= (index := row[key]) < headings.size:
+    begin, end = row["start_angle_index"], row["end_angle_index"]
+    for key, index in (("start_angle_index", begin), ("end_angle_index", end)):
+        if not 0 <= index < headings.size:
             raise wrong(f"got {index}, need 0 to {headings.size - 1}", key)
-    poses = row["poses"]
-    for k, pose in enumerate(poses):
+    for k, pose in enumerate(row["poses"]):
         if len(pose) != 3:
             raise wrong(f"got {len(pose)} numbers, need 3: x, y, yaw", "poses", k)
-    if not poses:
+    if not row["poses"]:
         raise wrong("is empty, need at least one pose", "poses")
-    one = made(Nav2Primitive, row, Nav2Row)
-    steps = np.hypot(*np.diff(one.poses[:, :2], axis=0, prepend=0.0).T) / resolution
+    poses = np.array(row["poses"], dtype=np.float64)
+    steps = np.hypot(*np.diff(poses[:, :2], axis=0, prepend=0.0).T) / resolution
     if not steps.max() <= MOST_CELLS:
         k = int(steps.argmax())
         raise wrong(
@@ -252,7 +207,7 @@ def _primitive(
             "poses",
             k,
         )
-    turns = np.abs(wrapped(np.diff(one.poses[:, 2], prepend=headings[one.start])))
+    turns = np.abs(wrapped(np.diff(poses[:, 2], prepend=headings[begin])))
     for values, most, unit in ((steps, GAP_CELLS, "cells"), (turns, GAP_TURN, "rad")):
         k, usual = int(values.argmax()), _usual(values)
         if values[k] > max(most, UNEVEN * usual):
@@ -262,7 +217,7 @@ def _primitive(
                 "poses",
                 k,
             )
-    last, heading = one.poses[-1], float(headings[one.end])
+    last, heading = poses[-1], float(headings[end])
     across = last[:2] / resolution
     if np.abs(across - np.round(across)).max() > ON_GRID:
         raise wrong(
@@ -272,11 +227,10 @@ def _primitive(
         )
     if abs(float(wrapped(last[2] - heading))) > ON_HEADING:
         raise wrong(
-            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {one.end}",
+            f"got the yaw {last[2]:g}, need {heading:g}, that of end_angle_index {end}",
             "poses",
             len(poses) - 1,
         )
-    return one
 
 
 def _usual(steps: Array) -> float:
@@ -287,45 +241,45 @@ def _usual(steps: Array) -> float:
     return math.inf if steps.size == 1 else 0.0
 
 
-def _check_order(primitives: Sequence[Nav2Primitive], n: int, path: Path) -> None:
+def _check_order(rows: Sequence[Nav2Row], n: int, path: Path) -> None:
     """Sorted by the first heading, from 0 on, none left out: Nav2 counts the changes."""
     expected = 0
-    for k, one in enumerate(primitives):
-        if one.start not in (expected, expected + 1) or (k == 0 and one.start != 0):
-            said = f"got {one.start} after {expected}, need primitives sorted by it, from 0 on"
+    for k, start in enumerate(row["start_angle_index"] for row in rows):
+        if start not in (expected, expected + 1) or (k == 0 and start != 0):
+            said = f"got {start} after {expected}, need primitives sorted by it, from 0 on"
             raise misstated(path, ("primitives", k, "start_angle_index"), said)
-        expected = one.start
+        expected = start
     if expected != n - 1:
         said = f"ends with the heading {expected}, need primitives up to {n - 1}"
         raise misstated(path, ("primitives",), said)
 
 
-def _meant(file: Nav2Lattice, one: Nav2Primitive) -> Move:
+def _meant(head: Nav2Head, row: Nav2Row) -> Move:
     """A primitive with its first pose, its last one exactly on the grid and its heading."""
-    begin, end = float(file.headings[one.start]), float(file.headings[one.end])
-    first = np.array([[0.0, 0.0, begin]])
-    poses = one.poses if one.poses[0, :2].any() or len(one.poses) == 1 else one.poses[1:]
-    poses = continuous(np.concatenate([first, poses]), last_heading=end)
-    poses[-1, :2] = file.resolution * np.round(poses[-1, :2] / file.resolution)
-    return Move(start=one.start, end=one.end, poses=poses)
+    begin, end, cell = row["start_angle_index"], row["end_angle_index"], head["grid_resolution"]
+    stated, angles = row["poses"], head["heading_angles"]
+    stated = stated if any(stated[0][:2]) or len(stated) == 1 else stated[1:]
+    poses = continuous([[0.0, 0.0, angles[begin]], *stated], last_heading=angles[end])
+    poses[-1, :2] = cell * np.round(poses[-1, :2] / cell)
+    return Move(start=begin, end=end, poses=poses)
 
 
-def _described(number: int, move: Move) -> Nav2Primitive:
+def _described(number: int, move: Move) -> Nav2Row:
     """A primitive with what its poses say of it."""
     radius, arc, straight = arcs(move.poses)
     moves = move.poses[:, :2].any()
     poses = move.poses[1:] if moves else move.poses
-    return Nav2Primitive(
-        id=number,
-        start=move.start,
-        end=move.end,
-        left_turn=not radius < 0.0,
-        radius=round(abs(radius), DIGITS),
-        length=round(arc + straight, DIGITS),
-        arc_length=round(arc, DIGITS),
-        straight_length=round(straight, DIGITS),
-        poses=np.concatenate([poses[:, :2], np.mod(poses[:, 2:], 2.0 * np.pi)], axis=1),
-    )
+    return {
+        "trajectory_id": number,
+        "start_angle_index": move.start,
+        "end_angle_index": move.end,
+        "left_turn": not radius < 0.0,
+        "trajectory_radius": round(abs(radius), DIGITS),
+        "trajectory_length": round(arc + straight, DIGITS),
+        "arc_length": round(arc, DIGITS),
+        "straight_length": round(straight, DIGITS),
+        "poses": np.column_stack([poses[:, :2], np.mod(poses[:, 2], 2.0 * np.pi)]).tolist(),
+    }
 
 
 def _along(move: Move) -> tuple[float, float]:

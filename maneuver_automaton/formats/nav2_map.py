@@ -126,10 +126,7 @@ def read_nav2_map(path: Path, document: Document) -> tuple[Statement, ...]:
 
 
 def save_nav2_map(cells: OccupancyMap, path: Path) -> None:
-    """Write a map as `path`, a YAML file, and an image with the ending .pgm beside it.
-
-    It reads back to the same map, to the last bit.
-    """
+    """Write a map as YAML and a .pgm beside it, which read back to the last bit."""
     rows, columns = cells.blocked.shape
     image = path.with_suffix(".pgm")
     pixels = np.where(cells.blocked[::-1], 0, 254).astype(np.uint8)
@@ -251,10 +248,7 @@ class GreyImage:
 
 
 def read_grey_image(path: Path) -> GreyImage:
-    """The shades of a PGM (binary or text, 8 or 16 bit), PNG or BMP.
-
-    Colours count as the mean of red, green and blue.
-    """
+    """The shades of a PGM (8 or 16 bit), PNG or BMP; the mean of red, green and blue."""
     if path.suffix.lower() in OTHER_IMAGES:
         return _through_pillow(path)
     content = read_bytes(path, most=MAX_MAP_BYTES, what="an image")

@@ -195,7 +195,9 @@ def plan_to_dict(result: PlanResult, *, name: str = "") -> PlanDocument:
         result,
         name=name,
         **library_entries(result.problem.automaton),
-        **motion_entries(result.plan),
+        duration_s=None if result.plan is None else result.plan.duration,
+        primitives=primitive_entries(result.plan),
+        trajectory=trajectory_entry(result.plan),
         terminal_error=entry(TerminalErrorEntry, result.terminal_error),
         via=[entry(PassedEntry, one, time_s=one.time) for one in result.via],
         audit=entry(AuditEntry, result.audit),
@@ -255,15 +257,6 @@ def save_plan(
         If the file cannot be written.
     """
     write_document(plan_to_dict(result, name=name), path, interrupted=interrupted)
-
-
-def motion_entries(plan: Plan | None) -> dict[str, Any]:
-    """The keys that a plan fills in a file; without one they are null or empty."""
-    return {
-        "duration_s": None if plan is None else plan.duration,
-        "primitives": primitive_entries(plan),
-        "trajectory": trajectory_entry(plan),
-    }
 
 
 def trajectory_entry(plan: Plan | None) -> TrajectoryEntry:
@@ -388,10 +381,7 @@ def _plan_of_file(document: Any, place: str, model: Model | None = None) -> Plan
 
 
 def load_result(path: Path | str, problem: Problem) -> PlanResult:
-    """The result of a plan.json; the file states neither body nor obstacles, the `problem` does.
-
-    Alternatives with maneuvers are left out: the file does not say how they move.
-    """
+    """The result of a plan.json of this `problem`; alternatives with maneuvers are left out."""
     return result_of(read_document(path, "plan"), problem, place=str(path))
 
 

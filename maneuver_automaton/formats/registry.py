@@ -43,13 +43,7 @@ class FileFormat(Protocol):
         """Whether a file is in it; the `document` is that of a YAML file, None of any other."""
 
     def read(self, path: Path, document: Document | None) -> tuple[Statement, ...]:
-        """What a file states, problem by problem.
-
-        Raises
-        ------
-        InvalidScenario
-            If it cannot be used: one line with file, place, value met, what would be right.
-        """
+        """What a file states, problem by problem; raises InvalidScenario."""
 
     def writes(self, path: Path) -> bool:
         """Whether a file of this name is written in it."""
@@ -141,10 +135,7 @@ def from_outside() -> tuple[FileFormat, ...]:
 
 
 def format_of(path: Path, document: Document | None = None) -> FileFormat | None:
-    """The format of a file; None of a scenario, and of what nothing recognises.
-
-    Those of other packages are asked first, and all only of files that are no scenario.
-    """
+    """The format of a file, those of other packages first; None of scenarios and the unknown."""
     ending = path.suffix.lower()
     if document is not None and isinstance(document.value, dict) and "schema" in document.value:
         return None
@@ -199,10 +190,7 @@ def map_writer_of(path: Path) -> FileFormat | None:
 
 
 def states_a_problem(path: Path, document: Document | None) -> bool:
-    """Whether a file of a folder is a problem by itself; a damaged one is, which tells why.
-
-    The `document` is that of a YAML file; None of one that cannot be read.
-    """
+    """Whether a file of a folder is a problem by itself; a damaged one is, which then tells why."""
     ending = path.suffix.lower()
     if ending in YAML_ENDINGS:
         return document is None or not belongs_to(document)

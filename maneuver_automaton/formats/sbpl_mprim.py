@@ -186,11 +186,7 @@ def save_mprim(file: MprimFile, path: Path) -> None:
 def automaton_of_mprim(
     file: MprimFile, *, speed: float = SPEED, turn_rate: float = TURN_RATE, name: str = ""
 ) -> Automaton:
-    """The automaton of a file: ends in the middle of their cells, times as `automaton_of_lattice`.
-
-    The file rounds its poses; a first and a last pose are taken where they are meant, so that
-    every word of primitives ends on the grid.
-    """
+    """The automaton of a file, whose rounded ends are taken where they are meant: on the grid."""
     lattice = Lattice(
         resolution=file.resolution,
         headings=file.headings,

@@ -109,10 +109,7 @@ _PLACE = re.compile(r"(.*)\[(\S+) (\S+)\]")
 
 
 def simple_polygon(corners: ArrayLike, holes: Sequence[ArrayLike] = ()) -> Polygon:
-    """A polygon of rings as a file lists them.
-
-    A corner that is listed twice in a row, or again at the end, counts once.
-    """
+    """A polygon of rings as a file lists them; corners that are listed twice count once."""
     rings = [_ring(corners, "the ring"), *(_ring(hole, "a hole") for hole in holes)]
     import shapely
 

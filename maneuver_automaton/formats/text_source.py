@@ -46,13 +46,7 @@ def too_long(name: str, most: int, *, what: str) -> InvalidScenario:
 
 
 def read_text(path: Path, *, most: int = MAX_BYTES, what: str = "a scenario") -> str:
-    """The text of a file, without the mark that some editors put in front of it.
-
-    Raises
-    ------
-    InvalidScenario
-        As `read_bytes`, and if it is not text in UTF-8 (or UTF-16).
-    """
+    """The text of a file in UTF-8 or UTF-16, less its mark; raises InvalidScenario."""
     content = read_bytes(path, most=most, what=what)
     encoding = "utf-16" if content[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
@@ -150,10 +144,7 @@ class Element:
         return (child for child in self.children if child.tag == tag)
 
     def get(self, *tags: str) -> Element | None:
-        """The first child of the first name, its first child of the second, ...; None if missing.
-
-        Names that are joined by ``|`` are alternatives.
-        """
+        """The first child of the first name, its first of the second, ...; `a|b` is either."""
         here: Element | None = self
         for tag in tags:
             if here is None:

@@ -99,10 +99,7 @@ def _short(text: str) -> str:
 
 
 def parse(text: str, *, name: str, what: str = "a scenario") -> Document:
-    r"""Values and lines of a YAML text; `name` is what messages call the file.
-
-    `what` is what it should hold, for the message if it is empty or too long.
-    """
+    """Values and lines of a YAML text; `name` is its file's, `what` it should hold."""
     if len(text) > MAX_BYTES:
         raise too_long(name, MAX_BYTES, what=what)
     if bad := _NOT_TEXT.search(text):

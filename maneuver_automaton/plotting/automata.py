@@ -191,8 +191,10 @@ def _draw_graph(ax: Axes, automaton: Automaton) -> AutomatonArtists:
         free, colors=[GREY], linewidths=0.6,
         alpha=0.7 if len(automaton) <= MOST_LEVEL_NAMES else 0.25, zorder=1.0,
     )  # fmt: skip
-    if len(free) <= MOST_HEADED:
-        _draw_switch_heads(ax, free, radius)
+    if len(free) <= MOST_HEADED:  # arrow heads at both ends, where there is room between nodes
+        ways = [(b, b - a, float(np.linalg.norm(b - a))) for p in free for a, b in (p, p[::-1])]
+        tips = [_tip(at, way / far, radius) for at, way, far in ways if far > 2.6 * radius]
+        ax.add_collection(PolyCollection(tips, facecolors=[GREY], linewidths=0.0, zorder=2.0))
     pictures, heads = _trim_pictures(automaton, radius)
     motions = LineCollection(
         [picture + centre for picture, centre in zip(pictures, centres, strict=True)],
@@ -313,17 +315,6 @@ def _arrow_head(picture: Array, radius: float) -> Array:
     aside = np.array([-along[1], along[0]])
     tip = picture[-1] + 0.2 * radius * along
     return np.array([tip, picture[-1] + 0.13 * radius * aside, picture[-1] - 0.13 * radius * aside])
-
-
-def _draw_switch_heads(ax: Axes, switches: list[Array], radius: float) -> None:
-    """Arrow heads at both ends of lines (2, 2) between nodes: trims that switch at will."""
-    heads = [
-        _tip(there, (there - here) / np.linalg.norm(there - here), radius)
-        for line in switches
-        for here, there in (line, line[::-1])
-        if np.linalg.norm(there - here) > 2.6 * radius  # there is room between the nodes
-    ]
-    ax.add_collection(PolyCollection(heads, facecolors=[GREY], linewidths=0.0, zorder=2.0))
 
 
 def _tip(centre: Array, along: Array, radius: float) -> Array:

@@ -42,15 +42,6 @@ BODIES, LEAST_MARK = 8.0, 0.35  # marks suit a path of so many bodies, or this s
 IN_VIEW = 0.5  # or, among obstacles, one that takes this share of the picture
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Carried:
-    """What a vehicle carries, say a trailer: its body, and the track of its own frame."""
-
-    name: str
-    body: tuple[Array, ...]  # outlines (n, 2) [m]
-    track: Track
-
-
 def view_box(world: Environment, times: Array, points: Array, *, size: float) -> Array:
     """Corners (2, 2) of what a picture shows around `points` (n, 2), where something happens.
 
@@ -139,16 +130,12 @@ class Actor:
         return self.mover.parts if self.mover.has_plan else (self.mover,)
 
     @cached_property
-    def carried(self) -> tuple[Carried, ...]:
-        """What it carries."""
-        return tuple(
-            Carried(
-                name=part.name,
-                body=tuple(footprint_polygons(part.bodies[""])),
-                track=joined_track(part.start, part.pieces),
-            )
+    def carried(self) -> list[tuple[list[Array], Track]]:
+        """Outlines (n, 2) [m] and track of each part that it carries."""
+        return [
+            (footprint_polygons(part.bodies[""]), joined_track(part.start, part.pieces))
             for part in self.parts[1:]
-        )
+        ]
 
     @property
     def goals(self) -> tuple[Goal, ...]:

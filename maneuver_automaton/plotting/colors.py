@@ -130,7 +130,7 @@ def _unlike(color: Color, taken: Sequence[Color]) -> Color:
 
 def _rounded(color: Color) -> Color:
     red, green, blue = (round(min(max(c, 0.0), 1.0), 4) for c in color)
-    return (red, green, blue)
+    return red, green, blue
 
 
 MOST_TRIMS = 12  # which have a colour and a name each
@@ -140,11 +140,7 @@ PALE, DARK = 0.5, -0.15  # shades of the slowest and the fastest of those that m
 
 
 def track_colors(twists: Mapping[str, Array]) -> dict[str, Color]:
-    """A colour for each of the trims with `twists` (dof,) by name.
-
-    Up to twelve trims have a colour each. More share the colours of how they move, the darker
-    the faster.
-    """
+    """Colours of trims with `twists` (dof,): one each, or of many by how they move."""
     if len(twists) <= MOST_TRIMS:
         return trim_colors(twists)
     colors: dict[str, Color] = {}
@@ -159,10 +155,7 @@ def track_colors(twists: Mapping[str, Array]) -> dict[str, Color]:
 
 
 def motion_names(twists: Mapping[str, Array], *, many: bool) -> dict[str, str]:
-    """What a legend calls the trims with `twists`, and a trim of each: itself, or the fastest.
-
-    Trims have their own names, and how they move if they are `many`.
-    """
+    """What a legend calls trims, of `many` how they move, and a trim of each, or the fastest."""
     if not many:
         return {name: name for name in twists}
     entries = {}

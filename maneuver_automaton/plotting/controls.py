@@ -81,18 +81,7 @@ def draw_controls(
     [[0.0, 0.5], [2.0, 0.5]]
     """
     track = track_of_plan(plan)
-    used = dict(track_colors(track.twists) if colors is None else colors)
-    return draw_track_controls(axes, track, labels=labels, colors=used)
-
-
-def draw_track_controls(
-    axes: Axes | Sequence[Axes],
-    track: Track,
-    *,
-    labels: Sequence[str],
-    colors: Mapping[str, Color],
-) -> tuple[StepArtists, ...]:
-    """Draw the controls of a `track`; see `draw_controls`."""
+    colors = track_colors(track.twists) if colors is None else colors
     panels = [axes] if isinstance(axes, Axes) else list(axes)
     many = track.pieces[0].control.shape[1] if track.pieces else max(len(labels), len(panels))
     if len(panels) not in (1, many) or (labels and len(labels) != many):

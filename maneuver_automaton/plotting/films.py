@@ -85,13 +85,6 @@ def check_film_path(path: str | Path) -> Path:
     return target
 
 
-def write_film(film: Film, path: str | Path) -> None:
-    """Write a `film` to `path`, by its ending; the file is replaced in one step."""
-    target = check_film_path(path)
-    writers = {".gif": _gif, ".mp4": _video}
-    write_bytes_atomically(target, writers[target.suffix.lower()](film))
-
-
 def _gif(film: Film) -> bytes:
     from PIL import Image
 
@@ -179,8 +172,8 @@ def save_film(result: Any, path: str | Path, *, look: Look | None = None) -> Non
     OSError
         If the file cannot be written; an old one stays as it was.
     """
-    target = check_film_path(path)
-    write_film(film_of(result, look=look), target)
+    target, film = check_film_path(path), film_of(result, look=look)
+    write_bytes_atomically(target, _video(film) if target.suffix.lower() == ".mp4" else _gif(film))
 
 
 def film_of(result: Any, *, look: Look | None = None) -> Film:

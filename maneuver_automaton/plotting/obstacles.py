@@ -34,30 +34,20 @@ DASHES = (0, (6.0, 3.0))
 FAR_M = 1e6  # a side without a limit is drawn so far, and cut off by the picture
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class LimitArtists:
-    """Artists of `draw_limits`."""
-
-    zones: tuple[PathCollection, ...]  # one for all that ask for the same
-    bounds: LineCollection
-
-
-def draw_limits(ax: Axes, zones: Sequence[Zone], bounds: Bounds) -> LimitArtists:
+def draw_limits(ax: Axes, zones: Sequence[Zone], bounds: Bounds) -> dict[str, Any]:
     """Draw zones hatched, and the bounds of the pose dashed, on `ax`, which keeps its limits."""
-    artists = LimitArtists(
-        zones=tuple(
-            PathCollection(
-                [shape_path(one.shape) for one in alike], facecolors=[(*ZONE, 0.10)],
-                edgecolors=[(*ZONE, 0.65)], linewidths=0.8, hatch=HATCHES[k % len(HATCHES)],
-                zorder=0.8,
-            )
-            for k, alike in enumerate(_alike(zones).values())
-        ),
-        bounds=LineCollection(
-            bound_lines(bounds), colors=[GREY], linewidths=1.1, linestyles=[DASHES], zorder=0.9
-        ),
-    )  # fmt: skip
-    for part in (*artists.zones, artists.bounds):
+    artists: dict[str, Any] = {
+        f"zone {k}": PathCollection(
+            [shape_path(one.shape) for one in alike], facecolors=[(*ZONE, 0.10)],
+            edgecolors=[(*ZONE, 0.65)], linewidths=0.8, hatch=HATCHES[k % len(HATCHES)],
+            zorder=0.8,
+        )
+        for k, alike in enumerate(_alike(zones).values())
+    }  # fmt: skip
+    artists["bounds"] = LineCollection(
+        bound_lines(bounds), colors=[GREY], linewidths=1.1, linestyles=[DASHES], zorder=0.9
+    )
+    for part in artists.values():
         ax.add_collection(part, autolim=False)
     return artists
 
@@ -328,10 +318,7 @@ def show_presence(drawn: PathCollection, colors: Sequence[Color], there: Sequenc
 
 
 def round_times(begin: float, end: float, *, most: int = MOST_STEPS) -> Array:
-    """A few round times (n,) [s] from `begin` to `end`, which are the first and the last.
-
-    There are at most so many steps between them, and one more.
-    """
+    """A few round times (n,) [s] from `begin` to `end`, which are the first and the last."""
     if not end > begin:
         return np.array([begin])
     tens = 10.0 ** np.floor(np.log10((end - begin) / most))

@@ -35,7 +35,7 @@ from maneuver_automaton.plotting.style import (
     tidy,
 )
 from maneuver_automaton.plotting.together import HATCH
-from maneuver_automaton.plotting.track import TrackPiece
+from maneuver_automaton.plotting.track import TrackPiece, solids_at
 from maneuver_automaton.recording import Curve, Mover
 
 STEP_S, MOST_STEPS = 0.05, 20_000  # between samples; no more of them, however long it takes
@@ -96,9 +96,7 @@ def _nearest(
         middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))
         middles.append(SE2(poses).act(middle))
         radii.append(float(np.linalg.norm(ring - middle, axis=1).max()) + grown)
-        corners = SE2(poses[:, None]).act(ring)
-        one = shapely.points(corners[:, 0]) if len(ring) == 1 else shapely.polygons(corners)
-        placed.append(one)
+        placed.append(solids_at(ring, poses))
     at, solid = np.array(middles), np.array(placed)
     wide, larger = np.array(radii), np.array([by for _, by, _ in rows])
     low = np.linalg.norm(at[:, None] - at[None], axis=-1) - (wide[:, None] + wide)[..., None]

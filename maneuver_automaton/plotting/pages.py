@@ -164,10 +164,7 @@ def plain_page(
     height: float,
     **ratios: Any,
 ) -> tuple[Figure, dict[str, Axes]]:
-    """A page of a `width` [in] with a heading and axes in a `mosaic`, which has a `height` [in].
-
-    A height that the look states is that of the whole page.
-    """
+    """A page of a `width` [in] with a heading and a `mosaic` of a `height` [in]."""
     figure, top = _headed(look, lines, width)
     _settle(figure, look.height or top + height, top)
     return figure, figure.subplot_mosaic(mosaic, empty_sentinel="", **ratios)

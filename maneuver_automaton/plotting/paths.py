@@ -244,17 +244,14 @@ def _steps_of(ax: Axes, cast: Cast, one: Actor) -> dict[str, Any]:
 
 
 def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
-    """Legend entries of the only vehicle of a cast: its trims, its body, its steps.
-
-    In a film the trims alone, if they are few.
-    """
+    """Legend entries of a vehicle alone: trims, body, steps; in a film trims, if few."""
     one = cast.actors[0]
     entries = [*trim_entries(one.track, cast.colors)]
     if moving:
         return entries if len(entries) <= MOST_TRIMS else []
     swept = bool(one.body and one.track.pieces)
     if swept:
-        names_of_parts = [part.name.replace("_", " ") for part in one.carried]
+        names_of_parts = [part.name.replace("_", " ") for part in one.parts[1:]]
         by = f" and the {names_of_parts[0]}" if names_of_parts else ""
         by = " and all that it pulls" if len(names_of_parts) > 1 else by
         entries.append((Patch(facecolor=(*SWEPT, SWEPT_ALPHA)), f"swept by the body{by}"))
@@ -273,10 +270,7 @@ def path_entries(cast: Cast, *, moving: bool = False) -> Entries:
 
 
 def trim_entries(track: Track, colors: Mapping[str, Color]) -> Entries:
-    """Legend entries of the trims of a `track` that can be seen, in order.
-
-    Of how they move, if they are many.
-    """
+    """Legend entries of the trims of a `track` that can be seen, or of how they move if many."""
     symbols = {piece.name: _symbol(piece) for piece in reversed(track.pieces)}
     seen = {name: twist for name, twist in track.twists.items() if name in track.seen}
     return [
@@ -313,7 +307,7 @@ def _spin_symbols(spins: list[TrackPiece], *, size: float) -> tuple[list[Array],
 def swept_area(one: Actor) -> PathCollection:
     """Area that the body covers along its track; empty where the body is not known."""
     region = swept_region(one.track, one.body) if one.body and one.track.pieces else []
-    carried = [swept_region(part.track, part.body) for part in one.carried]
+    carried = [swept_region(track, body) for body, track in one.carried]
     region = merged([*region, *chain.from_iterable(carried)]) if carried else region
     return PathCollection(
         [region_path(region)] if region else [], facecolors=[(*SWEPT, SWEPT_ALPHA)],
@@ -354,8 +348,8 @@ def _switch_bodies(one: Actor) -> PolyCollection:
     times = _shown_times(track, apart=BODIES_APART * one.reach)
     poses = track.at(times) if len(times) > len(track.switching_times) else track.switching_poses
     outlines = placed(one.body, poses)
-    for part in one.carried:
-        outlines += placed(part.body, part.track.at(times))
+    for body, its in one.carried:
+        outlines += placed(body, its.at(times))
     alpha = max(LEAST_ALPHA, 0.8 * min(1.0, FEW_BODIES / len(poses)))
     inner, bodies = len(poses) - 2, len(outlines) // len(poses)
     return PolyCollection(
@@ -410,8 +404,8 @@ def _moment_bodies(one: Actor, cast: Cast) -> PolyCollection:
     """The body at the times at which moving obstacles are shown, the darker the later."""
     times = cast.times if cast.obstacles_move and one.track.pieces else cast.times[:0]
     outlines = placed(one.body, one.track.at(times))
-    for part in one.carried:
-        outlines += placed(part.body, part.track.at(times))
+    for body, track in one.carried:
+        outlines += placed(body, track.at(times))
     bodies = len(outlines) // max(len(times), 1)
     colors = moment_colors(len(times), color=ROBOT) * bodies
     return PolyCollection(

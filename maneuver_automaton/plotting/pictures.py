@@ -117,15 +117,13 @@ def draw_world(ax: Axes, cast: Cast, times: Any) -> dict[str, Any]:
     for part in (lanes, goals):
         ax.add_collection(part, autolim=False)
     around = draw_obstacles(ax, world.obstacles, time=times, fleeting=world.fleeting)
-    limits = draw_limits(ax, world.zones, world.bounds)
-    ground = draw_ground(ax, world.ground)
-    parts: dict[str, Any] = {
+    parts = draw_limits(ax, world.zones, world.bounds)
+    parts |= {
         "lanes": lanes, "obstacles": around.static, "traffic": around.moving,
-        "tracks": around.tracks, "bounds": limits.bounds,
+        "tracks": around.tracks,
     }  # fmt: skip
     parts |= {f"map {k}": one for k, one in enumerate(around.maps)}
-    parts |= {f"ground {k}": one for k, one in enumerate(ground)}
-    return parts | {f"zone {k}": one for k, one in enumerate(limits.zones)}
+    return parts | {f"ground {k}": one for k, one in enumerate(draw_ground(ax, world.ground))}
 
 
 def plane_entries(cast: Cast, *, moving: bool = False) -> Entries:

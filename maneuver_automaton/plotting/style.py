@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -24,7 +23,7 @@ Entries = Sequence[tuple[Artist, str]]
 """What a legend shows: handles and names."""
 
 LEAST_SHARE = 0.3  # of the width of axes that a legend beside them leaves
-CHARACTER, ROW = 0.062, 0.19  # [in] of a character in a legend, and from row to row
+CHARACTER = 0.062  # [in] of a character in a legend
 
 
 def tidy(ax: Axes, *, x: str, y: str) -> None:
@@ -46,12 +45,10 @@ def count_from_near(ax: Axes, place: Array) -> None:
     for axis, coordinate in ((ax.xaxis, place[0]), (ax.yaxis, place[1])):
         if abs(coordinate) >= FAR_M:
             origin = float(round(coordinate, -3))
-            axis.set_major_formatter(_counted_from(origin))
+            axis.set_major_formatter(
+                FuncFormatter(lambda tick, _, origin=origin: f"{tick - origin:.6g}")
+            )
             axis.set_label_text(f"{axis.get_label_text()} from {origin:.0f}")
-
-
-def _counted_from(origin: float) -> FuncFormatter:
-    return FuncFormatter(lambda tick, _: f"{tick - origin:.6g}")
 
 
 def shortened(text: str, length: int = NAME_LENGTH) -> str:
@@ -95,71 +92,35 @@ def plain(legend: Legend, entries: Entries) -> Legend:
     return legend
 
 
-def outer_legend(ax: Axes, entries: Entries, *, above: bool = False) -> Legend:
-    """A legend on the right of `ax`, or `above` it, never over what is drawn.
-
-    The axes make room for it unless a layout engine does, or too little of them were left.
-    """
+def outer_legend(ax: Axes, entries: Entries) -> Legend:
+    """A legend right of `ax`, which makes room unless a layout engine does."""
     figure = ax.get_figure(root=True)
     assert figure is not None
-    wide, high = figure.get_size_inches()
     place = ax.get_position()
     longest = max((min(len(name), NAME_LENGTH) for _, name in entries), default=1)
-    if above:
-        columns = int(place.width * wide / (CHARACTER * longest + 0.5))
-        columns = max(1, min(len(entries), columns))
-        room = (0.0, (ROW * math.ceil(len(entries) / columns) + 0.08) / high)
-    else:
-        columns, room = 1, ((CHARACTER * longest + 0.6) / wide, 0.0)
-    width, height = place.width - room[0], place.height - room[1]
-    enough = width > LEAST_SHARE * place.width and height > LEAST_SHARE * place.height
-    if figure.get_layout_engine() is None and enough:
-        ax.set_position((place.x0, place.y0, width, height))
+    width = place.width - (CHARACTER * longest + 0.6) / figure.get_figwidth()
+    if figure.get_layout_engine() is None and width > LEAST_SHARE * place.width:
+        ax.set_position((place.x0, place.y0, width, place.height))
     legend = ax.legend(
-        [handle for handle, _ in entries],
-        [str(k) for k in range(len(entries))],
-        loc="lower left" if above else "upper left",
-        bbox_to_anchor=(0.0, 1.0) if above else (1.02, 1.0),
-        ncols=columns,
-        fontsize=SMALL_PT,
-        frameon=False,
-        borderaxespad=0.2 if above else 0.0,
-        borderpad=0.1,
-        labelspacing=0.3,
-        columnspacing=1.2,
-        handlelength=1.6,
-    )
+        [handle for handle, _ in entries], [str(k) for k in range(len(entries))],
+        loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=SMALL_PT, frameon=False,
+        borderaxespad=0.0, borderpad=0.1, labelspacing=0.3, columnspacing=1.2, handlelength=1.6,
+    )  # fmt: skip
     return plain(legend, entries)
 
 
-UNITS = {
-    "speed": "m/s",
-    "lateral_speed": "m/s",
-    "speed_ahead": "m/s",
-    "speed_aside": "m/s",
-    "climb": "m/s",
-    "turn_rate": "rad/s",
-    "steering": "rad",
-    "steering_rate": "rad/s",
-    "front_steering": "rad",
-    "rear_steering": "rad",
-    "articulation": "rad",
-    "articulation_rate": "rad/s",
-    "acceleration": "m/s²",
-    "angular_acceleration": "rad/s²",
-    "climb_acceleration": "m/s²",
-    "hitch": "rad",
-    "hitch_2": "rad",
-    "hitch_3": "rad",
-    "tilt": "rad",
-    "lateral_tilt": "rad",
-    "tilt_rate": "rad/s",
-    "lateral_tilt_rate": "rad/s",
-    "heading_cos": "1",
-    "heading_sin": "1",
-    "force": "N",
-    "torque": "N m",
+_BY_UNIT = {
+    "m/s": "speed lateral_speed speed_ahead speed_aside climb",
+    "rad/s": "turn_rate steering_rate articulation_rate tilt_rate lateral_tilt_rate",
+    "rad": "steering front_steering rear_steering articulation hitch hitch_2 hitch_3 tilt "
+    "lateral_tilt",
+    "m/s²": "acceleration climb_acceleration",
+    "rad/s²": "angular_acceleration",
+    "1": "heading_cos heading_sin",
+    "N": "force",
+    "N m": "torque",
 }
+UNITS = {name: unit for unit, names in _BY_UNIT.items() for name in names.split()}
 ARROW = " → "
 POLISHED = "polished"  # what planning calls a motion by optimal control
 

@@ -33,10 +33,7 @@ SLACK_S = 1e-6
 
 
 def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, Any]:
-    """Draw all vehicles of a cast; the artists by what they show.
-
-    Bodies stand along the paths at the times of the scene, `numbered` in their order on request.
-    """
+    """Draw all vehicles of a cast, with bodies on their paths; the artists by what they show."""
     actors = cast.actors
     extent = float(np.ptp(cast.box, axis=0).max())
     driving = [one for one in actors if one.mover.has_plan]
@@ -99,10 +96,7 @@ def draw_vehicles(ax: Axes, cast: Cast, *, numbered: bool = False) -> dict[str, 
 
 
 def vehicle_entries(cast: Cast, *, moving: bool = False) -> Entries:
-    """Legend entries: the vehicles if they are few, and what the marks say.
-
-    `moving`: in a film, where bodies stand along no path.
-    """
+    """Legend entries: the vehicles if they are few, and what marks say; `moving`: of a film."""
     actors = cast.actors
     named = () if cast.is_many else [one for one in actors if one.name]
     rows: list[tuple[Artist, str]] = [

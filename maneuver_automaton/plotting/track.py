@@ -92,11 +92,6 @@ class Track:
         """Poses (n + 1, dof) where pieces begin, and the end."""
         return np.array([*(piece.pose[0] for piece in self.pieces), self.end])
 
-    @cached_property
-    def size(self) -> float:
-        """Greatest distance of the path from its start [m]: the symmetry leaves it alone."""
-        return float(np.linalg.norm(self.pose[:, :2] - self.start[:2], axis=1).max())
-
     @property
     def twists(self) -> dict[str, Array]:
         """Twist of every trim by name, in the order in which they appear."""
@@ -198,9 +193,6 @@ class _Samples(NamedTuple):
     control: Array
     state: Array
 
-    def part(self, rows: Any) -> _Samples:
-        return _Samples(*(column[rows] for column in self))
-
 
 def _pieces(plan: Plan, k: int, duration: float) -> list[TrackPiece]:
     primitive, begin = plan.primitives[k], float(plan.switching_times[k])
@@ -208,13 +200,11 @@ def _pieces(plan: Plan, k: int, duration: float) -> list[TrackPiece]:
         if (course := primitive.course) is None:
             time = np.array([begin, begin + duration])
             empty = np.zeros((2, 0))
-            return _sampled(
-                primitive.name, "maneuver", _Samples(time, plan.pose_at(time), empty, empty)
-            )
+            return _parts(primitive.name, _Samples(time, plan.pose_at(time), empty, empty))
         group = group_of(plan.start.size)
         pose = (group(plan.switching_poses[k]) @ group(course.pose)).pose
         samples = _Samples(begin + course.time, pose, course.control, course.reduced_state)
-        return _sampled(primitive.name, "maneuver", samples)
+        return _parts(primitive.name, samples)
     steps = math.ceil(abs(primitive.body_velocity[2]) * duration / CHORD_RAD)
     time = np.linspace(begin, float(plan.switching_times[k + 1]), max(1, steps) + 1)
     return [
@@ -231,13 +221,13 @@ def _pieces(plan: Plan, k: int, duration: float) -> list[TrackPiece]:
     ]
 
 
-def _sampled(name: str, kind: str, samples: _Samples) -> list[TrackPiece]:
-    """Pieces of a primitive; a maneuver is cut where it turns back, or turns the other way."""
-    runs = _runs(samples) if kind == "maneuver" else []
+def _parts(name: str, samples: _Samples) -> list[TrackPiece]:
+    """Pieces of a maneuver, which is cut where it turns back, or turns the other way."""
+    runs = _runs(samples)
     whole = len(runs) < 2
     pieces = []
     for run in [_Run(0, len(samples.time) - 1, 0)] if whole else runs:
-        part = samples.part(slice(run.first, run.last + 1))
+        part = _Samples(*(column[run.first : run.last + 1] for column in samples))
         twist = _twist(part.time, part.pose)
         if not whole and run.turn == 0:
             twist[2] = 0.0  # what it still turns can hardly be seen
@@ -248,7 +238,8 @@ def _sampled(name: str, kind: str, samples: _Samples) -> list[TrackPiece]:
                 twist=twist,
                 time=part.time,
                 pose=part.pose,
-                control=_held(part.control),
+                # the last row is that of the next piece: the one before holds to the end
+                control=np.concatenate([part.control[:-1], part.control[-2:-1]]),
                 state=part.state,
             )
         )
@@ -315,11 +306,6 @@ def _joined(runs: Sequence[_Run]) -> list[_Run]:
     ]
 
 
-def _held(control: Array) -> Array:
-    """Controls of a piece, the last row (that of the next piece) replaced by the one before."""
-    return np.concatenate([control[:-1], control[-2:-1]])
-
-
 def _twist(time: Array, pose: Array) -> Array:
     """Mean twist (dof,) of one piece: what it gains from sample to sample, over its duration."""
     gained = (SE2(pose[:-1, :3]).inverse() @ SE2(pose[1:, :3])).log().sum(axis=0)
@@ -343,6 +329,14 @@ def placed(outlines: Sequence[Array], poses: Array) -> list[Array]:
     """Outlines (n, 2) at `poses` (m, dof) in the plane: m times len(outlines) arrays (n, 2)."""
     frames = SE2(poses[:, None, :3])
     return [corners for outline in outlines for corners in frames.act(outline)]
+
+
+def solids_at(outline: Array, poses: Array) -> Any:
+    """Shapely geometries (n,) of an outline, or of a point, at `poses` (n, dof) in the plane."""
+    import shapely
+
+    corners = SE2(poses[:, None, :3]).act(outline)
+    return shapely.points(corners[:, 0]) if len(outline) == 1 else shapely.polygons(corners)
 
 
 STRAIGHT_RAD, DETOUR = 1e-9, 1e-12  # turn, and way over chord, of a piece drawn by its two ends

@@ -56,10 +56,7 @@ RoadDrive, RoadFleetResult, RoadFleetDrive or Recording
 
 
 def tables_of(result: Any, *measured: Any) -> list[Table]:
-    """The tables that the terminal shows of any result of `recording_of`.
-
-    `measured` is what was found of the loop of a fleet, if it was judged already.
-    """
+    """The tables of any result; `measured`: what a fleet's loop was judged to be, if known."""
     room = _room_of(result)
     made: list[Table] = [] if room is None else room.tables(result, *measured)
     return made
@@ -73,15 +70,7 @@ def _room_of(result: Any) -> Any:
 
 
 def recording_to_write(value: Any, *, model: Model | None = None) -> Recording:
-    """The recording of a value that somebody moves in; `model` is that of a Plan alone.
-
-    Raises
-    ------
-    TypeError
-        If nobody moves in it.
-    ValueError
-        If nobody has a plan.
-    """
+    """The recording of a value with a plan, of this `model` if of a Plan alone; or ValueError."""
     recording = recording_of(value)
     if not recording.drivers:
         raise ValueError(f"the result has no plan to write: {recording.reason}")

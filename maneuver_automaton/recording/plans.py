@@ -196,10 +196,7 @@ def _rows(primitive: Primitive, duration: float, model: Model | None) -> list[li
 
 
 def stretches(maneuver: Maneuver, model: Model) -> list[tuple[str, float]]:
-    """What a maneuver does one after the other, in words, and for how long [s].
-
-    A stretch ends where the direction of travel or the side to which it bends changes.
-    """
+    """What a maneuver does, and for how long [s], until direction or side of its bend change."""
     course = maneuver.course
     if course is None or course.time.size < 2:
         return []

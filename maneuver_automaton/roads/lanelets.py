@@ -76,7 +76,7 @@ class Lanelet:
 
     def moved(self, by: LieGroup, *, digits: int | None = None) -> Lanelet:
         """The lanelet moved by a planar pose, its places rounded to `digits` if given."""
-        left, right = (_rounded(np.asarray(by.act(one)), digits) for one in (self.left, self.right))
+        left, right = (rounded(np.asarray(by.act(one)), digits) for one in (self.left, self.right))
         return replace(self, left=left, right=right)
 
     @property
@@ -130,7 +130,7 @@ class StopLine:
 
     def moved(self, by: LieGroup, *, digits: int | None = None) -> StopLine:
         """The line moved by a planar pose, its ends rounded to `digits` if given."""
-        return replace(self, line=_rounded(np.asarray(by.act(self.line)), digits))
+        return replace(self, line=rounded(np.asarray(by.act(self.line)), digits))
 
     def closed(self, begin: float, end: float) -> list[tuple[float, float]]:
         """Times between two [s] in which it is closed; those of a sign are all."""
@@ -149,18 +149,13 @@ class StopLine:
         return found
 
 
-def _rounded(values: Array, digits: int | None) -> Array:
+def rounded(values: Array, digits: int | None) -> Array:
+    """Numbers rounded to `digits`, if given; no negative zero."""
     return values if digits is None else np.asarray(np.round(values, digits) + 0.0)
 
 
 def resampled(line: Array, n: int) -> Array:
-    """`n` points (n, 2) equally spaced along a line (m, 2).
-
-    Examples
-    --------
-    >>> resampled(np.array([[0.0, 0.0], [1.0, 0.0], [4.0, 0.0]]), 3).tolist()
-    [[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]
-    """
+    """`n` points (n, 2) equally spaced along a line (m, 2)."""
     station = along(line)
     at = np.linspace(0.0, station[-1], n)
     return np.stack([np.interp(at, station, line[:, k]) for k in range(2)], axis=-1)
@@ -225,19 +220,11 @@ def _polygons(geometry: Any) -> list[Any]:
 
 
 def _flat(area: Any) -> Any:
-
     return united(_polygons(area))
 
 
 def obstacles_in(land: Any) -> tuple[Obstacle, ...]:
-    """A shapely area as static obstacles, cut into tiles.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> len(obstacles_in(shapely.box(0.0, 0.0, 50.0, 10.0)))
-    3
-    """
+    """A shapely area as static obstacles, cut into tiles."""
     import shapely
 
     if land.is_empty:

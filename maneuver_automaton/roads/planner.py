@@ -194,9 +194,9 @@ class RoadPlanner:
         """What may keep the vehicle from its route, as the end of a sentence."""
         return hindrance(self.route, self.local, self.vehicle)
 
-    def notes(self, states: Array, *, tick: int = 0) -> tuple[str, ...]:
-        """What of the file, and of its rules on states (n, 5) from a tick on, is not obeyed."""
-        times = np.array([self.time_of(tick + k) for k in range(len(states))])
+    def notes(self, states: Array) -> tuple[str, ...]:
+        """What of the file, and of its rules on states (n, 5) from the start, is not obeyed."""
+        times = np.array([self.time_of(k) for k in range(len(states))])
         route, scene = self.route.lanelets, self.scene
         return (*scene.notes, *broken_rules(self.local, self.vehicle, route, states, times))
 

@@ -104,10 +104,7 @@ def ramps(
     max_step_m: float = 0.05,
     max_step_rad: float = 0.05,
 ) -> tuple[Maneuver, ...]:
-    """Maneuvers from trim to trim (n,) under controls (n, 2) that are held for durations (n,) [s].
-
-    Samples of their courses are exact, and as far apart as `drive_all` says.
-    """
+    """Maneuvers from trim to trim (n,) under controls (n, 2) held for durations (n,) [s]."""
     if not len(sources):
         return ()
     courses = drive_all(
@@ -132,10 +129,7 @@ def ramps(
 
 
 def trim_of(model: SecondOrderCar, reduced_state: Array) -> Trim:
-    """The trim that holds a speed [m/s] and a steering angle [rad] (2,).
-
-    Its name says both; what rounding left of a zero is none.
-    """
+    """The trim that holds a speed [m/s] and a steering angle [rad] (2,), and says both."""
     speed, steering = (np.round(reduced_state, 9) + 0.0).tolist()
     control = np.zeros(2)
     return Trim(

@@ -214,12 +214,6 @@ class RoadVerdict:
         return self.edge_m <= too_close(0.0)
 
     @property
-    def room(self) -> str:
-        """How far it kept from road users and from the edge of the road, in words."""
-        near = "nobody is near" if math.isinf(self.clearance_m) else f"{self.clearance_m:.3g} m"
-        return f"{near}, to the edge of the road {self.edge_m:.3g} m"
-
-    @property
     def faults(self) -> tuple[tuple[str, str], ...]:
         """Status and words of each: touched | off_road | undrivable, in this order."""
         found = [("touched", f"collision with {name}") for name in self.hit]

@@ -14,7 +14,7 @@ from maneuver_automaton._arrays import Array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import AnyShape, Box, Disc, Obstacle, Polygon, Shape, as_shapes
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads.lanelets import Lanelet, StopLine
+from maneuver_automaton.roads.lanelets import Lanelet, StopLine, rounded
 
 TIME_TOLERANCE = 1e-9  # [s] times closer than this are one
 Interval: TypeAlias = tuple[float, float]
@@ -115,13 +115,13 @@ class RoadScene:
         def turned(interval: tuple[float, float] | None) -> tuple[float, float] | None:
             if interval is None:
                 return None
-            low, high = _near(np.array(interval) + turn, digits).tolist()
+            low, high = rounded(np.array(interval) + turn, digits).tolist()
             return low, high
 
         return replace(
             self,
             lanelets=tuple(one.moved(by, digits=digits) for one in self.lanelets),
-            start=replace(self.start, middle=_near((by @ SE2(self.start.middle)).pose, digits)),
+            start=replace(self.start, middle=rounded((by @ SE2(self.start.middle)).pose, digits)),
             goals=tuple(
                 replace(
                     goal,
@@ -136,18 +136,14 @@ class RoadScene:
         )
 
 
-def _near(values: Array, digits: int | None) -> Array:
-    return values if digits is None else np.asarray(np.round(values, digits) + 0.0)
-
-
 def _near_shape(shape: Shape, digits: int | None) -> Shape:
     if digits is None:
         return shape
     if isinstance(shape, Disc):
-        return Disc(shape.radius, _near(shape.center, digits))
+        return Disc(shape.radius, rounded(shape.center, digits))
     if isinstance(shape, Box):
-        return Box(shape.size, _near(shape.center, digits), round(shape.heading, digits))
-    rings = [_near(ring, digits) for ring in (shape.corners, *shape.holes)]
+        return Box(shape.size, rounded(shape.center, digits), round(shape.heading, digits))
+    rings = [rounded(ring, digits) for ring in (shape.corners, *shape.holes)]
     return Polygon(rings[0], rings[1:])
 
 
@@ -156,32 +152,15 @@ def moved_obstacle(one: Obstacle, by: SE2, *, digits: int | None = None) -> Obst
     one = one.moved(by)
     if one.motion is None:
         return replace(one, shape=_near_shape(one.shape, digits))
-    return replace(one, motion=replace(one.motion, pose=_near(one.motion.pose, digits)))
+    return replace(one, motion=replace(one.motion, pose=rounded(one.motion.pose, digits)))
 
 
 def presence_of(one: Obstacle) -> tuple[float, float]:
-    """First and last time [s] at which a road user is there: its recorded times, or always.
-
-    Examples
-    --------
-    >>> presence_of(Obstacle(Box([4.0, 2.0])))
-    (-inf, inf)
-    """
+    """First and last time [s] at which a road user is there: its recorded times, or always."""
     if one.motion is None:
         return -math.inf, math.inf
     first, last = one.motion.time[[0, -1]].tolist()
     return first, last
-
-
-def unwrapped(headings: Sequence[float]) -> Array:
-    """Headings (n,) as they were turned through: no jump of more than half a turn [rad].
-
-    Examples
-    --------
-    >>> unwrapped([3.0, -3.0]).round(3).tolist()
-    [3.0, 3.283]
-    """
-    return np.unwrap(np.asarray(headings, dtype=np.float64))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -230,25 +209,18 @@ class GoalRegion:
         if self.heading is not None and not np.isfinite(self.heading).all():
             raise ValueError(f"goal region: headings must be finite, got {self.heading} rad")
 
-    def contains(
-        self, middle: ArrayLike, *, speed: float, time: float, tolerance: float = EXACT
-    ) -> bool:
-        """Whether a pose (3,) of the middle, a speed [m/s] and a time [s] are within it.
-
-        The ends belong to it; `tolerance` [m/s, s, rad] is for values that were rounded.
-        """
+    def contains(self, middle: ArrayLike, *, speed: float, time: float) -> bool:
+        """Whether a pose (3,) of the middle, a speed [m/s] and a time [s] are within it."""
         import shapely
 
         x, y, heading = np.asarray(middle, dtype=np.float64).tolist()
-        if not self.time[0] - tolerance <= time <= self.time[1] + tolerance:
-            return False
-        if self.speed is not None and not (
-            self.speed[0] - tolerance <= speed <= self.speed[1] + tolerance
+        slowest, fastest = self.speed or (-math.inf, math.inf)
+        if not (
+            self.time[0] - EXACT <= time <= self.time[1] + EXACT
+            and slowest - EXACT <= speed <= fastest + EXACT
         ):
             return False
-        if self.heading is not None and not turns_within(
-            heading, self.heading, tolerance=tolerance
-        ):
+        if self.heading is not None and not turns_within(heading, self.heading, tolerance=EXACT):
             return False
         return self.away_from(shapely.Point(x, y)) <= 0.0
 
@@ -293,13 +265,7 @@ class GoalRegion:
 
 
 def turns_within(heading: float, interval: Interval, *, tolerance: float = 0.0) -> bool:
-    """Whether a heading is in an interval, whatever full turns are between.
-
-    Examples
-    --------
-    >>> turns_within(-3.1, (3.0, 3.3)), turns_within(0.0, (3.0, 3.3))
-    (True, False)
-    """
+    """Whether a heading is in an interval, whatever full turns are between."""
     low, high = interval[0] - tolerance, interval[1] + tolerance
     if high - low >= 2.0 * math.pi:
         return True

@@ -230,10 +230,7 @@ def clearing_of(
 
 
 def land_around(scene: RoadScene, *, far: float) -> tuple[Obstacle, ...]:
-    """Land beside the road as static obstacles, no further than `far` [m] from the start.
-
-    A strip along the edge is enough: a body that starts on the road has to cross it.
-    """
+    """A strip of land along the edge of the road as obstacles, to `far` [m] from the start."""
     import shapely
 
     x, y = scene.start.middle[:2].tolist()

@@ -160,13 +160,7 @@ class RoadLibrary:
 
 
 def tick_of(step: float) -> float:
-    """The longest tick of at most 0.1 s that divides the time step [s] of a scene.
-
-    Examples
-    --------
-    >>> tick_of(0.1), tick_of(0.25), tick_of(0.04)
-    (0.1, 0.08333333333333333, 0.04)
-    """
+    """The longest tick of at most 0.1 s that divides the time step [s] of a scene."""
     return step / math.ceil(step / LONGEST_TICK - 1e-9)
 
 

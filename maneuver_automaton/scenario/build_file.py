@@ -63,19 +63,15 @@ def _grid(value: Any) -> Any:
     return value
 
 
-def _mapping(value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise need("a mapping with the key kind, and the parameters of this kind")
-    return value
-
-
 def _each_once(values: tuple[float, ...]) -> tuple[float, ...]:
     if len(set(values)) < len(values):
         raise need("a list of numbers, each of them once")
     return values
 
 
-Mapped = Annotated[dict[str, Any], BeforeValidator(_mapping)]
+Mapped = Annotated[
+    dict[str, Any], Need("a mapping with the key kind, and the parameters of this kind")
+]
 _Once = AfterValidator(_each_once)
 Grid = Annotated[
     dict[str, Annotated[tuple[Number, ...], Several("a list of numbers", at_least=1), _Once]],

@@ -159,25 +159,11 @@ def _one_or_several(entries: list[Any]) -> Any:
 
 def _of_most(alone: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """What stands at the top for several vehicles: of each key what most of them have."""
-    return {
-        key: Counter(_Stated(one[key]) for one in alone).most_common(1)[0][0].value
-        for key in alone[0]
-        if key not in EACH
-    }
-
-
-class _Stated:
-    """A value of a file, equal to what is written alike: 0.0 is not -0.0."""
-
-    def __init__(self, value: Any) -> None:
-        self.value = value
-        self.text = _flow(value)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Stated) and self.text == other.text
-
-    def __hash__(self) -> int:
-        return hash(self.text)
+    top = {}
+    for key in (key for key in alone[0] if key not in EACH):
+        texts = [_flow(one[key]) for one in alone]  # equal is what is written alike: not 0.0, -0.0
+        top[key] = alone[texts.index(Counter(texts).most_common(1)[0][0])][key]
+    return top
 
 
 def _several(

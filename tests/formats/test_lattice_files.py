@@ -343,9 +343,10 @@ def test_a_lattice_of_our_own_goes_to_either_format(tmp_path):
     for one in automaton.maneuvers:  # it rolls as the unicycle does
         assert np.abs(one.course.control[:, 1]).max() < 1e-12
     file = nav2_lattice_of_automaton(automaton)
-    assert file.motion_model == "ackermann"
-    assert [one.radius for one in file.primitives[:2]] == [0.0, 1.0]
-    assert file.primitives[1].arc_length == pytest.approx(quarter, abs=1e-5)
+    rows = file["primitives"]
+    assert file["lattice_metadata"]["motion_model"] == "ackermann"
+    assert [one["trajectory_radius"] for one in rows[:2]] == [0.0, 1.0]
+    assert rows[1]["arc_length"] == pytest.approx(quarter, abs=1e-5)
     save_nav2_lattice(file, tmp_path / "a.json")
     again = automaton_of_nav2_lattice(read_nav2_lattice(tmp_path / "a.json"))
     assert_same_automaton(again, automaton)
@@ -426,14 +427,16 @@ def test_files_of_nav2(tmp_path, name, count):
     save_nav2_lattice(file, tmp_path / "a.json")
     assert (tmp_path / "a.json").read_text().strip() == path.read_text().strip()
     made = nav2_lattice_of_automaton(automaton_of_nav2_lattice(file))
-    assert (len(made.primitives), made.motion_model) == (count, name.split("_")[0])
-    for one, other in zip(file.primitives, made.primitives, strict=True):
-        assert (one.id, one.start, one.end, one.left_turn) == (
-            other.id, other.start, other.end, other.left_turn
-        )  # fmt: skip
-        np.testing.assert_allclose(other.poses[:, :2], one.poses[:, :2], atol=1e-12)
-        np.testing.assert_allclose(wrapped(other.poses - one.poses)[:, 2], 0.0, atol=1e-12)
-        assert other.radius == pytest.approx(one.radius, abs=1.5e-5)
-        if "omni" not in name or one.radius:  # omni states other lengths than its poses have
-            assert other.length == pytest.approx(one.length, abs=1.5e-5)
-            assert other.arc_length == pytest.approx(one.arc_length, abs=1.5e-5)
+    assert len(made["primitives"]) == count
+    assert made["lattice_metadata"]["motion_model"] == name.split("_")[0]
+    for one, other in zip(file["primitives"], made["primitives"], strict=True):
+        for key in ("trajectory_id", "start_angle_index", "end_angle_index", "left_turn"):
+            assert one[key] == other[key]
+        poses, theirs = np.array(other["poses"]), np.array(one["poses"])
+        np.testing.assert_allclose(poses[:, :2], theirs[:, :2], atol=1e-12)
+        np.testing.assert_allclose(wrapped(poses - theirs)[:, 2], 0.0, atol=1e-12)
+        radius = one["trajectory_radius"]
+        assert other["trajectory_radius"] == pytest.approx(radius, abs=1.5e-5)
+        if "omni" not in name or radius:  # omni states other lengths than its poses have
+            for key in ("trajectory_length", "arc_length"):
+                assert other[key] == pytest.approx(one[key], abs=1.5e-5)

@@ -58,23 +58,26 @@ def test_they_look_the_same_from_every_side():
 def test_none_is_longer_than_that_of_nav2(name):
     """For the turns that its generator keeps; most end at the very same cell."""
     given = read_nav2_lattice(NAV2 / f"{name}.json")
+    head = given["lattice_metadata"]
     lattice = lattice_of_arcs(
-        resolution=given.resolution,
-        turning_radius=given.turning_radius,
-        spins=given.motion_model == "diff",
+        resolution=head["grid_resolution"],
+        turning_radius=head["turning_radius"],
+        spins=head["motion_model"] == "diff",
     )
-    np.testing.assert_array_equal(lattice.headings, given.headings)
+    np.testing.assert_array_equal(lattice.headings, head["heading_angles"])
     ours = {(m.start, m.end): m.poses for m in moving(lattice)}
     same = []
-    for one in given.primitives:
-        if one.length and one.start != one.end:
-            poses = ours[one.start, one.end]
+    ends = [(row["start_angle_index"], row["end_angle_index"]) for row in given["primitives"]]
+    for (start, end), row in zip(ends, given["primitives"], strict=True):
+        if row["trajectory_length"] and start != end:
+            poses = ours[start, end]
             steps = (ma.SE2(poses[:-1]).inverse() @ ma.SE2(poses[1:])).log()
-            assert steps[:, 0].sum() <= one.length + 1e-5  # its digits
-            same.append(np.allclose(poses[-1, :2], one.poses[-1, :2], atol=1e-9))
+            assert steps[:, 0].sum() <= row["trajectory_length"] + 1e-5  # its digits
+            same.append(np.allclose(poses[-1, :2], row["poses"][-1][:2], atol=1e-9))
     assert np.mean(same) >= 0.8
     spins = [(m.start, m.end) for m in lattice.moves if not m.poses[-1, :2].any()]
-    theirs = [(m.start, m.end) for m in given.primitives if not m.length]
+    lengths = [row["trajectory_length"] for row in given["primitives"]]
+    theirs = [pair for pair, length in zip(ends, lengths, strict=True) if not length]
     assert sorted(spins) == sorted(theirs)
 
 
@@ -98,7 +101,9 @@ def test_a_preset_becomes_a_file_of_nav2_and_is_planned_with(preset, motion, tmp
     path.write_text(SCENARIO.replace("NAME", preset))
     assert run(["convert", str(path), str(tmp_path / "made.nav2.json")]) == 0
     made = read_nav2_lattice(tmp_path / "made.nav2.json")
-    assert (made.motion_model, made.turning_radius, made.resolution) == (motion, 0.7, 0.1)
+    head = made["lattice_metadata"]
+    known = [head[key] for key in ("motion_model", "turning_radius", "grid_resolution")]
+    assert known == [motion, 0.7, 0.1]
     path.write_text(SCENARIO.replace("preset: NAME", "file: made.nav2.json"))
     result = ma.plan(ma.load_scenario(path).problem, time_limit=2.0)
     assert result.status is ma.PlanStatus.FOUND

@@ -17,7 +17,6 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._files import write_text_atomically
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Obstacle
-from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting.cast import BODIES, LEAST_MARK, Actor, Cast, cast_of
 from maneuver_automaton.plotting.colors import Color, track_colors
 from maneuver_automaton.plotting.over_time import distance_times, nearest_others
@@ -33,7 +32,6 @@ from maneuver_automaton.plotting.player.numbers import (
     motion_entry,
     obstacle_entries,
     part_entries,
-    part_frames,
     rounded,
     sample_times,
 )
@@ -230,11 +228,8 @@ def _motion(
     bodies = [(ring, poses) for ring in rings]
     parts: list[Any] = []
     if model is not None and names and track.pieces:
-        at, frames = part_frames(track, model)
-        for k, name in enumerate(names):
-            columns = [np.interp(times, at, column) for column in frames[:, k].T]
-            there = (SE2(poses[:, :3]) @ SE2(np.stack(columns, axis=-1))).pose
-            bodies += [(ring, there) for ring in footprint_polygons(mover.bodies[name])]
+        carried = [(part.bodies[""], part.pose_at(times)) for part in mover.parts[1:]]
+        bodies += [(ring, at) for body, at in carried for ring in footprint_polygons(body)]
         parts = part_entries(track, model, names)
     heights = None
     if mover.problem is not None and track.start.size > 3:

@@ -22,7 +22,7 @@ from maneuver_automaton.models import Model
 from maneuver_automaton.plotting.controls import step_curves
 from maneuver_automaton.plotting.obstacles import bound_lines, map_paths
 from maneuver_automaton.plotting.over_time import labels_of, thinned
-from maneuver_automaton.plotting.track import Track, TrackPiece, footprint_polygons
+from maneuver_automaton.plotting.track import Track, TrackPiece, footprint_polygons, solids_at
 from maneuver_automaton.problem import Bounds, Goal
 from maneuver_automaton.recording import Mover
 
@@ -101,19 +101,11 @@ def curve_entries(track: Track, mover: Mover) -> list[dict[str, Any]]:
 
 def part_entries(track: Track, model: Model, names: Sequence[str]) -> list[dict[str, Any]]:
     """Poses in time of the parts that a vehicle carries, seen from its body."""
-    if not track.pieces or not names:
-        return []
-    time, poses = part_frames(track, model)
+    time = np.concatenate([piece.time for piece in track.pieces])
+    poses = np.asarray(model.part_poses(np.concatenate([piece.state for piece in track.pieces])))
     return [
         {"t": rounded(time, POSE_DIGITS), "pose": rounded(poses[:, k])} for k in range(len(names))
     ]
-
-
-def part_frames(track: Track, model: Model) -> tuple[Array, Array]:
-    """Times (n,) and poses (n, parts, 3) of the parts, seen from the body."""
-    time = np.concatenate([piece.time for piece in track.pieces])
-    state = np.concatenate([piece.state for piece in track.pieces])
-    return time, np.asarray(model.part_poses(state))
 
 
 def _arcs(piece: TrackPiece) -> list[tuple[float, Array, Array]]:
@@ -249,7 +241,7 @@ def clearance_entry(
         return None
     import shapely
 
-    placed = [_placed(ring, poses) for ring, poses in bodies]
+    placed = [solids_at(ring, poses) for ring, poses in bodies]
     least = np.full(len(times), np.inf)
     flat: list[Any] = []
     for one in obstacles:
@@ -273,14 +265,6 @@ def clearance_entry(
     if not known.any():
         return None
     return {"t": rounded(times[known], POSE_DIGITS), "v": rounded(least[known], 4)}
-
-
-def _placed(ring: Array, poses: Array) -> Any:
-    """A shapely geometry (n,) for the outline at each pose."""
-    import shapely
-
-    corners = SE2(poses[:, None, :3]).act(ring)
-    return shapely.points(corners[:, 0]) if len(ring) == 1 else shapely.polygons(corners)
 
 
 def _apart(placed: Sequence[Any], geometries: Sequence[Any]) -> Array:
