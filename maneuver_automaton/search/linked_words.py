@@ -52,7 +52,7 @@ def steer_linked_words(
     """
     setup = word_setup(problem, goal, most_trims=alphabet, steers=True)
     # the times of so few trims follow from the pose: to meet a time exactly is left to the scan
-    headings = _headings(goal)[: 0 if setup.exactly else None]
+    headings = _headings(problem, goal)[: 0 if setup.exactly else None]
     refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)
     steered = _steered(setup, headings, budget)
     good = _made_good(setup, steered, alternatives, upper_bound, budget, refined=refined)
@@ -178,11 +178,11 @@ def _result(
     )
 
 
-def _headings(goal: Goal) -> Array:
-    """Headings at the goal that are steered to: seeds where any will do."""
+def _headings(problem: Problem, goal: Goal) -> Array:
+    """Headings at the goal that are steered to: where any will do, seeds from the start's on."""
     if not goal.free_heading:
         return goal.pose[2:3]
-    return np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
+    return problem.start[2] + np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
 
 
 def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[TimedWord]:
