@@ -20,10 +20,7 @@ NOTHING = 1e-9  # [s] what lasts no longer has passed, or has not begun
 
 
 def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
-    """A plan whose maneuvers have samples at `times` (n,) [s] too, where it can be cut exactly.
-
-    Raises ValueError if a maneuver has no course.
-    """
+    """A plan whose maneuvers have samples at `times` (n,) [s] too, where it can be cut exactly."""
     if not any(plan.maneuvers):
         return plan
     due = np.asarray(times, dtype=np.float64)

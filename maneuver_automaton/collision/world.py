@@ -82,13 +82,7 @@ def _one_into(x: float, y: float, turn: float, c: float, s: float) -> tuple[floa
 
 
 def rounded(value: float) -> float:
-    """A number as `numpy.round` rounds it to `DIGITS` decimals.
-
-    Examples
-    --------
-    >>> rounded(1.00000000051), rounded(-0.2e-9)
-    (1.000000001, -0.0)
-    """
+    """A number as `numpy.round` rounds it to `DIGITS` decimals."""
     return math.copysign(round(value * SHARE) / SHARE, value)
 
 

@@ -187,13 +187,7 @@ def without_shuffles(model: Model, found: Polished, shortest: float) -> Array | 
 
 
 def _merged(gears: Array, driven: Array, shortest: float) -> Array:
-    """Gears (n,) of which no stretch is shorter, the shortest ones turned first.
-
-    Examples
-    --------
-    >>> _merged(np.array([1.0, 1.0, -1.0, 1.0, -1.0]), np.array([2.0, 2.0, 0.1, 0.2, 3.0]), 0.5)
-    array([ 1.,  1.,  1.,  1., -1.])
-    """
+    """Gears (n,) of which no stretch is shorter, the shortest ones turned first."""
     gears = gears.copy()
     while True:
         begins = np.flatnonzero(np.diff(gears, prepend=0.0))

@@ -64,8 +64,6 @@ def timed(plan: Plan, pace: PathLimits) -> Timed:
 
     It stops where the sign of the speed changes, and between driving and turning on the spot. Where
     a wheel has to be turned further than the strokes around a stop give time for, it waits.
-
-    Raises ValueError if the plan does not move.
     """
     twists = np.array([trim.body_velocity[:3] for trim in plan.trims]).reshape(-1, 3)
     moves = twists.any(axis=1) & (plan.durations > 0.0)

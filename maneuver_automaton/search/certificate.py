@@ -36,16 +36,6 @@ def certificate(problem: Problem, goal: Goal, word: Word) -> float | None:
     switched to: a necessary condition for the optimum. Where the multipliers are not unique, those
     are taken that make it largest. With a binding ``max_trims`` it may be negative. What another
     maneuver would bring is no infinitesimal change, and is not priced.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"slow": (1, 0), "fast": (2, 0)})
-    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0])
-    >>> [certificate(problem, problem.goals[0], Word(trims=[k], durations=[t]))
-    ...  for k, t in ((0, 2.0), (1, 1.0))]
-    [-1.0, 0.0]
     """
     if not (word.durations > 0.0).any():
         return None

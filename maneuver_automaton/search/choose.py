@@ -153,18 +153,6 @@ def search_with_least_times(
     The least time of each trim gives a fixed displacement after it; the time beyond is solved for.
     Each word is solved from several starts, so solutions may be missed. Of a large library only the
     trims that reach far are combined.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> from maneuver_automaton.problem import Horizon
-    >>> controls = {"ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
-    >>> robot = Automaton.of_controls(Unicycle(), controls)
-    >>> problem = Problem(robot, [0, 0, 0], [4, 1, 0], horizon=Horizon(max_trims=3, min_coast=0.5))
-    >>> best = search_with_least_times(problem, problem.goals[0]).solutions[0]
-    >>> bool((best.durations >= 0.5).all()), round(best.cost, 4)
-    (True, 4.3623)
     """
     setup = search_setup(problem, goal)
     if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):

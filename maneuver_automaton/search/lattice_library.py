@@ -136,8 +136,6 @@ def lattice_library(
 
     Trims that lead to none of the goals of these numbers are left out: their speeds would make the
     estimates of cost too low. A vehicle that switches at will can use all of them.
-
-    Raises ValueError if a maneuver has no course, and so no known cost.
     """
     automaton = problem.automaton
     if automaton.is_kinematic:

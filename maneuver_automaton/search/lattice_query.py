@@ -192,11 +192,6 @@ def lattice_query(
     several headings are asked for where any will do: best times then let the heading go. A fixed
     time is a longest one, since rest fills it. A `library` takes the place of the usual one; `ends`
     of a vehicle in the plane are not looked at again.
-
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course, and so no known cost.
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon

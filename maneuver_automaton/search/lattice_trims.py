@@ -155,10 +155,7 @@ def _with_prices(arrays: LibraryArrays, cost: StageCost) -> LibraryArrays:
 
 
 def priced_library(automaton: Automaton, cost: StageCost) -> Library:
-    """All trims and maneuvers of an automaton, priced by a cost.
-
-    Raises ValueError if a maneuver has no course, and so no known cost.
-    """
+    """All trims and maneuvers of an automaton, priced by a cost."""
     origin = origin_of(automaton, automaton.trims[0])
     rest = automaton.trims[0].name
     known = Problem(automaton, origin, Goal(pose=origin, trim=rest), start_trim=rest, cost=cost)

@@ -37,13 +37,7 @@ class Transitions:
     targets: IntArray  # (M,) and after it
 
     def chain(self, source: int, target: int) -> tuple[tuple[int, int], ...]:
-        """What leads from trim to trim: each (maneuver, trim it leads to), SWITCH for a switch.
-
-        Raises
-        ------
-        ValueError
-            If no chain of maneuvers leads there.
-        """
+        """What leads from trim to trim: each (maneuver, trim it leads to), SWITCH for a switch."""
         links: list[tuple[int, int]] = []
         while self.class_of[source] != self.class_of[target]:
             maneuver = int(self.first[self.class_of[source], self.class_of[target]])
@@ -229,13 +223,7 @@ class Library:
         return numbers
 
     def chain(self, source: int, target: int) -> tuple[tuple[int, int], ...]:
-        """What leads from trim to trim of the automaton; see `Transitions.chain`.
-
-        Raises
-        ------
-        ValueError
-            If no maneuvers lead there.
-        """
+        """What leads from trim to trim of the automaton; see `Transitions.chain`."""
         if not np.isfinite(self.transitions.cost[self.class_pair(source, target)]):
             names = self.automaton.trim_names
             raise ValueError(f"no maneuvers lead from {names[source]!r} to {names[target]!r}")
@@ -282,7 +270,6 @@ def library_of(
     `rates`: cost per second of each trim; 1 if omitted, so that cost is time. `maneuver_costs`:
     cost of each maneuver; its duration if omitted. `most_trims`: trims that words are made of; of a
     larger library those that differ most. `trims`: the trims that words are made of, instead.
-    Raises ValueError if an array has the wrong length or a cost is negative.
     """
     m = len(automaton)
     per_second = _costs("rates", np.ones(m) if rates is None else rates, m)
