@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -312,9 +312,6 @@ def _moving_of(obstacle: Obstacle) -> _Moving:
         way=np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle)),
     )
 
-
-if TYPE_CHECKING:
-    from maneuver_automaton.collision.arrays import MovingObstacles
 
 FEW_MOVING = 4  # obstacles that are followed one by one sooner than looked up
 MOST_SLABS = 128  # of the shortest; a power of two

@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.chain import chained, coasted
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_price as kernels
 from maneuver_automaton.words._kernels_times import TimesProblem
@@ -105,11 +105,7 @@ class PricedWord:
 
     def poses(self) -> Array:
         """Poses (n + 1, 3) at which trims begin, and the end."""
-        pose, poses = SE2.identity(), [np.zeros(3)]
-        for twist, time in zip(self.twists, self.times, strict=True):
-            pose = pose @ SE2.exp(time * twist[:3])
-            poses.append(pose.pose)
-        return np.array(poses)
+        return coasted(np.zeros(3), self.twists[:, :3], self.times)
 
 
 def smallest_reduced_cost(word: PricedWord) -> float:

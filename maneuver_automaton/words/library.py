@@ -382,27 +382,21 @@ def moving_trims(automaton: Automaton, cost: StageCost) -> MovingTrims:
     resting = np.flatnonzero(cheapest & still)
     with np.errstate(divide="ignore"):
         periods = np.where(twists[:, 2] != 0.0, FULL_TURN / np.abs(twists[:, 2]), np.inf)
-    arrays = (
-        moving.astype(np.int64),
-        twists[moving],
-        rates[moving],
-        periods[moving],
-        np.linalg.norm(twists[moving][:, [0, 1, 3]], axis=1),
-        np.abs(twists[moving][:, 2]),
-    )
-    for array in arrays:
-        array.setflags(write=False)
-    return MovingTrims(
-        trims=arrays[0],
-        twists=arrays[1],
-        rates=arrays[2],
-        periods=arrays[3],
+    found = MovingTrims(
+        trims=moving.astype(np.int64),
+        twists=twists[moving],
+        rates=rates[moving],
+        periods=periods[moving],
         rest=int(resting[0]) if resting.size else None,
         rest_rate=float(rates[resting[0]]) if resting.size else 0.0,
         climbs=bool(twists[:, 3].any()),
-        speeds=arrays[4],
-        turn_rates=arrays[5],
+        speeds=np.linalg.norm(twists[moving][:, [0, 1, 3]], axis=1),
+        turn_rates=np.abs(twists[moving][:, 2]),
     )
+    for one in vars(found).values():
+        if isinstance(one, np.ndarray):
+            one.setflags(write=False)
+    return found
 
 
 def words_of(trims: Sequence[int], transitions: Transitions) -> tuple[IntArray, int]:

@@ -192,21 +192,22 @@ class _ConjugatedWord:
             return _failed(n)
         if not chosen.size and not len(self.turn):
             return self._as_it_is(rates, beyond)
-        endings = [_Ending(self.turn[:0], 0.0), *(_Ending(self.turn, turn) for turn in TURNS)]
+        beyond_least = [np.maximum(one - self.floors, 0.0)[chosen] for one in guesses]
+        # without a turn in place at the end, and with one that iterations begin at some angle
+        begins = [np.zeros(0), *(np.array([turn]) for turn in TURNS if len(self.turn))]
         solved = min(
             (
                 _solved(
-                    np.vstack([self.twists[chosen], ending.turn]),
-                    np.append(rates[chosen], 0.0 * ending.first),
+                    np.vstack([self.twists[chosen], self.turn[: first.size]]),
+                    np.append(rates[chosen], 0.0 * first),
                     self.goal,
                     beyond,
-                    np.append(np.ones(chosen.size), 0.0 * ending.first),
-                    [np.append(self._beyond(one)[chosen], ending.first) for one in guesses],
+                    np.append(np.ones(chosen.size), 0.0 * first),
+                    [np.append(one, first) for one in beyond_least],
                     restarts,
                 )
-                for ending in (
-                    endings[:1] if not len(self.turn) else endings[int(not chosen.size) :]
-                )
+                for first in begins
+                if chosen.size or first.size
             ),
             key=lambda one: one.cost,
         )
@@ -215,10 +216,6 @@ class _ConjugatedWord:
         times = self.floors.copy()
         times[chosen] += np.maximum(solved.durations[: chosen.size], 0.0)
         return replace(solved, durations=times, cost=float(rates @ times))
-
-    def _beyond(self, times: Array) -> Array:
-        """Times (n,) beyond the least ones."""
-        return np.maximum(times - self.floors, 0.0)
 
     def _as_it_is(self, rates: Array, beyond: float | None) -> SwitchingTimes:
         """No time is free: the word meets the goal or it does not."""
@@ -232,14 +229,6 @@ class _ConjugatedWord:
             cost=float(rates @ self.floors),
             multipliers=np.zeros(3),
         )
-
-
-class _Ending:
-    """A turn in place at the end (1, dof), or none (0, dof), and where iterations begin [rad]."""
-
-    def __init__(self, turn: Array, first: float) -> None:
-        self.turn = turn
-        self.first = np.full(len(turn), first)
 
 
 def _solved(
