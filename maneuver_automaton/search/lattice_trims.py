@@ -338,7 +338,7 @@ def at_two_paces(
     for k in range(len(word)):
         later = float(slowly[k] - quickly[k])
         share = 1.0 if later <= spare else spare / later
-        spare -= share * later
+        spare = max(spare - share * later, 0.0)
         steps = ((slow[k], share * slowly[k]), (fast[k], (1.0 - share) * quickly[k]))
         driven += [(int(row), float(t)) for row, t in steps if t > 0.0]
     return driven

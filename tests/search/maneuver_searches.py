@@ -81,7 +81,7 @@ def word_is_free(query: LatticeQuery, word: Word) -> bool:
             edges,
             library.number_of[word.trims],
             np.array(word.durations),
-            float(query.start_time),
+            float(query.problem.start_time),
         )
     )
 
