@@ -89,9 +89,8 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
     known, layers = _sizes(query.library, settings, resolution, timed, count, coast)
     cells = known.cells
     cells = cells._replace(frame=(x, y, heading, math.cos(heading), math.sin(heading)))
-    # a connection takes as long as some expansions
-    least, most = query.library.interval
-    interval = {"least_interval": least * len(query.goals), "most_interval": most}
+    least, most = query.library.interval  # as a connection takes as long as some expansions
+    least *= len(query.goals)
     back_off = float(max(back_off_of(query.library), 2.0 * query.margin))
     # of each trim, and of none, the least surplus of maneuvers from there to an aim's trim
     numbered = query.library.arrays.library
@@ -105,7 +104,7 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
         aims=aims,
         cells=cells._replace(radix=_radix(query, cells, layers)),
         estimates=known.estimates._replace(surplus=surplus),
-        connecting=known.connecting._replace(**interval),
+        connecting=known.connecting._replace(least_interval=least, most_interval=most),
         truncation=known.truncation._replace(back_off=back_off),
         limits=limits._replace(least_coast=limits.least_coast * (1.0 - ROUNDING)),
     )

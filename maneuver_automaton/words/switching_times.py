@@ -133,7 +133,9 @@ def solve_switching_times(
             raise ValueError(f"guesses: got shape {guess.shape}, need ({n},)")
     if displacements is None and least is None and longest is None and not free_heading:
         return _solved(rows, prices, end, given, np.ones(n), starts, restarts)
-    rows, end = _of_equal_size(rows, end)
+    dof = max(rows.shape[1], end.size)  # an altitude that is missing is zero
+    rows = np.pad(rows, ((0, 0), (0, dof - rows.shape[1])))
+    end = np.pad(end, (0, dof - end.size))
     steps = _steps(displacements, n, end.size)
     floors = np.zeros(n) if least is None else np.array(as_array("least", least))
     limits = np.full(n, math.inf) if longest is None else np.asarray(longest, dtype=np.float64)
@@ -282,15 +284,6 @@ def _starts(n: int, total: float | None, guesses: Sequence[Array], restarts: int
     if total is not None:
         scales *= total / scales.sum(axis=1, keepdims=True)
     return np.vstack([*first, even, scales])
-
-
-def _of_equal_size(twists: Array, goal: Array) -> tuple[Array, Array]:
-    """Twists and goal of as many coordinates, a missing altitude being zero."""
-    dof = max(twists.shape[1], goal.size)
-    rows, end = np.zeros((len(twists), dof)), np.zeros(dof)
-    rows[:, : twists.shape[1]] = twists
-    end[: goal.size] = goal
-    return rows, end
 
 
 def _steps(displacements: ArrayLike | None, n: int, dof: int) -> Array:
