@@ -41,19 +41,6 @@ def touched(
     """
     here = np.array(as_array("pose", pose, last=3))
     here[:2] -= origin
-    return touched_near(footprint, obstacles, here, time=time, margin=margin, origin=origin)
-
-
-def touched_near(
-    footprint: tuple[Shape, ...],
-    obstacles: tuple[AnyObstacle, ...],
-    here: Array,
-    *,
-    time: float,
-    margin: float,
-    origin: tuple[float, float],
-) -> str:
-    """As `touched`, for a pose (3,) that is counted from the origin already."""
     body = parts_of(footprint)
     found = surroundings_of(obstacles, origin).nearest(body, here[None], np.array([time]))
     distance, index = float(found.distance[0]), int(found.owner[0])

@@ -39,7 +39,27 @@ def certificate(problem: Problem, goal: Goal, word: Word) -> float | None:
     """
     if not (word.durations > 0.0).any():
         return None
-    return smallest_reduced_cost(_priced(problem, goal, word))
+    priced = _priced(problem, goal, word)
+    lasting = np.flatnonzero(priced.times > 0.0)
+    p = kernels.multipliers_of_word(
+        _library(priced.twists, priced.rates, priced.rows), lasting, priced.times[lasting].copy()
+    )
+    best, cut = priced.least(p)
+    columns, enough = priced.columns(), -NEGLIGIBLE * priced.scale
+    if best >= enough or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
+        return best
+    cuts = [cut]
+    for _ in range(CUTS):
+        solved = _largest_least(columns, priced.rates[lasting], cuts)
+        if solved is None:
+            return best
+        p, bound = solved
+        least, cut = priced.least(p)
+        best = max(best, least)
+        if least >= bound - 0.1 * NEGLIGIBLE * priced.scale or best >= enough:
+            return best
+        cuts.append(cut)
+    return best
 
 
 class Stretch(NamedTuple):
@@ -106,30 +126,6 @@ class PricedWord:
     def poses(self) -> Array:
         """Poses (n + 1, 3) at which trims begin, and the end."""
         return coasted(np.zeros(3), self.twists[:, :3], self.times)
-
-
-def smallest_reduced_cost(word: PricedWord) -> float:
-    """`certificate` of a word that is prepared for it."""
-    lasting = np.flatnonzero(word.times > 0.0)
-    p = kernels.multipliers_of_word(
-        _library(word.twists, word.rates, word.rows), lasting, word.times[lasting].copy()
-    )
-    best, cut = word.least(p)
-    columns, enough = word.columns(), -NEGLIGIBLE * word.scale
-    if best >= enough or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
-        return best
-    cuts = [cut]
-    for _ in range(CUTS):
-        solved = _largest_least(columns, word.rates[lasting], cuts)
-        if solved is None:
-            return best
-        p, bound = solved
-        least, cut = word.least(p)
-        best = max(best, least)
-        if least >= bound - 0.1 * NEGLIGIBLE * word.scale or best >= enough:
-            return best
-        cuts.append(cut)
-    return best
 
 
 def _library(twists: Array, rates: Array, rows: Array) -> TimesProblem:
