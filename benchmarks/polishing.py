@@ -36,6 +36,7 @@ from maneuver_automaton.optimal_control import Guess
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.scene import BodyPart, PolishSettings
 from maneuver_automaton.problem import Bounds, Problem
+from maneuver_automaton.refinement.closure import PolishedMotion
 from maneuver_automaton.refinement.gear_sequences import (
     car_library,
     gear_sequences,
@@ -51,7 +52,6 @@ from maneuver_automaton.refinement.guesses import (
     unicycle_guess,
 )
 from maneuver_automaton.refinement.polish import (
-    PolishedMotion,
     PolishTask,
     polish_guesses,
 )

@@ -32,11 +32,6 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
     -------
     array
         A float64 array in the order of C; `value` itself if it is one.
-
-    Raises
-    ------
-    ValueError
-        If `value` holds no numbers, is not finite, or has another last axis.
     """
     try:
         array = np.asarray(value, dtype=np.float64, order="C")

@@ -13,17 +13,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray, plain_numbers, wrapped
-from maneuver_automaton.analysis.reach import (
-    Reached,
-    ReachSettings,
-    path_length,
-    reached,
-    rest_classes,
-)
+from maneuver_automaton.analysis.reach import Reached, ReachSettings, reached, rest_classes
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import LatticeBody
 from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.lattice_library import path_length
 
 REFERENCE_S = 0.2  # for the plan of a reference to a pose
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from maneuver_automaton._arrays import Array, IntArray, plain_numbers
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.search.lattice_library import path_length
 
 EVEN = 16  # the number of bins of headings is a multiple: usual headings lie within, not between
 MEASURES = ("time", "length")
@@ -83,23 +83,15 @@ def rest_classes(automaton: Automaton) -> frozenset[int]:
     return frozenset(chosen.tolist())
 
 
-def path_length(maneuver: Maneuver) -> float:
-    """Length of the path of a maneuver [m]; of the straight line where the path is not known."""
-    poses = None if maneuver.course is None else maneuver.course.pose
-    if poses is None:
-        return float(np.linalg.norm(maneuver.displacement[:2]))
-    return float(np.linalg.norm(np.diff(poses[:, :2], axis=0), axis=1).sum())
-
-
 def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Nodes]:
     """Maneuvers, and every trim for one edge, by class: where they lead, from 0."""
     rows: defaultdict[int, list[tuple[Array, float, int]]] = defaultdict(list)
     for trim, where in zip(automaton.trims, automaton.trim_classes.tolist(), strict=True):
-        seconds = _edge_duration(trim, settings)
-        if seconds is not None:
-            rows[where].append(
-                (SE2.exp(seconds * trim.body_velocity).pose, settings.edge_cost, where)
-            )
+        rate = 1.0 if settings.measure == "time" else float(np.hypot(*trim.body_velocity[:2]))
+        if not trim.is_rest and rate > 0.0:
+            seconds = min(settings.edge_cost / rate, trim.max_duration)
+            there = SE2.exp(seconds * trim.body_velocity).pose
+            rows[where].append((there, settings.edge_cost, where))
     for maneuver in automaton.maneuvers:
         source, target = (
             int(automaton.trim_classes[automaton.index_of(name)])
@@ -111,14 +103,6 @@ def _steps(automaton: Automaton, settings: ReachSettings) -> dict[int, _Nodes]:
     return {
         where: _Nodes(*map(np.array, zip(*entries, strict=True))) for where, entries in rows.items()
     }
-
-
-def _edge_duration(trim: Trim, settings: ReachSettings) -> float | None:
-    """How long a trim lasts in one step [s]; None if it does not move, or not at a cost."""
-    rate = 1.0 if settings.measure == "time" else float(np.hypot(*trim.body_velocity[:2]))
-    if trim.is_rest or not rate > 0.0:
-        return None
-    return min(settings.edge_cost / rate, trim.max_duration)
 
 
 def _searched(first: int, steps: dict[int, _Nodes], settings: ReachSettings) -> Reached:

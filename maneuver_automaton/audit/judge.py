@@ -184,7 +184,10 @@ def audit_plan(
     most = DEFECT_TOLERANCE * (1.0 + near.duration + np.abs(drive.frames.nodes).max(axis=(0, 1)))
     if not (drive.off <= most.max() and drive.turned <= most[2]):
         reasons.append(f"the plan is {drive.off:.3g} off the model's equations")
-    reasons += _off_the_goal(missed, goal)
+    if not missed.position_m <= goal.tolerance_m + TERMINAL_TOLERANCE:
+        reasons.append(f"it ends {missed.position_m:.3g} m from the goal")
+    if not (goal.free_heading or missed.heading_rad <= goal.tolerance_rad + TERMINAL_TOLERANCE):
+        reasons.append(f"its last heading is {missed.heading_rad:.3g} rad off")
     reasons += _beyond_limits(drive)
     if states is not None:
         reasons += _wrong_ends(near, states)
@@ -377,16 +380,6 @@ def _clearance(
 def _keeps(least: Least, enough: float) -> bool:
     """Whether a clearance is enough [m], as far as it can be told."""
     return least.measured > enough and least.distance > enough - UNRESOLVED
-
-
-def _off_the_goal(missed: TerminalError, goal: Goal) -> list[str]:
-    """How far the end is beyond the goal's tolerance."""
-    reasons = []
-    if not missed.position_m <= goal.tolerance_m + TERMINAL_TOLERANCE:
-        reasons.append(f"it ends {missed.position_m:.3g} m from the goal")
-    if not (goal.free_heading or missed.heading_rad <= goal.tolerance_rad + TERMINAL_TOLERANCE):
-        reasons.append(f"its last heading is {missed.heading_rad:.3g} rad off")
-    return reasons
 
 
 def _beyond_limits(drive: DrivenPlan) -> list[str]:

@@ -233,15 +233,7 @@ def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Inputs | No
 
 
 def driven(automaton: Automaton, inputs: Sequence[Inputs | None]) -> tuple[Maneuver, ...]:
-    """The maneuvers of an automaton, those with inputs along the courses these lead.
-
-    Raises
-    ------
-    InvalidLibrary
-        If the inputs of one, or the reduced states of its course, break a limit of the model.
-    ValueError
-        If one leads elsewhere than it says.
-    """
+    """The maneuvers of an automaton, those with inputs along the courses these lead."""
     model = automaton.model
     given = {k: one for k, one in enumerate(inputs) if one is not None}
     labels = {k: f"maneuvers[{k}] {automaton.maneuvers[k].name!r}" for k in given}

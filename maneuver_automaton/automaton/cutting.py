@@ -20,10 +20,7 @@ NOTHING = 1e-9  # [s] what lasts no longer has passed, or has not begun
 
 
 def with_samples_at(plan: Plan, times: ArrayLike, model: Model) -> Plan:
-    """A plan whose maneuvers have samples at `times` (n,) [s] too, where it can be cut exactly.
-
-    Raises ValueError if a maneuver has no course.
-    """
+    """A plan whose maneuvers have samples at `times` (n,) [s] too, where it can be cut exactly."""
     if not any(plan.maneuvers):
         return plan
     due = np.asarray(times, dtype=np.float64)
@@ -49,7 +46,7 @@ def head_of(plan: Plan, until: float) -> Plan:
         if k and left <= NOTHING:
             break
         if k:
-            maneuver = plan.maneuvers[k - 1] if plan.maneuvers else None
+            maneuver = plan.maneuvers[k - 1]
             if maneuver is not None:
                 lasting = maneuver.duration
                 cut = left < lasting - NOTHING
@@ -77,7 +74,7 @@ def tail_of(plan: Plan, after: float, *, start: Array | None = None) -> Plan:
     word, times, between, passed = list[Trim](), list[float](), list[Maneuver | None](), after
     for k, (trim, duration) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):
         if k:
-            maneuver = plan.maneuvers[k - 1] if plan.maneuvers else None
+            maneuver = plan.maneuvers[k - 1]
             if word:
                 between.append(maneuver)
             elif maneuver is not None and passed < maneuver.duration - NOTHING:
@@ -134,28 +131,26 @@ def committed(plan: Plan, after: float) -> float:
 
 def begin_state(plan: Plan) -> Array:
     """Reduced state (n_z,) in which a plan of at least one trim starts, say within a maneuver."""
-    first = plan.primitives[0] if plan.primitives else plan.trims[0]
-    if isinstance(first, Maneuver) and first.course is not None:
-        begin: Array = first.course.reduced_state[0]
-        return begin
-    return first.reduced_state if isinstance(first, Trim) else plan.trims[0].reduced_state
+    return _end_of_plan(plan, 0)
 
 
 def end_state(plan: Plan) -> Array:
     """Reduced state (n_z,) in which a plan of at least one trim ends, say within a maneuver."""
-    last = plan.primitives[-1] if plan.primitives else plan.trims[-1]
-    if isinstance(last, Maneuver) and last.course is not None:
-        end: Array = last.course.reduced_state[-1]
-        return end
-    return last.reduced_state if isinstance(last, Trim) else plan.trims[-1].reduced_state
+    return _end_of_plan(plan, -1)
+
+
+def _end_of_plan(plan: Plan, k: int) -> Array:
+    one = plan.primitives[k] if plan.primitives else plan.trims[k]
+    if isinstance(one, Maneuver):
+        return plan.trims[k].reduced_state if one.course is None else one.course.reduced_state[k]
+    return one.reduced_state
 
 
 def _starts_within(plan: Plan) -> bool:
     """Whether a plan starts within a maneuver: not in the state of the trim before it."""
     number = next(k for k, one in enumerate(plan.maneuvers) if one is not None)
-    if not isinstance(plan.primitives[0], Maneuver):
-        return False
-    return not same_state(begin_state(plan), plan.trims[number].reduced_state)
+    begun = isinstance(plan.primitives[0], Maneuver)
+    return begun and not same_state(begin_state(plan), plan.trims[number].reduced_state)
 
 
 def joined(first: Plan, second: Plan) -> Plan:
@@ -199,11 +194,16 @@ def _course(maneuver: Maneuver) -> Trajectory:
     return maneuver.course
 
 
-def _begin_of(maneuver: Maneuver, until: float) -> Maneuver:
+def _cut_at(maneuver: Maneuver, time: float) -> tuple[Trajectory, int]:
+    """The course of a maneuver with a sample at a time since its begin [s], and its number."""
     course = _course(maneuver)
-    k = _sample_at(course, until)
-    if k is None:
-        course, k = _with_rows(course, np.array([until]), *_between_samples(course, until))
+    if (k := _sample_at(course, time)) is not None:
+        return course, k
+    return _with_rows(course, np.array([time]), *_between_samples(course, time))
+
+
+def _begin_of(maneuver: Maneuver, until: float) -> Maneuver:
+    course, k = _cut_at(maneuver, until)
     part = replace(
         course,
         time=course.time[: k + 1],
@@ -215,10 +215,7 @@ def _begin_of(maneuver: Maneuver, until: float) -> Maneuver:
 
 
 def _end_of(maneuver: Maneuver, after: float) -> Maneuver:
-    course = _course(maneuver)
-    k = _sample_at(course, after)
-    if k is None:
-        course, k = _with_rows(course, np.array([after]), *_between_samples(course, after))
+    course, k = _cut_at(maneuver, after)
     group = group_of(course.pose.shape[1])
     poses = np.array((group(course.pose[k]).inverse() @ group(course.pose[k:])).pose)
     poses[0] = 0.0

@@ -63,8 +63,7 @@ def posed(
 
     `automaton`: of a vehicle that translations alone move. `pose`: with or without a heading.
     `what`: what messages call it. `trim`: the trim there, if it is known. `free`: whether any
-    heading will do. Raises ValueError if no trim has the heading, or the trim named has another
-    one: the nearest is named.
+    heading will do.
     """
     model, kinematic = automaton.translated, automaton.is_kinematic
     assert model is not None
@@ -105,10 +104,7 @@ def posed(
 
 
 def motion_of(automaton: Automaton, by: LieGroup) -> LieGroup:
-    """The motion `by` on the poses of an automaton, by which the vehicle looks the same.
-
-    Raises ValueError if translations alone move the vehicle, and `by` turns it.
-    """
+    """The motion `by` on the poses of an automaton, by which the vehicle looks the same."""
     model = automaton.translated
     if model is None:
         return by

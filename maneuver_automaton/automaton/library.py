@@ -102,14 +102,6 @@ def automaton_hash(automaton: Automaton) -> str:
     """SHA-256, 64 hexadecimal digits, of model, trims and maneuvers; the name does not count.
 
     Of a maneuver's course the inputs count; its samples follow from them.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0)})
-    >>> renamed = Automaton(robot.model, robot.trims, name="the same")
-    >>> automaton_hash(robot) == automaton_hash(renamed)
-    True
     """
     return _hash(_content(automaton, [None] * len(automaton.maneuvers)))
 

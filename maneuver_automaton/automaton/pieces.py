@@ -37,17 +37,6 @@ def words_of(plan: Plan, library: Automaton) -> list[Piece]:
     """The primitives of a plan with their durations: enough to make it again from its start.
 
     Those that the library holds are told by their names and ends, others in full.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"on": (1.0, 0.0), "left": (0.0, 1.0)})
-    >>> plan = Plan([0, 0, 0], [robot["on"], robot["left"]], durations=[2.0, 1.0])
-    >>> words = words_of(plan, robot)
-    >>> [(one["name"], one["duration_s"]) for one in words]
-    [('on', 2.0), ('left', 1.0)]
-    >>> plan_of(plan.start, 0.0, words, robot).end.tolist()
-    [2.0, 0.0, 1.0]
     """
     return [
         _piece(primitive, float(duration), library)
@@ -56,11 +45,7 @@ def words_of(plan: Plan, library: Automaton) -> list[Piece]:
 
 
 def plan_of(start: ArrayLike, time: float, words: Sequence[Piece], library: Automaton) -> Plan:
-    """The plan from a pose (dof,) at a time [s]; maneuvers are those of the library, or cut.
-
-    Raises ValueError, KeyError, TypeError if a piece misses a key, or names what the library has
-    not.
-    """
+    """The plan from a pose (dof,) at a time [s]; maneuvers are those of the library, or cut."""
     durations = [float(one["duration_s"]) for one in words]
     if all(one["kind"] == "trim" for one in words) and library.is_kinematic:
         trims = tuple(_trim(one, library) for one in words)

@@ -57,16 +57,6 @@ def motions_of(problem: Problem) -> Motions | None:
 
     Of a vehicle with inertia they are those of the kinematic one at its limits, whose poses it
     shares. Prices of switches are left out, and climbing too: a bound without them holds.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Car, Cost, Problem
-    >>> car = Car(wheelbase=2.8, max_steering=0.6)
-    >>> controls = {"ahead": (2, 0), "left": (2, 0.6), "right": (2, -0.6), "back": (-1, 0)}
-    >>> robot = Automaton.of_controls(car, controls)
-    >>> motions = motions_of(Problem(robot, [0, 0, 0], [5, 1, 0], cost=Cost(time=1.0)))
-    >>> motions.families.speed.tolist(), motions.families.turn_rate.round(3).tolist()
-    ([2.0, 1.0], [0.489, 0.0])
     """
     if problem.automaton.translated:
         return None

@@ -286,20 +286,10 @@ def separation(
     'no collision-free path leads from the start to the goal, however it is driven: the passage at \
 (3.56, 0) is 0.22 m too narrow'
     """
-    if not lasting_obstacles(problem):
+    proof = _proof(problem, most_boxes, deadline)
+    if proof is None:
         return None
-    scene, start, goals = _asked(problem)
-    known = _proofs(problem)
-    proof = (
-        known[0]
-        if known
-        else connectivity(
-            scene, start, goals, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
-        )
-    )
-    if proof.answer is not Reachability.SEPARATED:
-        return None
-    narrowest = _narrowest(problem, scene, start, goals, deadline)
+    narrowest = _narrowest(problem, *_asked(problem), deadline)
     return Separation(boxes=proof.boxes, reached=proof.reached, narrowest=narrowest)
 
 
@@ -352,13 +342,19 @@ def are_apart(problem: Problem, *, most_boxes: int, deadline: float = math.inf) 
     >>> are_apart(problem, most_boxes=10_000)  # the walls leave 1.8 m
     True
     """
-    if _proofs(problem) or not lasting_obstacles(problem):
-        return bool(_proofs(problem))
-    proof = connectivity(
-        *_asked(problem), bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
-    )
-    _proofs(problem).extend([proof] if proof.answer is Reachability.SEPARATED else [])
-    return proof.answer is Reachability.SEPARATED
+    return _proof(problem, most_boxes, deadline) is not None
+
+
+def _proof(problem: Problem, most_boxes: int, deadline: float) -> Connectivity | None:
+    """That obstacles part the start from every goal; found once for a problem."""
+    known = _proofs(problem)
+    if not known and lasting_obstacles(problem):
+        asked = _asked(problem)
+        found = connectivity(
+            *asked, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
+        )
+        known.extend([found] if found.answer is Reachability.SEPARATED else [])
+    return known[0] if known else None
 
 
 @kept_by_first

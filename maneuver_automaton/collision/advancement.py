@@ -28,8 +28,7 @@ def free_times(
     body velocities [m/s, m/s, rad/s]. `durations`: [s]; a negative one is driven backwards, into
     the past. `margin`: clearance beyond `keep` that every pose looked at has, positive [m]. `keep`:
     distance kept from everything, also between the poses looked at [m]. `times`: time of the world
-    at the beginning [s]. Returns [s]; 0 where the motion begins too near to something. Raises
-    ValueError: if the margin is not positive.
+    at the beginning [s]. Returns [s]; 0 where the motion begins too near to something.
     """
     if not margin > 0.0:
         raise ValueError(f"margin must be positive, got {margin} m")

@@ -38,38 +38,9 @@ def touched(
     """Sentence on the obstacle that a footprint at a pose (3,) and a time [s] touches; else empty.
 
     Exact, by shapely; obstacles and pose are counted from `origin` [m], so that no digit is lost.
-
-    Raises
-    ------
-    ValueError
-        If a polygon has no area, or the pose is not finite.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Box, Disc, Obstacle
-    >>> scene = (Obstacle(Disc(1.0), name="pillar"), Obstacle(Box([2.0, 2.0], center=[5.0, 0.0])))
-    >>> touched((Disc(0.5),), scene, [1.5, 0.0, 0.0])
-    "the vehicle touches obstacle 'pillar'"
-    >>> touched((Disc(0.5),), scene, [3.25, 0.0, 0.0], margin=0.5)
-    'the vehicle is 0.25 m from obstacle 1 (box near (4, 0)), closer than 0.5 m'
-    >>> touched((Disc(0.5),), scene, [2.5, 0.0, 0.0], margin=0.5)
-    ''
     """
     here = np.array(as_array("pose", pose, last=3))
     here[:2] -= origin
-    return touched_near(footprint, obstacles, here, time=time, margin=margin, origin=origin)
-
-
-def touched_near(
-    footprint: tuple[Shape, ...],
-    obstacles: tuple[AnyObstacle, ...],
-    here: Array,
-    *,
-    time: float,
-    margin: float,
-    origin: tuple[float, float],
-) -> str:
-    """As `touched`, for a pose (3,) that is counted from the origin already."""
     body = parts_of(footprint)
     found = surroundings_of(obstacles, origin).nearest(body, here[None], np.array([time]))
     distance, index = float(found.distance[0]), int(found.owner[0])

@@ -101,8 +101,6 @@ class FclChecker:
 
         Each coasts, ``start @ exp(t * body_velocity)``, from one of `starts` (n, 3) for one of
         `durations` (n,) [s]. `ask` is called again and again, and may raise to give it up.
-
-        Raises ValueError if a number is not finite, or a duration negative.
         """
         here = self._seen("starts", starts)
         twists = as_array("body_velocities", body_velocities, last=3)
@@ -318,10 +316,7 @@ def _ground_of(
 
 
 def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
-    """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles.
-
-    Raises ValueError if a polygon has no area.
-    """
+    """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles."""
     import shapely
 
     boxes = np.zeros((len(obstacles), 4))
@@ -443,11 +438,6 @@ def origin_near(place: ArrayLike) -> tuple[float, float]:
     """Where to count from so that coordinates near `place` (2 or more) lose no digit.
 
     The same for all places of a neighbourhood, so that what is prepared for one serves all.
-
-    Examples
-    --------
-    >>> origin_near([3.0, -4.0]), origin_near([1e9 + 5.0, 0.0])
-    ((0.0, 0.0), (1000013824.0, 0.0))
     """
     x, y = GRID * np.round(np.asarray(place, dtype=np.float64)[:2] / GRID) + 0.0
     return float(x), float(y)

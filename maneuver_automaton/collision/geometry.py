@@ -35,13 +35,6 @@ def rings_of_geometry(what: str, geometry: Any) -> Iterator[Rings]:
     """The outer ring and the holes of each polygon of a shapely geometry, corner for corner.
 
     Heights (z) of its points are left out.
-
-    Examples
-    --------
-    >>> import shapely
-    >>> two = shapely.MultiPolygon([shapely.box(0, 0, 1, 1), shapely.box(2, 0, 3, 1)])
-    >>> [ring.corners[0].tolist() for ring in rings_of_geometry("obstacles", two)]
-    [[1.0, 0.0], [3.0, 0.0]]
     """
     import shapely
 
@@ -78,13 +71,7 @@ def one_ring(what: str, geometry: Any) -> Rings:
 
 
 def are_points(value: Any) -> bool:
-    """Whether an array, or a sequence, is a list of points and not one of shapes.
-
-    Examples
-    --------
-    >>> are_points([[0, 0], [1, 0], [1, 1]]), are_points([[[0, 0], [1, 0], [1, 1]]])
-    (True, False)
-    """
+    """Whether an array, or a sequence, is a list of points and not one of shapes."""
     if isinstance(value, np.ndarray):
         return value.ndim < 3 and value.dtype != np.object_
     return len(value) > 0 and all(_is_point(one) for one in value)

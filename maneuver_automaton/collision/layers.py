@@ -63,15 +63,7 @@ def bands_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Lay
 def always(
     obstacles: tuple[AnyObstacle, ...], *, low: float, high: float
 ) -> tuple[AnyObstacle, ...]:
-    """Obstacles that stand at every height between two, so that no path leads over or under them.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Disc, Obstacle
-    >>> tower = Obstacle(Disc(1.0), height=(0.0, 20.0))
-    >>> [len(always((tower,), low=1.0, high=h)) for h in (9.0, 30.0)]
-    [1, 0]
-    """
+    """Obstacles at every height between two, so that no path leads over or under them."""
     lasting = [
         number
         for layer in layers_of(obstacles, in_space=True)
@@ -215,13 +207,7 @@ class Layer(NamedTuple):
     numbers: tuple[int, ...]  # where they are among all obstacles
 
     def clearance(self, altitude: Array, body: tuple[float, float]) -> Array:
-        """Vertical clearance (n,) [m] to a body that reaches from low to high about its altitude.
-
-        Examples
-        --------
-        >>> Layer(0.0, 10.0, (), ()).clearance(np.array([5.0, 12.0]), (-1.0, 1.0)).tolist()
-        [0.0, 1.0]
-        """
+        """Vertical clearance (n,) [m] to a body reaching from low to high about its altitude."""
         above = altitude + body[0] - self.high
         below = self.low - (altitude + body[1])
         return np.maximum(np.maximum(above, below), 0.0)
@@ -229,15 +215,7 @@ class Layer(NamedTuple):
 
 @functools.lru_cache(maxsize=16)
 def layers_of(obstacles: tuple[AnyObstacle, ...], *, in_space: bool) -> tuple[Layer, ...]:
-    """Obstacles by height; in the plane all of them are one layer that blocks every altitude.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Disc
-    >>> tower = Obstacle(Disc(1.0), height=(0.0, 20.0))
-    >>> [layer.high for layer in layers_of((tower, Obstacle(Disc(2.0))), in_space=True)]
-    [20.0, inf]
-    """
+    """Obstacles by height; in the plane all of them are one layer that blocks every altitude."""
     if obstacles and not in_space:
         return (Layer(-math.inf, math.inf, obstacles, tuple(range(len(obstacles)))),)
     groups: dict[tuple[float, float], list[int]] = {}

@@ -217,16 +217,7 @@ class Motion:
 
 
 class Knots(NamedTuple):
-    """Several motions side by side, so that all are asked at once.
-
-    Examples
-    --------
-    >>> ahead = Motion([0.0, 2.0], [[0, 0, 0], [4, 0, 0]])
-    >>> left = Motion([0.0, 2.0], [[0, 0, 0], [0, 2, np.pi]], [[np.pi / 2, 0, np.pi / 2]])
-    >>> both = Knots.of([ahead, left])
-    >>> both.at(np.array([[0], [1]]), np.array([1.0, 9.0])).round(6).tolist()
-    [[[2.0, 0.0, 0.0], [4.0, 0.0, 0.0]], [[1.0, 1.0, 1.570796], [0.0, 2.0, 3.141593]]]
-    """
+    """Several motions side by side, so that all are asked at once."""
 
     time: Array  # (k,) [s]
     pose: Array  # (k, 3)

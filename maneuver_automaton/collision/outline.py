@@ -20,17 +20,6 @@ def outlines(shape: Polygon | Box) -> list[Any]:
 
     A ring that crosses or touches itself is cut into its faces: those it runs around are solid,
     once or several times, in either direction. Repeated corners and spikes without width vanish.
-
-    Raises
-    ------
-    ValueError
-        If the polygon has no area.
-
-    Examples
-    --------
-    >>> knot = Polygon([[0, 0], [2, 2], [2, 0], [0, 2]])
-    >>> [part.area for part in outlines(knot)]
-    [1.0, 1.0]
     """
     solid = solid_parts(shape)
     if not solid:

@@ -65,16 +65,7 @@ class _Single(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ObstacleDistances:
-    """Obstacles counted from an origin, prepared once for any number of plans.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.collision import Obstacle
-    >>> pillar = Obstacle(Disc(0.5, center=[3.0, 0.0]))
-    >>> around = surroundings_of((pillar,), (0.0, 0.0))
-    >>> around.nearest(parts_of((Disc(1.0),)), np.zeros((1, 3)), np.zeros(1)).distance.tolist()
-    [1.5]
-    """
+    """Obstacles counted from an origin, prepared once for any number of plans."""
 
     tree: Any  # of the polygons of static obstacles
     owners: IntArray  # which obstacle each belongs to

@@ -214,16 +214,7 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
 
 
 def windows(turn_rates: Array, durations: Array) -> Windows:
-    """The fewest slices that cover coasts (n,) of `durations` [s], none longer than its coast.
-
-    Examples
-    --------
-    >>> parts = windows(np.array([0.0, 1.0, 0.0]), np.array([5.0, 0.7, 0.0]))
-    >>> parts.coast.tolist(), parts.begins.round(9).tolist()
-    ([0, 0, 1, 1, 1], [0.0, 1.0, 0.0, 0.25, 0.45])
-    >>> parts.lengths.tolist()
-    [4.0, 4.0, 0.25, 0.25, 0.25]
-    """
+    """The fewest slices that cover coasts (n,) of `durations` [s], none longer than its coast."""
     turning = np.abs(turn_rates)
     with np.errstate(divide="ignore", over="ignore"):
         most = np.minimum(durations, MOST_TURN / turning)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -82,13 +82,7 @@ def _one_into(x: float, y: float, turn: float, c: float, s: float) -> tuple[floa
 
 
 def rounded(value: float) -> float:
-    """A number as `numpy.round` rounds it to `DIGITS` decimals.
-
-    Examples
-    --------
-    >>> rounded(1.00000000051), rounded(-0.2e-9)
-    (1.000000001, -0.0)
-    """
+    """A number as `numpy.round` rounds it to `DIGITS` decimals."""
     return math.copysign(round(value * SHARE) / SHARE, value)
 
 
@@ -141,7 +135,8 @@ def _static_arrays(
 ) -> tuple[Solids, Buckets, Field]:
     """The static obstacles around a footprint: the same beside any moving ones."""
     body, pose = body_of(footprint), np.array(frame)
-    maps = [_seen_map(o, pose) for o in static if isinstance(o, OccupancyMap)]
+    place, turn = SE2(np.array([-pose[0], -pose[1], 0.0])), SE2(np.array([0.0, 0.0, -pose[2]]))
+    maps = [one.moved(place).moved(turn) for one in static if isinstance(one, OccupancyMap)]
     pieces = pieces_seen_from([o.shape for o in static if isinstance(o, Obstacle)], pose)
     # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
     # by a transform of their cells.
@@ -178,11 +173,6 @@ def frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
         if longest >= 0:
             return (*ring[0].tolist(), math.atan2(edge[longest, 1], edge[longest, 0]))
     return ()
-
-
-def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:
-    there = one.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
-    return there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
 
 
 def _cells(one: OccupancyMap, frame: Array) -> Array:
@@ -318,9 +308,6 @@ def _moving_of(obstacle: Obstacle) -> _Moving:
         way=np.asarray(SE2(motion.at(motion.times_for_lines(ALONG))).act(middle)),
     )
 
-
-if TYPE_CHECKING:
-    from maneuver_automaton.collision.arrays import MovingObstacles
 
 FEW_MOVING = 4  # obstacles that are followed one by one sooner than looked up
 MOST_SLABS = 128  # of the shortest; a power of two

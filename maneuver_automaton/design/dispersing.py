@@ -83,7 +83,8 @@ def disperse_library(
         )
     if metres_per_radian is not None and not 0.0 < metres_per_radian < math.inf:
         raise ValueError(f"disperse: metres_per_radian must be positive, got {metres_per_radian}")
-    sources, targets = _classes(library)
+    ends = [(library.index_of(m.source), library.index_of(m.target)) for m in library.maneuvers]
+    sources, targets = library.trim_classes[np.array(ends)].T
     apart = _distances(library, sources, metres_per_radian)
     # The maneuvers of the quickest ways from rest to all trims, and of those back.
     root = int(library.trim_classes[library.rest or 0])
@@ -100,7 +101,8 @@ def disperse_library(
     chosen = np.sort(order)
     nearest = apart[:, chosen].min(axis=1)
     size = len(chosen)
-    _, bounds = _farthest_first(apart, _one_each(sources), size)
+    _, one_each = np.unique(sources, return_index=True)
+    _, bounds = _farthest_first(apart, one_each, size)
     return DispersedLibrary(
         automaton=replace(library, maneuvers=tuple(library.maneuvers[k] for k in chosen)),
         maneuvers=len(library.maneuvers),
@@ -111,13 +113,6 @@ def disperse_library(
             (len(first) + k, float(value)) for k, value in enumerate(reach) if np.isfinite(value)
         ),
     )
-
-
-def _classes(library: Automaton) -> tuple[IntArray, IntArray]:
-    """Classes of the trims from which maneuvers lead, and to which (n,)."""
-    ends = [(library.index_of(m.source), library.index_of(m.target)) for m in library.maneuvers]
-    classes = library.trim_classes[np.array(ends)]
-    return classes[:, 0], classes[:, 1]
 
 
 def _distances(library: Automaton, sources: IntArray, metres_per_radian: float | None) -> Array:
@@ -152,12 +147,6 @@ def _quickest_ways(root: int, sources: IntArray, targets: IntArray, durations: A
             if reached < value[targets[k]]:
                 value[targets[k]], last[targets[k]], changed = reached, k, True
     return np.asarray(last[last >= 0], dtype=np.int64)
-
-
-def _one_each(sources: IntArray) -> IntArray:
-    """The first maneuver from every class."""
-    _, first = np.unique(sources, return_index=True)
-    return np.asarray(first, dtype=np.int64)
 
 
 def _farthest_first(apart: Array, first: IntArray, most: int) -> tuple[IntArray, Array]:

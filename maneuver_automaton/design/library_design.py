@@ -339,13 +339,7 @@ def design_of_file(
     Values of `within`, `most`, `max_trims` and `radius_m` in `instead` hold instead of those
     stated.
     """
-    return design_of_text(read_text(Path(path)), name=str(path), instead=instead)
-
-
-def design_of_text(
-    text: str, *, name: str, instead: Mapping[str, float] | None = None
-) -> DesignedLibrary:
-    """The library that the text of a design file asks for; see `design_of_file`."""
+    name, text = str(path), read_text(Path(path))
     asked = build_file_of_text(text, name=name)
     document = parse(text, name=name, what="a design file")
     if asked.design is None:

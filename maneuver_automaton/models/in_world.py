@@ -139,13 +139,11 @@ class InWorld:
     def body_velocity(self, reduced_state: Array, control: Array) -> Array:
         """Twist (..., dof) seen from the body; see `velocity`."""
         z, cos, sin = self._stated_rows(reduced_state)
-        world = self.stated.body_velocity(z, control)
+        v_x, v_y, *climb = np.moveaxis(self.stated.body_velocity(z, control), -1, 0)
         turn = np.zeros(())
         if self._place is not None:
             turn = self.stated.reduced_dynamics(z, control)[..., self._place]
-        v_x, v_y = world[..., 0], world[..., 1]
-        columns = [cos * v_x + sin * v_y, cos * v_y - sin * v_x, turn]
-        columns += [world[..., k] for k in range(2, world.shape[-1])]
+        columns = [cos * v_x + sin * v_y, cos * v_y - sin * v_x, turn, *climb]
         return np.stack(np.broadcast_arrays(*columns), axis=-1)
 
     def reduced_dynamics(self, reduced_state: Array, control: Array) -> Array:

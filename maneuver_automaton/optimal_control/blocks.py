@@ -187,11 +187,6 @@ def _matrix(
         order = np.empty(len(keys), dtype=np.int64)
         order[owner] = np.arange(len(keys))
         return casadi.MX(sparsity, entries[order.tolist()])
-    return casadi.MX(sparsity, _summed(casadi, entries, owner, len(keys)))
-
-
-def _summed(casadi: Any, entries: Any, owner: IntArray, count: int) -> Any:
-    """Sums (count,) of the entries of each owner."""
-    begins = np.arange(len(owner) + 1)
-    sparsity = casadi.Sparsity(count, len(owner), begins.tolist(), owner.tolist())
-    return casadi.MX(casadi.DM(sparsity, np.ones(len(owner)))) @ entries
+    each = np.arange(len(owner) + 1).tolist()
+    owned = casadi.Sparsity(len(keys), len(owner), each, owner.tolist())
+    return casadi.MX(sparsity, casadi.MX(casadi.DM(owned, np.ones(len(owner)))) @ entries)

@@ -241,16 +241,6 @@ def increments(rule: Rule, field: Field, *, state: Any, control: Any, step: Any)
     `rule`: controls at the n nodes (n_u, n), or constant over the n - 1 intervals (n_u, n - 1).
     `field`: the rates. `state`: states at the nodes. `control`: see `rule`. `step`: time between
     nodes [s].
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> field = lambda x, u: np.stack([u[0], x[0] ** 2])  # x' = u, and x^2 rides along
-    >>> x, u = np.array([[0.0, 1.0, 2.0]]), np.ones((1, 3))
-    >>> increments("trapezoidal", field, state=x, control=u, step=1.0).tolist()
-    [[1.0, 1.0], [0.5, 2.5]]
-    >>> increments("rk4", field, state=x, control=u[:, :2], step=1.0).round(3).tolist()
-    [[1.0, 1.0], [0.333, 2.333]]
     """
     return _RULES[rule](field, state, control, step)
 

@@ -74,16 +74,6 @@ def evaluate(
     """Cost, defects and violations of states (n, n_x) and controls (m, n_u) on a grid.
 
     Nothing of the solver is used: the functions of the problem are called on arrays.
-
-    Examples
-    --------
-    >>> cart = OptimalControlProblem(
-    ...     state_names=("x",), control_names=("u",), dynamics=lambda x, u: [u[0]],
-    ...     start=(0.0,), end=(1.0,), duration=(1.0, 1.0), stage_cost=lambda x, u: u[0] ** 2)
-    >>> found = evaluate(cart, TimeGrid(n_nodes=2), state=np.array([[0.0], [1.0]]),
-    ...                  control=np.ones((2, 1)), duration=1.0)
-    >>> found.cost, found.worst_defect, found.worst_violation
-    (1.0, 0.0, 0.0)
     """
     integrands = [problem.stage_cost or _nothing, *problem.integrals.values()]
     n_states = problem.n_states

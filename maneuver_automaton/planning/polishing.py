@@ -36,6 +36,7 @@ from maneuver_automaton.planning.polished_price import (
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Horizon, Problem, moves
+from maneuver_automaton.refinement.closure import PolishedMotion
 from maneuver_automaton.refinement.gear_sequences import gear_sequences
 from maneuver_automaton.refinement.guesses import (
     PathGuesses,
@@ -45,7 +46,6 @@ from maneuver_automaton.refinement.guesses import (
     timed,
 )
 from maneuver_automaton.refinement.polish import (
-    PolishedMotion,
     PolishResult,
     PolishTask,
     polish_guesses,

@@ -15,8 +15,8 @@ from maneuver_automaton.primitives.primitive import Trajectory
 N_NODES = 16
 
 
-def _integrals(shares: Array) -> Array:
-    """Integrals (k, N_NODES) of the Legendre polynomials from 0 to k shares of [0, 1].
+def integrals_to(shares: Array) -> Array:
+    """Matrix (k, N_NODES): coefficients of a series to its integrals from 0 to k shares of [0, 1].
 
     Source: (2 k + 1) P_k = P'_{k+1} - P'_{k-1}, for k = 0 with the constant P_{-1} = -1.
     """
@@ -31,17 +31,12 @@ def _tables() -> tuple[Array, Array, Array, Array]:
     orders = 2.0 * np.arange(N_NODES) + 1.0
     series = 0.5 * orders[:, None] * (legendre.legvander(x, N_NODES - 1) * weights[:, None]).T
     nodes = 0.5 * (x + 1.0)
-    return nodes, 0.5 * weights, series, _integrals(nodes) @ series
+    return nodes, 0.5 * weights, series, integrals_to(nodes) @ series
 
 
 NODES, WEIGHTS, SERIES, INTEGRALS = _tables()
 """Gauss points (n,) and weights (n,) of [0, 1]; matrices (n, n) from values at the points to the
 coefficients of the series, and to its integrals from 0 to each point."""
-
-
-def integrals_to(shares: Array) -> Array:
-    """Matrix (k, n) that takes coefficients of a series to its integrals from 0 to k shares."""
-    return _integrals(shares)
 
 
 RESOLVED = 1e-13  # last terms of a series, over the greatest value or 1 [m, rad, units of z]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from maneuver_automaton._lazy import lazily
 
 if TYPE_CHECKING:
-    from maneuver_automaton.refinement.polish import PolishedMotion as PolishedMotion
+    from maneuver_automaton.refinement.closure import PolishedMotion as PolishedMotion
     from maneuver_automaton.refinement.polish import PolishResult as PolishResult
     from maneuver_automaton.refinement.polish import PolishTask as PolishTask
     from maneuver_automaton.refinement.polish import polish_guesses as polish_guesses

@@ -12,7 +12,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.primitives import Trajectory
+from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.primitives.driving import drive, drive_all
 
 STEPS = 5  # of Newton's method
@@ -24,18 +24,23 @@ FIRST_STEP = 3.0  # times the first drive, that a step of Newton's method takes 
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Closed:
-    """A motion from the identity pose that ends where it must."""
+class PolishedMotion:
+    """An exact motion from the start to the goal, seen from the start."""
 
+    course: Trajectory  # from the identity pose and time 0
     control: Array  # (n, n_u)
     durations: Array  # (n,) [s]
-    course: Trajectory
     error: float  # [m, rad, units of z] of its end
+    objective: float = math.inf  # of the solver, at its end
 
     @property
     def duration(self) -> float:
         """[s]."""
         return float(self.course.time[-1])
+
+    def maneuver(self, name: str, *, source: str, target: str) -> Maneuver:
+        """The motion as a maneuver from trim to trim."""
+        return Maneuver.along(self.course, name=name, source=source, target=target)
 
 
 def closed(
@@ -46,34 +51,20 @@ def closed(
     control: Array,
     durations: Array,
     budget: Budget = UNLIMITED,
-) -> Closed | str:
+) -> PolishedMotion | str:
     """The smallest change of controls, and of the pace, with which a motion ends exactly.
 
     Newton's method through the accurate integrator. Controls move in proportion to the room they
     have to their limits, so that those at a limit stay there.
 
-    Parameters
-    ----------
-    model : Model
-    start_state : (n_z,) array
-    end : sequence of dof + n_z numbers
-        Last pose, seen from the first, and last reduced state; None leaves a component free.
-    control : (n, n_u) array
-        Within its limits.
-    durations : (n,) array
-        How long each control holds [s].
-    budget : Budget
-        No further step is made that would leave no time to check what comes out.
-
-    Returns
-    -------
-    Closed or str
-        Why there is none, if so.
+    `end`: last pose, seen from the first, and last reduced state; None leaves a component free.
+    `control` (n, n_u), within its limits, holds for `durations` (n,) [s]. No further step is made
+    that would leave no time to check what comes out. Otherwise why there is none.
     """
     wanted = np.array([k for k, value in enumerate(end) if value is not None], dtype=np.int64)
     aim = np.array([value for value in end if value is not None], dtype=np.float64)
     low, high = model.control_limits.T
-    best: Closed | None = None
+    best: PolishedMotion | None = None
     u, h = np.clip(control, low, high), np.array(durations)
     since, longest = budget.elapsed, 0.0
     for step in range(STEPS):
@@ -89,7 +80,7 @@ def closed(
         if best is not None and error > DIVERGED * best.error:
             break  # no step comes back from there, and to follow such motions may take minutes
         if best is None or error < best.error:
-            best = Closed(control=u, durations=h, course=course, error=error)
+            best = PolishedMotion(control=u, durations=h, course=course, error=error)
         if error <= EXACT * max(1.0, float(np.abs(course.pose).max())):
             break
         now = budget.elapsed
@@ -109,7 +100,7 @@ def closed(
     return _why_not(model, best) or best
 
 
-def _why_not(model: Model, found: Closed) -> str:
+def _why_not(model: Model, found: PolishedMotion) -> str:
     if not found.error <= 1e-9:
         return f"the end could not be closed: {found.error:.3g} are left"
     low, high = model.reduced_limits.T

@@ -103,13 +103,6 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
 
     An exact end next to that of so short a word may need whole turns, or not exist: then the few
     digits by which coordinates are rounded decide what a plan costs.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> [plan.word for plan, _ in nearly_met(Problem(robot, [0, 0, 0], [2, 1e-10, 0]))]
-    [('ahead',)]
     """
     automaton, found = problem.automaton, list[tuple[Plan, int]]()
     start, clock = problem.start, problem.start_time

@@ -62,37 +62,29 @@ class TimedDrive:
         return bool(signs and (np.abs(mine - theirs) <= STROKE_TOLERANCE * longer).all())
 
 
+@functools.lru_cache(maxsize=16)
 def car_library(
     *, wheelbase: float, max_steering: float, share: float = 1.0, reverses: bool = True
 ) -> Automaton:
     """Straight on and as tightly as a share of the greatest curvature allows, to both sides."""
-    return _car_library(wheelbase, max_steering, share, reverses)
-
-
-def unicycle_library(
-    *, max_speed: float, max_turn_rate: float, share: float = 1.0, reverses: bool = True
-) -> Automaton:
-    """Straight on, arcs at a share of the greatest turn rate, and turns on the spot."""
-    return _unicycle_library(max_speed, max_turn_rate, share, reverses)
-
-
-@functools.lru_cache(maxsize=16)
-def _car_library(wheelbase: float, steering: float, share: float, reverses: bool) -> Automaton:
-    angle = math.atan(share * math.tan(steering))
+    angle = math.atan(share * math.tan(max_steering))
     turns = {"left": angle, "straight": 0.0, "right": -angle}
     gears = {"ahead": 1.0, "back": -1.0} if reverses else {"ahead": 1.0}
-    car = Car(wheelbase=wheelbase, max_steering=steering)
+    car = Car(wheelbase=wheelbase, max_steering=max_steering)
     return Automaton.of_controls(
         car, {f"{g} {t}": (gears[g], turns[t]) for g in gears for t in turns}
     )
 
 
 @functools.lru_cache(maxsize=16)
-def _unicycle_library(speed: float, rate: float, share: float, reverses: bool) -> Automaton:
-    gears = {"ahead": speed, "back": -speed} if reverses else {"ahead": speed}
-    turns = {"left": share * rate, "straight": 0.0, "right": -share * rate}
+def unicycle_library(
+    *, max_speed: float, max_turn_rate: float, share: float = 1.0, reverses: bool = True
+) -> Automaton:
+    """Straight on, arcs at a share of the greatest turn rate, and turns on the spot."""
+    gears = {"ahead": max_speed, "back": -max_speed} if reverses else {"ahead": max_speed}
+    turns = {"left": share * max_turn_rate, "straight": 0.0, "right": -share * max_turn_rate}
     controls = {f"{g} {t}": (gears[g], turns[t]) for g in gears for t in turns}
-    spins = {"spin left": (0.0, rate), "spin right": (0.0, -rate)}
+    spins = {"spin left": (0.0, max_turn_rate), "spin right": (0.0, -max_turn_rate)}
     return Automaton.of_controls(Unicycle(), controls | spins)
 
 
@@ -187,13 +179,7 @@ def without_shuffles(model: Model, found: Polished, shortest: float) -> Array | 
 
 
 def _merged(gears: Array, driven: Array, shortest: float) -> Array:
-    """Gears (n,) of which no stretch is shorter, the shortest ones turned first.
-
-    Examples
-    --------
-    >>> _merged(np.array([1.0, 1.0, -1.0, 1.0, -1.0]), np.array([2.0, 2.0, 0.1, 0.2, 3.0]), 0.5)
-    array([ 1.,  1.,  1.,  1., -1.])
-    """
+    """Gears (n,) of which no stretch is shorter, the shortest ones turned first."""
     gears = gears.copy()
     while True:
         begins = np.flatnonzero(np.diff(gears, prepend=0.0))

@@ -64,8 +64,6 @@ def timed(plan: Plan, pace: PathLimits) -> Timed:
 
     It stops where the sign of the speed changes, and between driving and turning on the spot. Where
     a wheel has to be turned further than the strokes around a stop give time for, it waits.
-
-    Raises ValueError if the plan does not move.
     """
     twists = np.array([trim.body_velocity[:3] for trim in plan.trims]).reshape(-1, 3)
     moves = twists.any(axis=1) & (plan.durations > 0.0)
@@ -317,36 +315,40 @@ def path_guesses(model: object) -> PathGuesses | None:
     return None
 
 
+def _turning(
+    pace: PathLimits,
+    library: Callable[..., Automaton],
+    guess: Callable[[Plan, Array, Array, Step], Guess],
+    share: float = 1.0,
+) -> PathGuesses:
+    """Guesses along paths in libraries that turn as tightly as a share of what they may."""
+    reverses = pace.reverse_speed > 0.0
+    return PathGuesses(
+        [library(share=share * turn, reverses=reverses) for turn in TURNS], pace, guess
+    )
+
+
+def _library_of_car(model: SecondOrderCar | CarWithTrailer) -> Callable[..., Automaton]:
+    sizes = {"wheelbase": model.wheelbase, "max_steering": model.max_steering}
+    return functools.partial(car_library, **sizes)
+
+
 @path_guesses.register
 def _of_car(model: SecondOrderCar) -> PathGuesses:
-    pace = pace_of_car(model)
-    library = functools.partial(
-        car_library,
-        wheelbase=model.wheelbase,
-        max_steering=model.max_steering,
-        reverses=pace.reverse_speed > 0.0,
-    )
-    return PathGuesses(
-        [library(share=share) for share in TURNS],
-        pace,
-        lambda plan, first, last, intervals: car_guess(model, plan, intervals=intervals),
-    )
+    def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
+        return car_guess(model, plan, intervals=intervals)
+
+    return _turning(pace_of_car(model), _library_of_car(model), guess)
 
 
 @path_guesses.register
 def _of_unicycle(model: SecondOrderUnicycle) -> PathGuesses:
-    pace = pace_of_unicycle(model)
-    library = functools.partial(
-        unicycle_library,
-        max_speed=model.max_speed,
-        max_turn_rate=model.max_turn_rate,
-        reverses=pace.reverse_speed > 0.0,
-    )
-    return PathGuesses(
-        [library(share=share) for share in TURNS],
-        pace,
-        lambda plan, first, last, intervals: unicycle_guess(model, plan, intervals=intervals),
-    )
+    def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
+        return unicycle_guess(model, plan, intervals=intervals)
+
+    limits = {"max_speed": model.max_speed, "max_turn_rate": model.max_turn_rate}
+    library = functools.partial(unicycle_library, **limits)
+    return _turning(pace_of_unicycle(model), library, guess)
 
 
 @path_guesses.register
@@ -357,17 +359,10 @@ def _of_trailer(model: CarWithTrailer) -> PathGuesses:
     """
     hitch = min(float(model.reduced_limits[0, 1]), ALONG)
     followed = math.sin(hitch) / model.hitch_length * model.wheelbase
-    share, pace = min(followed / math.tan(model.max_steering), 1.0), pace_of_trailer(model)
-    library = functools.partial(
-        car_library,
-        wheelbase=model.wheelbase,
-        max_steering=model.max_steering,
-        reverses=pace.reverse_speed > 0.0,
-    )
-    return PathGuesses(
-        [library(share=share * turn) for turn in TURNS],
-        pace,
-        lambda plan, first, last, intervals: trailer_guess(
-            model, plan, (float(first[0]), float(last[0])), intervals=intervals
-        ),
-    )
+
+    def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
+        hitches = float(first[0]), float(last[0])
+        return trailer_guess(model, plan, hitches, intervals=intervals)
+
+    share = min(followed / math.tan(model.max_steering), 1.0)
+    return _turning(pace_of_trailer(model), _library_of_car(model), guess, share)

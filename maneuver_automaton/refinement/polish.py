@@ -37,10 +37,9 @@ from maneuver_automaton.optimal_control.scene import (
     PolishSettings,
     settled,
 )
-from maneuver_automaton.primitives import Maneuver, Trajectory
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.problem import Bounds
-from maneuver_automaton.refinement.closure import Closed, closed
+from maneuver_automaton.refinement.closure import PolishedMotion, closed
 from maneuver_automaton.refinement.gear_sequences import gears_of, without_shuffles
 
 NEAR = 1.12  # share of the best cost so far up to which free lines are tried
@@ -203,33 +202,6 @@ class Attempt:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PolishedMotion:
-    """An exact motion from the start to the goal, seen from the start."""
-
-    course: Trajectory  # from the identity pose and time 0
-    control: Array  # (n, n_u)
-    durations: Array  # (n,) [s]
-    objective: float  # of the solver, at its end
-    error: float  # [m, rad, units of z] of its end
-
-    @property
-    def duration(self) -> float:
-        """[s]."""
-        return float(self.course.time[-1])
-
-    def maneuver(self, name: str, *, source: str, target: str) -> Maneuver:
-        """The motion as a maneuver from trim to trim."""
-        return Maneuver(
-            name=name,
-            source=source,
-            target=target,
-            displacement=self.course.pose[-1],
-            duration=self.duration,
-            course=self.course,
-        )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PolishResult:
     """The best motion, and the attempts made for it."""
 
@@ -291,14 +263,8 @@ def polish_through(
 ) -> PolishedMotion | str:
     """The exact motion through poses on the way that a guess leads to; why there is none, if so.
 
-    Parameters
-    ----------
-    task : PolishTask
-        Nothing may move.
-    guess : Guess
-        Seen from the start, with its nodes at the poses on the way.
-    via : sequence of (int, tuple)
-        These nodes in order, with pose and reduced state seen from the start; None is free.
+    Nothing may move. `guess`: seen from the start, with nodes at the poses on the way; `via`: these
+    in order, with pose and reduced state seen from the start; None is free.
     """
     settings = settings or PolishSettings()
     ends, why = task.ends(float(guess.state[-1, 2])), ""
@@ -319,12 +285,8 @@ def _closed_through(
     task: PolishTask, found: Polished, nodes: Sequence[NodeOnTheWay], budget: Budget
 ) -> PolishedMotion | str:
     """The motion closed from node to node, each from where the one before it came out."""
-    group, here, first, state = (
-        group_of(task.start.size),
-        np.zeros(task.start.size),
-        0,
-        task.start_state,
-    )
+    group, here = group_of(task.start.size), np.zeros(task.start.size)
+    first, state = 0, task.start_state
     dof, control, durations = here.size, list[Array](), list[Array]()
     for last, wanted in nodes:
         aim = np.array([found.state[last, k] if v is None else v for k, v in enumerate(wanted)])
@@ -570,7 +532,7 @@ class _Polishing:
         """How big the greatest part of the body is [m]."""
         return max((part.reach for part in self.task.parts), default=0.0)
 
-    def _closed(self, found: Polished) -> Closed | str:
+    def _closed(self, found: Polished) -> PolishedMotion | str:
         return closed(
             self.task.model,
             self.task.start_state,
@@ -580,17 +542,11 @@ class _Polishing:
             budget=self.budget,
         )
 
-    def _keep(self, found: Polished, ending: Closed | str, raw: Polished) -> bool:
+    def _keep(self, found: Polished, ending: PolishedMotion | str, raw: Polished) -> bool:
         """Keep a closed motion if it is accepted and better; `raw` is where finer steps begin."""
         if isinstance(ending, str):
             return False
-        motion = PolishedMotion(
-            course=ending.course,
-            control=ending.control,
-            durations=ending.durations,
-            objective=found.objective,
-            error=ending.error,
-        )
+        motion = replace(ending, objective=found.objective)
         if self.best is not None and motion.objective >= self.best.objective:
             return True
         if not self.accepts(motion):

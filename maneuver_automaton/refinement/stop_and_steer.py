@@ -45,8 +45,7 @@ def stop_and_steer(model: StopsAndSteers, path: Plan, *, first: Trim, last: Trim
     speed where it is long enough, full braking. Between strokes the reduced state changes at rest.
 
     `model`: the vehicle. `path`: of its kinematic vehicle. `first`, `last`: trims at rest in which
-    it begins and ends. Returns along the same poses. Raises ValueError if the first or last trim
-    moves.
+    it begins and ends. Returns along the same poses.
     """
     for what, trim in (("first", first), ("last", last)):
         if not trim.is_rest:
@@ -179,17 +178,6 @@ def kinematic_problem(
 
     Its cost is time; `switch` and `direction_change` are prices in units of the time that the
     vehicle with inertia takes to change its reduced state from one limit to the other.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderUnicycle
-    >>> from maneuver_automaton.primitives import Trim
-    >>> robot = SecondOrderUnicycle(max_speed=1.0, max_turn_rate=0.5, max_acceleration=1.0,
-    ...                             max_angular_acceleration=1.0)
-    >>> rest = Trim(name="rest", body_velocity=[0, 0, 0], control=[0, 0], reduced_state=[0, 0])
-    >>> simpler = kinematic_problem(Problem(Automaton(robot, (rest,)), [0, 0, 0], [1, 1, 0]))
-    >>> simpler.automaton.controls.tolist()[0]
-    [1.0, 0.5]
     """
     model = problem.automaton.model
     automaton = extreme_automaton(model)  # type: ignore[arg-type]

@@ -153,7 +153,7 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
         return None
     query = lattice_query(problem, tuple(range(len(problem.goals))), prepared=prepared)
     library, world = query.library, query.world
-    first = first_resolutions(library, query.settings)[0]
+    first = first_resolutions(library, query.problem.search)[0]
     if query.around.place.value.size and bounds.x is None:
         return None  # what places cost is known in the window of one query alone
     plain = first.durations == 1.0 and query.least_coast == 0.0 and first.margin == 1.0

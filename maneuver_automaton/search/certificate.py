@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.chain import chained, coasted
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_price as kernels
 from maneuver_automaton.words._kernels_times import TimesProblem
@@ -36,20 +36,30 @@ def certificate(problem: Problem, goal: Goal, word: Word) -> float | None:
     switched to: a necessary condition for the optimum. Where the multipliers are not unique, those
     are taken that make it largest. With a binding ``max_trims`` it may be negative. What another
     maneuver would bring is no infinitesimal change, and is not priced.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.automaton import Automaton
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"slow": (1, 0), "fast": (2, 0)})
-    >>> problem = Problem(robot, [0, 0, 0], [2, 0, 0])
-    >>> [certificate(problem, problem.goals[0], Word(trims=[k], durations=[t]))
-    ...  for k, t in ((0, 2.0), (1, 1.0))]
-    [-1.0, 0.0]
     """
     if not (word.durations > 0.0).any():
         return None
-    return smallest_reduced_cost(_priced(problem, goal, word))
+    priced = _priced(problem, goal, word)
+    lasting = np.flatnonzero(priced.times > 0.0)
+    p = kernels.multipliers_of_word(
+        _library(priced.twists, priced.rates, priced.rows), lasting, priced.times[lasting].copy()
+    )
+    best, cut = priced.least(p)
+    columns, enough = priced.columns(), -NEGLIGIBLE * priced.scale
+    if best >= enough or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
+        return best
+    cuts = [cut]
+    for _ in range(CUTS):
+        solved = _largest_least(columns, priced.rates[lasting], cuts)
+        if solved is None:
+            return best
+        p, bound = solved
+        least, cut = priced.least(p)
+        best = max(best, least)
+        if least >= bound - 0.1 * NEGLIGIBLE * priced.scale or best >= enough:
+            return best
+        cuts.append(cut)
+    return best
 
 
 class Stretch(NamedTuple):
@@ -115,35 +125,7 @@ class PricedWord:
 
     def poses(self) -> Array:
         """Poses (n + 1, 3) at which trims begin, and the end."""
-        pose, poses = SE2.identity(), [np.zeros(3)]
-        for twist, time in zip(self.twists, self.times, strict=True):
-            pose = pose @ SE2.exp(time * twist[:3])
-            poses.append(pose.pose)
-        return np.array(poses)
-
-
-def smallest_reduced_cost(word: PricedWord) -> float:
-    """`certificate` of a word that is prepared for it."""
-    lasting = np.flatnonzero(word.times > 0.0)
-    p = kernels.multipliers_of_word(
-        _library(word.twists, word.rates, word.rows), lasting, word.times[lasting].copy()
-    )
-    best, cut = word.least(p)
-    columns, enough = word.columns(), -NEGLIGIBLE * word.scale
-    if best >= enough or np.linalg.matrix_rank(columns, tol=1e-9) == len(columns):
-        return best
-    cuts = [cut]
-    for _ in range(CUTS):
-        solved = _largest_least(columns, word.rates[lasting], cuts)
-        if solved is None:
-            return best
-        p, bound = solved
-        least, cut = word.least(p)
-        best = max(best, least)
-        if least >= bound - 0.1 * NEGLIGIBLE * word.scale or best >= enough:
-            return best
-        cuts.append(cut)
-    return best
+        return coasted(np.zeros(3), self.twists[:, :3], self.times)
 
 
 def _library(twists: Array, rates: Array, rows: Array) -> TimesProblem:

@@ -48,8 +48,6 @@ def cost_to_go_table(
     are kept in files of `folder`, the user's cache folder if None, named after a hash of their key;
     where nothing can be written it works without. ``value[k, j, i]`` belongs to the pose
     ``((i - half) cell, (j - half) cell, k 2 pi / n)`` seen from the goal.
-
-    Raises ValueError if `reach` is not positive.
     """
     library = lattice_library(problem, prepared=prepared)
     size = REACH * library.radius if reach is None else reach

@@ -83,7 +83,7 @@ def first_plan(
     guides = _Guides(query, table)
     room = 2**62 if budget.expansions is None else budget.expansions
     stages = list(schedule.stages[1:])
-    turns = _turns(guides, schedule, first_resolutions(query.library, query.settings))
+    turns = _turns(guides, schedule, first_resolutions(query.library, query.problem.search))
     if begun is not None:
         turns[0].begun = begun.search_of(query)
         if not begun.is_found:
@@ -144,7 +144,7 @@ def first_plan(
         enclosed=proof,
         nearest=min(ahead, default=(math.inf, math.inf)),
         nodes=expanded(query, [one.arrays for one in passes])
-        if query.settings.show_nodes
+        if query.problem.search.show_nodes
         else None,
     )
     for search in passes:

@@ -37,14 +37,6 @@ def nearest_on_lattice(problem: Problem, goal: Goal) -> LatticePose | None:
     """The pose next to a goal on the lattice of the start; None if the library has no lattice.
 
     Primitives move with the vehicle, so any pose will do for the start, where the lattice begins.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> problem = Problem(robot, [0, 0, 0], [1, 0, 0])
-    >>> nearest_on_lattice(problem, problem.goals[0]) is None
-    True
     """
     automaton, model = problem.automaton, problem.automaton.lattice
     if model is None or not _stays_on_grid(automaton, model):

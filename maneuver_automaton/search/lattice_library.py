@@ -136,8 +136,6 @@ def lattice_library(
 
     Trims that lead to none of the goals of these numbers are left out: their speeds would make the
     estimates of cost too low. A vehicle that switches at will can use all of them.
-
-    Raises ValueError if a maneuver has no course, and so no known cost.
     """
     automaton = problem.automaton
     if automaton.is_kinematic:
@@ -220,7 +218,7 @@ def library_of_trims(
         )
     radius = length_scale(twists, body_of(parts[0].shapes), wide=priced.wide)
     speed = np.hypot(twists[:, 0], twists[:, 1])
-    lengths = np.array([path_length(library.automaton, k) for k in edges.maneuver])
+    lengths = np.array([path_length(library.automaton.maneuvers[k]) for k in edges.maneuver])
     # where no trim moves, only maneuvers cover ground
     per_metre = _least(rates, speed) if speed.any() else _least(edges.cost, lengths)
     by_maneuver = np.zeros(len(library.maneuver_costs))
@@ -373,9 +371,8 @@ def motion_along(
     return motion, np.concatenate(spans)
 
 
-def path_length(automaton: Automaton, k: int) -> float:
-    """Length of the path of a maneuver [m]."""
-    maneuver = automaton.maneuvers[k]
+def path_length(maneuver: Maneuver) -> float:
+    """Length of the path of a maneuver [m]; of the straight line where the path is not known."""
     if maneuver.course is None:
         return float(np.hypot(*maneuver.displacement[:2]))
     return float(np.hypot(*np.diff(maneuver.course.pose[:, :2], axis=0).T).sum())

@@ -19,7 +19,7 @@ from maneuver_automaton.collision.body import body_of
 from maneuver_automaton.collision.convex import DIGITS
 from maneuver_automaton.collision.world import World
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Problem, SearchSettings
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.search._kernels_place import places_cost, word_place
 from maneuver_automaton.search.arrays import DistanceGrid, LeastPrices, Scene
 from maneuver_automaton.search.lattice_goals import poses_aimed_at
@@ -80,24 +80,14 @@ class LatticeQuery:
         return self.worlds.plane
 
     @property
-    def settings(self) -> SearchSettings:
-        """Cells, headings and weight of the lattice."""
-        return self.problem.search
-
-    @property
-    def window(self) -> Array:
-        """Window (9,) as in `_kernels_coast.inside_window`."""
-        return self.around.window
-
-    @property
     def margin(self) -> float:
         """Proven clearance beyond the problem's own margin [m]."""
         return self.around.margin
 
     @property
-    def start_time(self) -> float:
-        """Time of the world at the start [s]."""
-        return self.problem.start_time
+    def window(self) -> Array:
+        """Window (9,) as in `_kernels_coast.inside_window`."""
+        return self.around.window
 
     @property
     def least_coast(self) -> float:
@@ -108,12 +98,6 @@ class LatticeQuery:
     def moves(self) -> bool:
         """Whether an obstacle moves."""
         return bool(self.world.arrays.moving.speed.size)
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Least and most expansions between two connections: one takes as long as some of these."""
-        least, most = self.library.interval
-        return least * len(self.goals), most
 
     @property
     def padding(self) -> float:
@@ -134,14 +118,6 @@ class LatticeQuery:
             return 0
         pads = self.problem.horizon.time is not None and self.library.rest is not None
         return max(1, most - int(pads))
-
-    @property
-    def stay_until(self) -> float:
-        """Time of the world [s] until which a plan rests at its goal; -inf if it need not."""
-        if self.problem.horizon.stay:
-            return self.world.last_event
-        fixed = self.problem.horizon.time
-        return -math.inf if fixed is None else self.problem.start_time + fixed
 
     def scene(self, margin: float | None = None) -> Scene:
         """The scene for tests of motions, with a proven clearance [m], by default the usual."""
@@ -192,11 +168,6 @@ def lattice_query(
     several headings are asked for where any will do: best times then let the heading go. A fixed
     time is a longest one, since rest fills it. A `library` takes the place of the usual one; `ends`
     of a vehicle in the plane are not looked at again.
-
-    Raises
-    ------
-    ValueError
-        If a maneuver has no course, and so no known cost.
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon

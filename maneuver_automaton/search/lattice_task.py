@@ -65,10 +65,12 @@ class Resolution:
 
 def limits_of(query: LatticeQuery) -> WordLimits:
     """What a plan of a query has to keep."""
+    clock, horizon = query.problem.start_time, query.problem.horizon
+    rests_until = -math.inf if horizon.time is None else clock + horizon.time
     return WordLimits(
-        clock=float(query.start_time),
+        clock=float(clock),
         most_time=float(query.most_time),
-        stay_until=float(query.stay_until),
+        stay_until=float(query.world.last_event if horizon.stay else rests_until),
         most_trims=int(query.most_trims),
         least_coast=float(query.least_coast),
     )
@@ -82,13 +84,13 @@ def task_of(query: LatticeQuery, resolution: Resolution, *, sign: float = 1.0) -
     goal_trims = np.array(query.goal_trims, dtype=np.int64)
     goals = EndArrays(np.array(query.goals), goal_trims, np.array(query.free_heading))
     aims, roots = (goals, start) if sign > 0.0 else (start, goal_roots(query))
-    timed = query.moves or math.isfinite(query.most_time)
-    known, layers = _sizes(
-        query.library, query.settings, resolution, timed, query.most_trims, query.least_coast
-    )
-    cells, limits = known.cells, limits_of(query)
+    timed, limits = query.moves or math.isfinite(query.most_time), limits_of(query)
+    settings, count, coast = query.problem.search, limits.most_trims, limits.least_coast
+    known, layers = _sizes(query.library, settings, resolution, timed, count, coast)
+    cells = known.cells
     cells = cells._replace(frame=(x, y, heading, math.cos(heading), math.sin(heading)))
-    least, most = query.interval
+    least, most = query.library.interval  # as a connection takes as long as some expansions
+    least *= len(query.goals)
     back_off = float(max(back_off_of(query.library), 2.0 * query.margin))
     # of each trim, and of none, the least surplus of maneuvers from there to an aim's trim
     numbered = query.library.arrays.library

@@ -155,10 +155,7 @@ def _with_prices(arrays: LibraryArrays, cost: StageCost) -> LibraryArrays:
 
 
 def priced_library(automaton: Automaton, cost: StageCost) -> Library:
-    """All trims and maneuvers of an automaton, priced by a cost.
-
-    Raises ValueError if a maneuver has no course, and so no known cost.
-    """
+    """All trims and maneuvers of an automaton, priced by a cost."""
     origin = origin_of(automaton, automaton.trims[0])
     rest = automaton.trims[0].name
     known = Problem(automaton, origin, Goal(pose=origin, trim=rest), start_trim=rest, cost=cost)
@@ -341,7 +338,7 @@ def at_two_paces(
     for k in range(len(word)):
         later = float(slowly[k] - quickly[k])
         share = 1.0 if later <= spare else spare / later
-        spare -= share * later
+        spare = max(spare - share * later, 0.0)
         steps = ((slow[k], share * slowly[k]), (fast[k], (1.0 - share) * quickly[k]))
         driven += [(int(row), float(t)) for row, t in steps if t > 0.0]
     return driven

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
+from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import TIE, SearchResult, SearchStatus, TimedWord, in_order
 from maneuver_automaton.search.word_scan import WordScan, scanned
@@ -90,7 +91,9 @@ def scan_linked_words(
     """
     setup = word_setup(problem, goal, most_trims=alphabet)
     expansions = problem.search.max_expansions
-    later = setup.is_mispriced or setup.is_mended
+    terms = terms_of(problem.cost)
+    exact = terms is not None and terms.direction_change == 0.0  # parts and switches are all
+    later = setup.is_mended or not exact
     pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
     most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
     everything = alternatives is None and upper_bound == math.inf

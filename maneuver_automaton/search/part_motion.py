@@ -50,10 +50,7 @@ def parts_of(
     footprint: Sequence[Shape],
     carried: Sequence[Sequence[Shape]] = (),
 ) -> tuple[Part, ...]:
-    """The vehicle's own body, and its other parts where its model says, each in its own frame.
-
-    Raises ValueError if the model carries another number of parts than `carried` has bodies.
-    """
+    """The vehicle's own body, and its other parts where its model says, each in its own frame."""
     model = automaton.model
     if len(carried) != len(model.part_names):
         raise ValueError(

@@ -69,17 +69,7 @@ def tied(cost: float) -> float:
 
 
 def in_order(words: Iterable[Word]) -> Iterator[Word]:
-    """Words by rising cost; among equal costs, fewer trims first, then by word.
-
-    Examples
-    --------
-    >>> costly, long, short = (
-    ...     Word(trims=trims, durations=[1.0] * len(trims), cost=cost)
-    ...     for trims, cost in (([0], 2.0), ([0, 1], 1.0), ([2], 1.0 + 1e-12))
-    ... )
-    >>> [word.trims.tolist() for word in in_order([costly, long, short])]
-    [[2], [0, 1], [0]]
-    """
+    """Words by rising cost; among equal costs, fewer trims first, then by word."""
     equal: list[Word] = []
     for word in sorted(words, key=lambda one: one.cost):
         if equal and word.cost > tied(equal[0].cost):

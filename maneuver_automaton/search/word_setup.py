@@ -166,7 +166,7 @@ class WordSetup:
         if most is not None and np.count_nonzero(times) + waits > most:
             return None
         cost = price + float(self.library.arrays.rates[list(trims)] @ times)
-        if total is not None or self.prices_switches:
+        if total is not None or prices_switches(self.problem.cost):
             cost = self.problem.invariant_cost_of(self.plan(trims, times))
         return TimedWord(tuple(trims), times, cost)
 
@@ -175,17 +175,6 @@ class WordSetup:
         """Cost of a word for each of its trims but the first, as far as known."""
         terms = terms_of(self.problem.cost)
         return terms.switch if terms else 0.0
-
-    @property
-    def is_mispriced(self) -> bool:
-        """Whether words may cost more than their parts and switches: a search has lower bounds."""
-        terms = terms_of(self.problem.cost)
-        return terms is None or terms.direction_change > 0.0
-
-    @property
-    def prices_switches(self) -> bool:
-        """Whether the cost of a word is more than that of its parts."""
-        return prices_switches(self.problem.cost)
 
     def plan(self, trims: Sequence[int], durations: Array) -> Plan:
         """The plan of a word from the problem's start, padded by rest where the time is fixed."""
@@ -296,8 +285,11 @@ def word_setup(
     `steers`, the library lists the words to be steered along.
     """
     automaton = problem.automaton
-    start_trim = automaton.index_of(problem.first_trim.name)
-    goal_trim = automaton.index_of(problem.last_trim(goal).name)
+    if automaton.is_kinematic:  # any trim will do
+        start_trim = goal_trim = automaton.rest or 0
+    else:
+        start_trim = automaton.index_of(problem.first_trim.name)
+        goal_trim = automaton.index_of(problem.last_trim(goal).name)
     wanted = tuple(sorted({start_trim, goal_trim, *also}))
     useful = trims_between(automaton, start_trim, [goal_trim])
     kept = None if len(useful) == len(automaton) else tuple(useful.tolist())

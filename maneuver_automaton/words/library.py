@@ -37,13 +37,7 @@ class Transitions:
     targets: IntArray  # (M,) and after it
 
     def chain(self, source: int, target: int) -> tuple[tuple[int, int], ...]:
-        """What leads from trim to trim: each (maneuver, trim it leads to), SWITCH for a switch.
-
-        Raises
-        ------
-        ValueError
-            If no chain of maneuvers leads there.
-        """
+        """What leads from trim to trim: each (maneuver, trim it leads to), SWITCH for a switch."""
         links: list[tuple[int, int]] = []
         while self.class_of[source] != self.class_of[target]:
             maneuver = int(self.first[self.class_of[source], self.class_of[target]])
@@ -229,13 +223,7 @@ class Library:
         return numbers
 
     def chain(self, source: int, target: int) -> tuple[tuple[int, int], ...]:
-        """What leads from trim to trim of the automaton; see `Transitions.chain`.
-
-        Raises
-        ------
-        ValueError
-            If no maneuvers lead there.
-        """
+        """What leads from trim to trim of the automaton; see `Transitions.chain`."""
         if not np.isfinite(self.transitions.cost[self.class_pair(source, target)]):
             names = self.automaton.trim_names
             raise ValueError(f"no maneuvers lead from {names[source]!r} to {names[target]!r}")
@@ -282,7 +270,6 @@ def library_of(
     `rates`: cost per second of each trim; 1 if omitted, so that cost is time. `maneuver_costs`:
     cost of each maneuver; its duration if omitted. `most_trims`: trims that words are made of; of a
     larger library those that differ most. `trims`: the trims that words are made of, instead.
-    Raises ValueError if an array has the wrong length or a cost is negative.
     """
     m = len(automaton)
     per_second = _costs("rates", np.ones(m) if rates is None else rates, m)
@@ -395,27 +382,21 @@ def moving_trims(automaton: Automaton, cost: StageCost) -> MovingTrims:
     resting = np.flatnonzero(cheapest & still)
     with np.errstate(divide="ignore"):
         periods = np.where(twists[:, 2] != 0.0, FULL_TURN / np.abs(twists[:, 2]), np.inf)
-    arrays = (
-        moving.astype(np.int64),
-        twists[moving],
-        rates[moving],
-        periods[moving],
-        np.linalg.norm(twists[moving][:, [0, 1, 3]], axis=1),
-        np.abs(twists[moving][:, 2]),
-    )
-    for array in arrays:
-        array.setflags(write=False)
-    return MovingTrims(
-        trims=arrays[0],
-        twists=arrays[1],
-        rates=arrays[2],
-        periods=arrays[3],
+    found = MovingTrims(
+        trims=moving.astype(np.int64),
+        twists=twists[moving],
+        rates=rates[moving],
+        periods=periods[moving],
         rest=int(resting[0]) if resting.size else None,
         rest_rate=float(rates[resting[0]]) if resting.size else 0.0,
         climbs=bool(twists[:, 3].any()),
-        speeds=arrays[4],
-        turn_rates=arrays[5],
+        speeds=np.linalg.norm(twists[moving][:, [0, 1, 3]], axis=1),
+        turn_rates=np.abs(twists[moving][:, 2]),
     )
+    for one in vars(found).values():
+        if isinstance(one, np.ndarray):
+            one.setflags(write=False)
+    return found
 
 
 def words_of(trims: Sequence[int], transitions: Transitions) -> tuple[IntArray, int]:

@@ -133,7 +133,9 @@ def solve_switching_times(
             raise ValueError(f"guesses: got shape {guess.shape}, need ({n},)")
     if displacements is None and least is None and longest is None and not free_heading:
         return _solved(rows, prices, end, given, np.ones(n), starts, restarts)
-    rows, end = _of_equal_size(rows, end)
+    dof = max(rows.shape[1], end.size)  # an altitude that is missing is zero
+    rows = np.pad(rows, ((0, 0), (0, dof - rows.shape[1])))
+    end = np.pad(end, (0, dof - end.size))
     steps = _steps(displacements, n, end.size)
     floors = np.zeros(n) if least is None else np.array(as_array("least", least))
     limits = np.full(n, math.inf) if longest is None else np.asarray(longest, dtype=np.float64)
@@ -192,21 +194,22 @@ class _ConjugatedWord:
             return _failed(n)
         if not chosen.size and not len(self.turn):
             return self._as_it_is(rates, beyond)
-        endings = [_Ending(self.turn[:0], 0.0), *(_Ending(self.turn, turn) for turn in TURNS)]
+        beyond_least = [np.maximum(one - self.floors, 0.0)[chosen] for one in guesses]
+        # without a turn in place at the end, and with one that iterations begin at some angle
+        begins = [np.zeros(0), *(np.array([turn]) for turn in TURNS if len(self.turn))]
         solved = min(
             (
                 _solved(
-                    np.vstack([self.twists[chosen], ending.turn]),
-                    np.append(rates[chosen], 0.0 * ending.first),
+                    np.vstack([self.twists[chosen], self.turn[: first.size]]),
+                    np.append(rates[chosen], 0.0 * first),
                     self.goal,
                     beyond,
-                    np.append(np.ones(chosen.size), 0.0 * ending.first),
-                    [np.append(self._beyond(one)[chosen], ending.first) for one in guesses],
+                    np.append(np.ones(chosen.size), 0.0 * first),
+                    [np.append(one, first) for one in beyond_least],
                     restarts,
                 )
-                for ending in (
-                    endings[:1] if not len(self.turn) else endings[int(not chosen.size) :]
-                )
+                for first in begins
+                if chosen.size or first.size
             ),
             key=lambda one: one.cost,
         )
@@ -215,10 +218,6 @@ class _ConjugatedWord:
         times = self.floors.copy()
         times[chosen] += np.maximum(solved.durations[: chosen.size], 0.0)
         return replace(solved, durations=times, cost=float(rates @ times))
-
-    def _beyond(self, times: Array) -> Array:
-        """Times (n,) beyond the least ones."""
-        return np.maximum(times - self.floors, 0.0)
 
     def _as_it_is(self, rates: Array, beyond: float | None) -> SwitchingTimes:
         """No time is free: the word meets the goal or it does not."""
@@ -232,14 +231,6 @@ class _ConjugatedWord:
             cost=float(rates @ self.floors),
             multipliers=np.zeros(3),
         )
-
-
-class _Ending:
-    """A turn in place at the end (1, dof), or none (0, dof), and where iterations begin [rad]."""
-
-    def __init__(self, turn: Array, first: float) -> None:
-        self.turn = turn
-        self.first = np.full(len(turn), first)
 
 
 def _solved(
@@ -293,15 +284,6 @@ def _starts(n: int, total: float | None, guesses: Sequence[Array], restarts: int
     if total is not None:
         scales *= total / scales.sum(axis=1, keepdims=True)
     return np.vstack([*first, even, scales])
-
-
-def _of_equal_size(twists: Array, goal: Array) -> tuple[Array, Array]:
-    """Twists and goal of as many coordinates, a missing altitude being zero."""
-    dof = max(twists.shape[1], goal.size)
-    rows, end = np.zeros((len(twists), dof)), np.zeros(dof)
-    rows[:, : twists.shape[1]] = twists
-    end[: goal.size] = goal
-    return rows, end
 
 
 def _steps(displacements: ArrayLike | None, n: int, dof: int) -> Array:

@@ -11,7 +11,7 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.design import disperse_library
-from maneuver_automaton.design.dispersing import _classes, _distances
+from maneuver_automaton.design.dispersing import _distances
 from maneuver_automaton.primitives import Maneuver
 
 CAR = ma.load_stock_library("second_order_car")
@@ -36,7 +36,8 @@ def small(n, seed):
 def test_no_choice_is_better_than_the_bound_nor_twice_as_good(seed, most):
     library = small(9, seed)
     done = disperse_library(library, most=most)
-    apart = _distances(library, _classes(library)[0], None)
+    sources = [library.index_of(one.source) for one in library.maneuvers]
+    apart = _distances(library, library.trim_classes[sources], None)
     best = min(apart[:, list(some)].min(axis=1).max() for some in combinations(range(9), most))
     assert done.at_least <= best + 1e-12
     assert best <= done.dispersion <= 2.0 * best + 1e-12

@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks.uniform_effort import END, START, example_problem, solve_uniform_effort_example
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.optimal_control import (
-    Guess,
-    SolveStatus,
-    solve_uniform_effort_example,
-)
-from maneuver_automaton.optimal_control.uniform_effort import END, START, example_problem
+from maneuver_automaton.optimal_control import Guess, SolveStatus
 from tests.optimal_control import pontryagin
 from tests.reference_dynamics import dynamics_defect
 

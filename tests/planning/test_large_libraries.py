@@ -16,7 +16,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
 from maneuver_automaton.problem import Bounds, Horizon, Problem, SearchSettings
-from maneuver_automaton.search.lattice_trims import coarse_trims
+from maneuver_automaton.search.lattice_trims import at_two_paces, coarse_trims
 from maneuver_automaton.words.library import moving_trims
 from tests.planning.test_among_obstacles import assert_moved
 from tests.quickly import quick_are
@@ -114,3 +114,15 @@ def test_an_effort_is_spread_over_the_time_there_is():
 
 def test_a_moved_problem_has_the_moved_plan():
     assert assert_moved(CASES["mixed"], SE2([3.0, -2.0, 0.7]))
+
+
+@pytest.mark.parametrize(
+    ("durations", "most_time"), [([1.86, 2.22], 5.06), ([1.07, 0.54], 1.94)], ids=str
+)
+def test_a_word_fills_its_time_to_the_last_digit(durations, most_time):
+    """Driving slows down, turning on the spot does not: what rounding leaves over is no time."""
+    twists = np.array([[1.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    word, paces = np.array([0, 2]), (np.array([1, 2]), np.array([0, 2]))
+    driven = at_two_paces(twists, word, np.array(durations), paces, most_time)
+    assert sum(t for _, t in driven) == pytest.approx(most_time, rel=1e-12)
+    assert {row for row, _ in driven} == {0, 1, 2}

@@ -143,24 +143,12 @@ def solve_uniform_effort_example(
 
 
 def quadratic_effort(x: Components, u: Components) -> Any:
-    """``4 u1^2 + u2^2 - 3 u1 u2``: the quadratic part of the stage cost.
-
-    Examples
-    --------
-    >>> quadratic_effort((), (1.0, 2.0))
-    2.0
-    """
+    """``4 u1^2 + u2^2 - 3 u1 u2``: the quadratic part of the stage cost."""
     return 4.0 * u[0] ** 2 + u[1] ** 2 - 3.0 * u[0] * u[1]
 
 
 def relative_spread(values: Sequence[float] | Array) -> float:
-    """Greatest less least over mean.
-
-    Examples
-    --------
-    >>> relative_spread([1.0, 2.0, 3.0])
-    1.0
-    """
+    """Greatest less least over mean."""
     return float(np.ptp(values) / np.mean(values))
 
 
