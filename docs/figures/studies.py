@@ -1,6 +1,6 @@
 """Pictures of studies for the pages: `python docs/figures/studies.py FOLDER` writes them all.
 
-Each function draws what a study of `maneuver_automaton.analysis`, or a benchmark, has found.
+Each function draws what a study of `maneuver_automaton.analysis` and its like has found.
 """
 
 from __future__ import annotations
@@ -19,15 +19,16 @@ sys.path.insert(0, str(Path(__file__).parent))
 from symmetry import INK, tidy
 
 import maneuver_automaton as ma
-from benchmarks.turnpike import Turnpike, turnpike
 from benchmarks.uniform_effort import END_NODES, UniformEffortExample, solve_uniform_effort_example
 from maneuver_automaton.analysis import (
     CertifiedHorizon,
     FeasibleSet,
+    Turnpike,
     certified_horizon,
     feasible_set,
     growth_bound,
     ring_poses,
+    turnpike,
 )
 from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.primitives.closed_form import bang_bang

@@ -24,6 +24,14 @@ from maneuver_automaton.analysis.library_conditions import turn_move_turn as tur
 from maneuver_automaton.analysis.reach import Reached as Reached
 from maneuver_automaton.analysis.reach import ReachSettings as ReachSettings
 from maneuver_automaton.analysis.reach import reached as reached
+from maneuver_automaton.analysis.shift import ControlProblem as ControlProblem
+from maneuver_automaton.analysis.shift import QuadraticCost as QuadraticCost
+from maneuver_automaton.analysis.shift import (
+    shifted_boundary_condition as shifted_boundary_condition,
+)
+from maneuver_automaton.analysis.shift import shifted_cost as shifted_cost
+from maneuver_automaton.analysis.shift import shifted_function as shifted_function
+from maneuver_automaton.analysis.shift import shifted_problem as shifted_problem
 from maneuver_automaton.analysis.stability import CertifiedHorizon as CertifiedHorizon
 from maneuver_automaton.analysis.stability import ClosedLoopCheck as ClosedLoopCheck
 from maneuver_automaton.analysis.stability import certified_horizon as certified_horizon
@@ -40,6 +48,9 @@ from maneuver_automaton.analysis.symmetry import check_flow as check_flow
 from maneuver_automaton.analysis.symmetry import check_stage_cost as check_stage_cost
 from maneuver_automaton.analysis.symmetry import check_vector_field as check_vector_field
 from maneuver_automaton.analysis.symmetry import same_motion_primitive as same_motion_primitive
+from maneuver_automaton.analysis.turnpike import Turnpike as Turnpike
+from maneuver_automaton.analysis.turnpike import TurnpikeCase as TurnpikeCase
+from maneuver_automaton.analysis.turnpike import turnpike as turnpike
 from maneuver_automaton.refinement.retiming import EffortReport as EffortReport
 from maneuver_automaton.refinement.retiming import Retiming as Retiming
 from maneuver_automaton.refinement.retiming import effort_report as effort_report

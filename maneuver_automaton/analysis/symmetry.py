@@ -292,7 +292,7 @@ def check_boundary_condition(
 ) -> SymmetryReport:
     """Whether a boundary condition ``r(x_0, x_T) = 0`` stays the same when both ends are moved.
 
-    A fixed start or goal never does, unless it is moved along.
+    A fixed start or goal never does; `shifted_problem` moves it along.
 
     Source: the paper, Def. 7. Parameters are those of `check_stage_cost`; the state of the report
     is the pair of ends (2, n_x).

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.turnpike import turnpike
+from maneuver_automaton.analysis import turnpike
 from maneuver_automaton.models import SecondOrderUnicycle
 from maneuver_automaton.optimal_control import SolveStatus
 from maneuver_automaton.primitives import trims_of
