@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.linked_words import scan_linked_words
+from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.linked_words import scan_linked_words, steer_linked_words
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.word_setup import word_setup
 from tests.inertia import car_automaton, unicycle_automaton
@@ -75,16 +75,19 @@ def test_every_plan_passes_the_audit(make):
     x=st.floats(-3.0, 3.0),
     y=st.floats(-3.0, 3.0),
     turn=st.floats(-3.0, 3.0),
+    free=st.booleans(),
     by=st.tuples(st.floats(-9.0, 9.0), st.floats(-9.0, 9.0), st.floats(-4.0, 4.0)),
 )
 @settings(max_examples=10)
-def test_a_moved_problem_has_the_moved_words(x, y, turn, by):
-    one = problem([x, y, turn], automaton=unicycle_automaton(SMALL))
+def test_a_moved_problem_has_the_moved_words(x, y, turn, free, by):
+    goal = Goal([x, y, turn], free_heading=free)
+    one = problem(goal, automaton=unicycle_automaton(SMALL))
     moved = one.moved(SE2(by))
-    here, there = (searched(p, max_trims=3).solutions for p in (one, moved))
-    assert len(here) == len(there)
-    if here:
-        assert there[0].cost == pytest.approx(here[0].cost, abs=1e-5)
+    for search, most in ((scan_linked_words, {"max_trims": 3}), (steer_linked_words, {})):
+        here, there = (search(p, p.goals[0], **most).solutions for p in (one, moved))
+        assert len(here) == len(there)
+        if here:
+            assert there[0].cost == pytest.approx(here[0].cost, abs=1e-5)
 
 
 @pytest.mark.parametrize("switch", [0.3, 20.0])
