@@ -126,7 +126,7 @@ def _improved(work: _Work) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
     names = [] if plan is None else [trim.name for trim in plan.trims]
-    if plan is not None and len(names) <= LONGEST and set(names) <= set(automaton.trim_names):
+    if plan is not None and len(names) <= LONGEST and all(map(automaton.__contains__, names)):
         word = np.array([automaton.index_of(name) for name in names], dtype=np.int64)
         if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
             known.append(_in_library(work, word, plan.durations))
@@ -259,7 +259,9 @@ def _with_insertions(
 
 def _with_short_runs(library: InsertionLibrary, word: TimedWord) -> TimedWord:
     """The word with its runs of two trims that alternate shortened."""
-    if len(word.trims) - library.tail < RUN:
+    trims = word.trims[: len(word.trims) - library.tail]
+    parts = (trims[k : k + RUN] for k in range(len(trims) + 1 - RUN))
+    if not any(part[2:] == part[:-2] for part in parts):  # no two that take turns
         return word
     trims, times = _with_room(word)
     size, cost, least = _kernels_insertion.word_with_short_runs(

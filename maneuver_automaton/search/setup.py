@@ -139,6 +139,7 @@ class Columns:
     twists: Array  # (M, 4)
     rates: Array  # (M,) that of rest taken off where it pads
     weights: Array  # (M,) 0 for the free turn, which takes no time, otherwise 1
+    scale: float  # size of a typical rate
 
 
 @kept_by_first
@@ -157,8 +158,21 @@ def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
         weights = np.append(weights, 0.0)
     # kernels are compiled for arrays that can be written
     return Columns(
-        trims=trims, twists=np.array(twists, order="C"), rates=np.array(rates), weights=weights
+        trims=trims,
+        twists=np.array(twists, order="C"),
+        rates=np.array(rates),
+        weights=weights,
+        scale=float(np.abs(rates).max(initial=1.0)),
     )
+
+
+@kept_by_first
+def _numbers(packed: Columns, n: int) -> IntArray:
+    """The row of each of an automaton's `n` trims, -1 where it has none."""
+    numbers = np.full(n, -1, dtype=np.int64)
+    trims = packed.trims[packed.trims != UNUSED]
+    numbers[trims] = np.arange(len(trims))
+    return numbers
 
 
 UNUSED = -1  # stands in `trims` for what is no trim of the automaton
@@ -176,16 +190,12 @@ class InsertionLibrary:
     climbs: bool  # whether the first row is altitude
     n_priced: int  # all but the free turn
     fixed_cost: float  # of the whole fixed time at rest
+    scale: float  # size of a typical rate
 
     @property
     def tail(self) -> int:
         """How many turns of a free heading follow every word: 0 or 1."""
         return int(self.free_heading)
-
-    @property
-    def scale(self) -> float:
-        """Size of a typical rate."""
-        return max(1.0, float(np.abs(self.problem.rates).max()))
 
     def within_time(self, limit: float) -> InsertionLibrary:
         """The library with a column for unused time, so that words last at most `limit` [s].
@@ -235,8 +245,6 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
     pads = limit is not None and library.rest is not None
     kept = columns(library, pads=pads, free_heading=setup.free_heading)
     n_priced = len(kept.trims) - int(setup.free_heading)
-    number_of = np.full(len(problem.automaton), -1, dtype=np.int64)
-    number_of[kept.trims[:n_priced]] = np.arange(n_priced)
     rows, targets = [], []
     if setup.climbs:
         rows.append(kept.twists[:, 3])
@@ -246,7 +254,7 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
         targets.append(limit)
     return InsertionLibrary(
         trims=kept.trims,
-        number_of=number_of,
+        number_of=_numbers(kept, len(problem.automaton)),
         problem=TimesProblem(
             twists=kept.twists,
             rates=kept.rates,
@@ -259,6 +267,7 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
         climbs=setup.climbs,
         n_priced=n_priced,
         fixed_cost=library.rest_rate * limit if pads and limit is not None else 0.0,
+        scale=kept.scale,
     )
 
 
