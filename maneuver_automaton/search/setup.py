@@ -287,6 +287,7 @@ def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
     x, y, turn, z = setup.goal.tolist()
     size = max(abs(x), abs(y), abs(z), abs(math.remainder(turn, 2.0 * math.pi)), TINY)
     finer = max(0, math.ceil(-math.log10(UNUSUAL * size)))
-    goal = setup.goal.round(DIGITS + finer) + 0.0  # no negative zeros
+    unit = 10.0 ** (DIGITS + finer)
+    goal = np.array([round(value * unit) / unit for value in setup.goal.tolist()])
     rounded = replace(setup, goal=goal)
     return setup if rounded.start_is_goal else rounded
