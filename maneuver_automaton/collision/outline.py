@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,20 @@ def outlines(shape: Polygon | Box) -> list[Any]:
             "all on one line"
         )
     return solid
+
+
+def outlines_of(polygons: Sequence[Polygon]) -> list[list[Any]]:
+    """The `outlines` of each of some polygons: those that are valid are made all at once."""
+    import shapely
+
+    if not polygons:
+        return []
+    numbers = np.repeat(np.arange(len(polygons)), [len(one.corners) for one in polygons])
+    rings = shapely.linearrings(np.concatenate([one.corners for one in polygons]), indices=numbers)
+    wholes = shapely.polygons(rings)
+    plain = shapely.is_valid(wholes) & (shapely.area(wholes) > 0.0)
+    every = zip(polygons, wholes, plain.tolist(), strict=True)
+    return [[whole] if ok and not one.holes else outlines(one) for one, whole, ok in every]
 
 
 def solid_parts(shape: Polygon | Box) -> list[Any]:
