@@ -116,7 +116,7 @@ def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
             "control": primitive.control.tolist(),
             "duration_s": duration,
         }
-        known = library[primitive.name] if primitive.name in library else None
+        known = library[primitive.name] if primitive.name in library.trim_names else None
         # At will, a trim at another pace is made of its control; one that noise moves is not.
         disturbed = (
             known is not None

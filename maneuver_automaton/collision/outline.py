@@ -86,14 +86,6 @@ def united(parts: Iterable[Any]) -> Any:
     return functools.reduce(shapely.union, every) if lost.any() else whole
 
 
-def triangles_of(polygon: Any) -> Array:
-    """Triangles (n, 3, 2) that cover a valid polygon, cut along its own corners only."""
-    import shapely
-
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    return np.asarray(shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3])
-
-
 def rings_of(polygon: Any) -> list[Array]:
     """Corners (n, 2) of the outer ring of a valid polygon, then of its holes, none repeated."""
     import shapely

@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -96,9 +96,13 @@ def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list
     regions = []
     for one, shape in zip(obstacles, shapes, strict=True):
         if isinstance(one, OccupancyMap):
-            regions.append(_region(_map_triangles(one)))
+            rectangles = blocked_rectangles(one.blocked).astype(np.float64)
+            halves = rectangles[:, [[[0, 1], [2, 1], [2, 3]], [[0, 1], [2, 3], [0, 3]]]]
+            regions.append(_region(SE2(one.origin).act(one.resolution * halves)))
         elif isinstance(shape, Disc):
-            regions.append(_region(_fan(circumscribed(shape.center, shape.radius, excess))[None]))
+            ring = circumscribed(shape.center, shape.radius, excess)
+            first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
+            regions.append(_region(np.stack([first, ring[1:-1], ring[2:]], axis=1)[None]))
         elif isinstance(shape, Polygon):
             regions.append(next(covers))
         else:
@@ -153,12 +157,6 @@ def _grown(part: Array, corners: Array) -> Array:
     return convex_hull((part[:, None] + corners).reshape(-1, 2))
 
 
-def _fan(ring: Array) -> Array:
-    """Triangles (n - 2, 3, 2) of a convex polygon."""
-    n = len(ring) - 2
-    return np.stack([np.broadcast_to(ring[0], (n, 2)), ring[1:-1], ring[2:]], axis=1)
-
-
 def _covers(polygons: Sequence[Polygon]) -> Iterator[Cover]:
     """What covers each polygon: triangles, cut of all at once, and posts on one of each part."""
     import shapely
@@ -181,10 +179,3 @@ def _covers(polygons: Sequence[Polygon]) -> Iterator[Cover]:
     ends = np.cumsum([0, *map(len, outlined)])
     for a, b in itertools.pairwise(ends.tolist()):
         yield Cover(corners[begins[a] : begins[b]], whole.posts[2 * a : 2 * b])
-
-
-def _map_triangles(one: OccupancyMap) -> Array:
-    """Rectangles of blocked cells (n, 2, 3, 2), two triangles each."""
-    boxes = blocked_rectangles(one.blocked).astype(np.float64)
-    corners = boxes[:, [[[0, 1], [2, 1], [2, 3]], [[0, 1], [2, 3], [0, 3]]]]
-    return SE2(one.origin).act(one.resolution * corners)

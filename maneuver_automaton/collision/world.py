@@ -141,7 +141,8 @@ def _static_arrays(
 ) -> tuple[Solids, Buckets, Field]:
     """The static obstacles around a footprint: the same beside any moving ones."""
     body, pose = body_of(footprint), np.array(frame)
-    maps = [_seen_map(o, pose) for o in static if isinstance(o, OccupancyMap)]
+    away, back = SE2(np.array([-pose[0], -pose[1], 0.0])), SE2(np.array([0.0, 0.0, -pose[2]]))
+    maps = [o.moved(away).moved(back) for o in static if isinstance(o, OccupancyMap)]
     pieces = pieces_seen_from([o.shape for o in static if isinstance(o, Obstacle)], pose)
     # Rectangles of maps come last: near contact they are solids as others, but the field takes maps
     # by a transform of their cells.
@@ -178,11 +179,6 @@ def frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
         if longest >= 0:
             return (*ring[0].tolist(), math.atan2(edge[longest, 1], edge[longest, 0]))
     return ()
-
-
-def _seen_map(one: OccupancyMap, frame: Array) -> OccupancyMap:
-    there = one.moved(SE2(np.array([-frame[0], -frame[1], 0.0])))
-    return there.moved(SE2(np.array([0.0, 0.0, -frame[2]])))
 
 
 def _cells(one: OccupancyMap, frame: Array) -> Array:

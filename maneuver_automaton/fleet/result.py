@@ -294,7 +294,7 @@ def _cost(problem: Problem, piece: Plan) -> float:
         return 0.0
     known = problem.automaton
     if not piece.maneuvers:
-        trims = tuple(known[t.name] if t.name in known else t for t in piece.trims)
+        trims = tuple(known[t.name] if t.name in known.trim_names else t for t in piece.trims)
         lasting: list[float] = piece.durations.tolist()
         piece = Plan.of_parts(piece.start, trims, lasting, start_time=piece.start_time)
     return float(problem.cost_of(piece))

@@ -164,7 +164,7 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
     binding = (
         not words or min(words, key=attrgetter("cost")).certificate < -ACCURACY * library.scale
     )
-    if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
+    if most < LONGEST and binding and not library.tail and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
     if prices_switches(problem.cost) and not task.budget.is_over:
         words += _with_fewer_switches(library, words, task.budget)
@@ -225,7 +225,7 @@ def _with_fewer_switches(
     library: InsertionLibrary, words: Sequence[TimedWord], budget: Budget
 ) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
-    if library.free_heading:
+    if library.tail:
         return
     for word in words[:SHORTENED]:
         longer = word
@@ -347,7 +347,7 @@ def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
     if limit is not None and library.rest is not None and word[-1:] != [library.rest]:
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
-    if library.free_heading:
+    if library.tail:
         turned = float(
             library.problem.twists[word, 2] @ np.array(times)
         )  # the rest is turned at 1 rad/s

@@ -139,6 +139,7 @@ class Columns:
     twists: Array  # (M, 4)
     rates: Array  # (M,) that of rest taken off where it pads
     weights: Array  # (M,) 0 for the free turn, which takes no time, otherwise 1
+    number_of: IntArray  # (m,) of the automaton's trims their row here, -1 where there is none
     scale: float  # size of a typical rate
 
 
@@ -150,7 +151,8 @@ def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
         trims = np.append(trims, library.rest)
         twists = np.vstack([twists, np.zeros(4)])
         rates = np.append(rates - library.rest_rate, 0.0)
-    weights = np.ones(len(trims))
+    weights, number_of = np.ones(len(trims)), np.full(library.of, -1, dtype=np.int64)
+    number_of[trims] = np.arange(len(trims))
     if free_heading:
         trims = np.append(trims, UNUSED)
         twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
@@ -162,17 +164,9 @@ def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
         twists=np.array(twists, order="C"),
         rates=np.array(rates),
         weights=weights,
+        number_of=number_of,
         scale=float(np.abs(rates).max(initial=1.0)),
     )
-
-
-@kept_by_first
-def _numbers(packed: Columns, n: int) -> IntArray:
-    """The row of each of an automaton's `n` trims, -1 where it has none."""
-    numbers = np.full(n, -1, dtype=np.int64)
-    trims = packed.trims[packed.trims != UNUSED]
-    numbers[trims] = np.arange(len(trims))
-    return numbers
 
 
 UNUSED = -1  # stands in `trims` for what is no trim of the automaton
@@ -186,16 +180,11 @@ class InsertionLibrary:
     number_of: IntArray  # from the automaton's indices to these, -1 where there is none
     problem: TimesProblem  # (M,) trims
     rest: int | None  # its number here
-    free_heading: bool
+    tail: int  # how many turns of a free heading follow every word: 0 or 1
     climbs: bool  # whether the first row is altitude
     n_priced: int  # all but the free turn
     fixed_cost: float  # of the whole fixed time at rest
     scale: float  # size of a typical rate
-
-    @property
-    def tail(self) -> int:
-        """How many turns of a free heading follow every word: 0 or 1."""
-        return int(self.free_heading)
 
     def within_time(self, limit: float) -> InsertionLibrary:
         """The library with a column for unused time, so that words last at most `limit` [s].
@@ -245,25 +234,20 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
     pads = limit is not None and library.rest is not None
     kept = columns(library, pads=pads, free_heading=setup.free_heading)
     n_priced = len(kept.trims) - int(setup.free_heading)
-    rows, targets = [], []
-    if setup.climbs:
-        rows.append(kept.twists[:, 3])
-        targets.append(float(setup.goal[3]))
-    if limit is not None:
-        rows.append(kept.weights)
-        targets.append(limit)
+    met = [(kept.twists[:, 3], setup.goal[3])] if setup.climbs else []
+    met += [] if limit is None else [(kept.weights, limit)]
     return InsertionLibrary(
         trims=kept.trims,
-        number_of=_numbers(kept, len(problem.automaton)),
+        number_of=kept.number_of,
         problem=TimesProblem(
             twists=kept.twists,
             rates=kept.rates,
-            rows=np.array(rows).reshape(len(rows), len(kept.rates)),
+            rows=np.array([row for row, _ in met]).reshape(len(met), len(kept.rates)),
             goal=np.array(setup.goal),
-            targets=np.array(targets, dtype=np.float64),
+            targets=np.array([target for _, target in met], dtype=np.float64),
         ),
         rest=len(library.trims) if pads else None,
-        free_heading=setup.free_heading,
+        tail=int(setup.free_heading),
         climbs=setup.climbs,
         n_priced=n_priced,
         fixed_cost=library.rest_rate * limit if pads and limit is not None else 0.0,
