@@ -259,8 +259,8 @@ def _with_insertions(
 
 def _with_short_runs(library: InsertionLibrary, word: TimedWord) -> TimedWord:
     """The word with its runs of two trims that alternate shortened."""
-    trims = word.trims[: len(word.trims) - library.tail]
-    parts = (trims[k : k + RUN] for k in range(len(trims) + 1 - RUN))
+    last = len(word.trims) - library.tail - RUN
+    parts = (word.trims[k : k + RUN] for k in range(last + 1))
     if not any(part[2:] == part[:-2] for part in parts):  # no two that take turns
         return word
     trims, times = _with_room(word)
