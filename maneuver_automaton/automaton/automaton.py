@@ -265,6 +265,9 @@ class Automaton(Drawn):
     def __len__(self) -> int:
         return len(self.trims)
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._index
+
     def __getitem__(self, name: str) -> Trim:
         return self.trims[self.index_of(name)]
 

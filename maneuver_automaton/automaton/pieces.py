@@ -146,7 +146,7 @@ def _passed(primitives: Sequence[Primitive], library: Automaton) -> dict[str, Tr
 
 def _coasted(entry: Piece, library: Automaton) -> Trim:
     """A trim of the library, or one that the piece tells all about."""
-    if entry["name"] in library.trim_names or "reduced_state" not in entry:
+    if entry["name"] in library or "reduced_state" not in entry:
         return library[entry["name"]]
     return Trim(
         name=entry["name"],
@@ -194,6 +194,6 @@ def _trim(entry: Piece, library: Automaton) -> Trim:
     if "body_velocity" in entry:
         twist = np.array(entry["body_velocity"])
         return Trim(name=name, body_velocity=twist, control=np.array(control))
-    if name in library.trim_names and library[name].control.tolist() == control:
+    if name in library and library[name].control.tolist() == control:
         return library[name]
     return Automaton.of_controls(library.model, {name: control}).trims[0]

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.collision.outline import solid_parts, triangles_of
+from maneuver_automaton.collision.outline import solid_parts
 from maneuver_automaton.collision.shapes import Box, Disc, Polygon, Shape
 
 TINY_EDGE = 1e-6  # [m]
@@ -179,7 +179,8 @@ def _decomposed(shape: Polygon) -> list[Array]:
 
     pieces: list[Array] = []
     for part in solid_parts(shape):
-        pieces += _merged([_simple(triangle) for triangle in triangles_of(part)])
+        triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(part))
+        pieces += _merged([_simple(shapely.get_coordinates(one)[:3]) for one in triangles])
     whole = shapely.Polygon(shape.corners, shape.holes)
     if whole.is_valid:
         return pieces

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.motion import point_speeds
-from maneuver_automaton.collision.outline import outlines
+from maneuver_automaton.collision.outline import outlines_of
 from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon, Shape, box_corners
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_regions, obstacle_skin
 from maneuver_automaton.collision.swept import (
@@ -317,8 +317,6 @@ def _ground_of(
 
 def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
     """Boxes (n, 4) [low x, low y, high x, high y] around static obstacles."""
-    import shapely
-
     boxes = np.zeros((len(obstacles), 4))
     rectangles, polygons = [], []
     for k, one in enumerate(obstacles):
@@ -326,8 +324,7 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
         if isinstance(shape, Box):
             rectangles.append((k, shape))
         elif isinstance(shape, Polygon):
-            boxes[k] = *shape.corners.min(axis=0), *shape.corners.max(axis=0)
-            polygons.append(shape)
+            polygons.append((k, shape))
         elif isinstance(shape, Disc):
             boxes[k] = *(shape.center - shape.radius), *(shape.center + shape.radius)
         else:  # a map, wherever it is turned
@@ -338,15 +335,12 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
         ends = [corners.min(axis=1), corners.max(axis=1)]
         boxes[[k for k, _ in rectangles]] = np.concatenate(ends, axis=1)
     if polygons:
-        which = np.repeat(np.arange(len(polygons)), [len(one.corners) for one in polygons])
-        rings = shapely.linearrings(
-            np.concatenate([one.corners for one in polygons]), indices=which
-        )
-        parts = shapely.polygons(rings)
-        plain = shapely.is_valid(parts) & (shapely.area(parts) > 0.0)
-        for polygon, whole in zip(polygons, plain.tolist(), strict=True):
-            if polygon.holes or not whole:
-                outlines(polygon)  # refuses one without area
+        sizes = np.array([len(one.corners) for _, one in polygons])
+        corners = np.concatenate([one.corners for _, one in polygons])
+        begins = np.cumsum(sizes) - sizes
+        ends = [np.minimum.reduceat(corners, begins), np.maximum.reduceat(corners, begins)]
+        boxes[[k for k, _ in polygons]] = np.concatenate(ends, axis=1)
+        outlines_of([one for _, one in polygons])  # refuses one without area
     return boxes
 
 

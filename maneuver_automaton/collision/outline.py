@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,20 @@ def outlines(shape: Polygon | Box) -> list[Any]:
             "all on one line"
         )
     return solid
+
+
+def outlines_of(polygons: Sequence[Polygon]) -> list[list[Any]]:
+    """The `outlines` of each of some polygons: those that are valid are made all at once."""
+    import shapely
+
+    if not polygons:
+        return []
+    numbers = np.repeat(np.arange(len(polygons)), [len(one.corners) for one in polygons])
+    rings = shapely.linearrings(np.concatenate([one.corners for one in polygons]), indices=numbers)
+    wholes = shapely.polygons(rings)
+    plain = shapely.is_valid(wholes) & (shapely.area(wholes) > 0.0)
+    every = zip(polygons, wholes, plain.tolist(), strict=True)
+    return [[whole] if ok and not one.holes else outlines(one) for one, whole, ok in every]
 
 
 def solid_parts(shape: Polygon | Box) -> list[Any]:
@@ -59,14 +73,6 @@ def united(parts: Iterable[Any]) -> Any:
     left = ~shapely.covers(whole, every)  # few, and soon told: a difference takes long
     lost = shapely.area(shapely.difference(every[left], whole)) > LOST * areas[left]
     return functools.reduce(shapely.union, every) if lost.any() else whole
-
-
-def triangles_of(polygon: Any) -> Array:
-    """Triangles (n, 3, 2) that cover a valid polygon, cut along its own corners only."""
-    import shapely
-
-    triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygon))
-    return np.asarray(shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3])
 
 
 def rings_of(polygon: Any) -> list[Array]:

@@ -9,15 +9,16 @@ nothing touches; and the distance of the skins is that in the plane.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import convex_pieces
-from maneuver_automaton.collision.outline import blocked_rectangles, outlines, triangles_of
+from maneuver_automaton.collision.outline import blocked_rectangles, outlines, outlines_of
 from maneuver_automaton.collision.shapes import (
     AnyObstacle,
     Box,
@@ -91,15 +92,19 @@ def obstacle_regions(obstacles: Sequence[AnyObstacle], *, excess: float) -> list
     if boxes:
         both = _region(box_corners(boxes)[:, [[0, 1, 2], [0, 2, 3]]])
         fans = map(Cover, both.cover.reshape(-1, 2, 3, 2), both.posts.reshape(-1, 2, 2, 2))
+    covers = _covers([one for one in shapes if isinstance(one, Polygon)])
     regions = []
     for one, shape in zip(obstacles, shapes, strict=True):
         if isinstance(one, OccupancyMap):
-            regions.append(_region(_map_triangles(one)))
+            rectangles = blocked_rectangles(one.blocked).astype(np.float64)
+            halves = rectangles[:, [[[0, 1], [2, 1], [2, 3]], [[0, 1], [2, 3], [0, 3]]]]
+            regions.append(_region(SE2(one.origin).act(one.resolution * halves)))
         elif isinstance(shape, Disc):
-            regions.append(_region(_fan(circumscribed(shape.center, shape.radius, excess))[None]))
+            ring = circumscribed(shape.center, shape.radius, excess)
+            first = np.broadcast_to(ring[0], (len(ring) - 2, 2))
+            regions.append(_region(np.stack([first, ring[1:-1], ring[2:]], axis=1)[None]))
         elif isinstance(shape, Polygon):
-            parts = [_region(_triangles(part)[None]) for part in outlines(shape)]
-            regions.append(Cover(*map(np.concatenate, zip(*parts, strict=True))))
+            regions.append(next(covers))
         else:
             regions.append(next(fans))
     return regions
@@ -152,28 +157,25 @@ def _grown(part: Array, corners: Array) -> Array:
     return convex_hull((part[:, None] + corners).reshape(-1, 2))
 
 
-def _fan(ring: Array) -> Array:
-    """Triangles (n - 2, 3, 2) of a convex polygon."""
-    n = len(ring) - 2
-    return np.stack([np.broadcast_to(ring[0], (n, 2)), ring[1:-1], ring[2:]], axis=1)
-
-
-def _triangles(polygon: Any) -> Array:
-    """Triangles (n, 3, 2) that cover a valid polygon."""
+def _covers(polygons: Sequence[Polygon]) -> Iterator[Cover]:
+    """What covers each polygon: triangles, cut of all at once, and posts on one of each part."""
     import shapely
 
-    triangles = triangles_of(polygon)
-    missed = polygon.area - shapely.area(shapely.polygons(triangles)).sum()
-    if abs(missed) > 1e-9 * polygon.area:
+    outlined = outlines_of(polygons)
+    parts = np.array([part for some in outlined for part in some], dtype=object)
+    triangles, of = shapely.get_parts(
+        shapely.constrained_delaunay_triangles(parts), return_index=True
+    )
+    areas = shapely.area(parts)
+    missed = areas - np.bincount(of, shapely.area(triangles), len(parts))
+    for k in np.flatnonzero(np.abs(missed) > 1e-9 * areas)[:1]:
         raise ValueError(
-            f"polygon: {missed:.3g} m^2 of {polygon.area:.3g} m^2 were lost in triangles; need "
+            f"polygon: {missed[k]:.3g} m^2 of {areas[k]:.3g} m^2 were lost in triangles; need "
             "corners further apart"
         )
-    return triangles
-
-
-def _map_triangles(one: OccupancyMap) -> Array:
-    """Rectangles of blocked cells (n, 2, 3, 2), two triangles each."""
-    boxes = blocked_rectangles(one.blocked).astype(np.float64)
-    corners = boxes[:, [[[0, 1], [2, 1], [2, 3]], [[0, 1], [2, 3], [0, 3]]]]
-    return SE2(one.origin).act(one.resolution * corners)
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    begins = np.searchsorted(of, np.arange(len(parts) + 1))
+    whole = _region(corners[begins[:-1], None])  # the first triangle of each part
+    ends = np.cumsum([0, *map(len, outlined)])
+    for a, b in itertools.pairwise(ends.tolist()):
+        yield Cover(corners[begins[a] : begins[b]], whole.posts[2 * a : 2 * b])

@@ -199,7 +199,7 @@ def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
     before: Plan | None = None
     for piece in pieces:
         if piece.trims and all(
-            trim.name not in problem.automaton.trim_names
+            trim.name not in problem.automaton
             or np.array_equal(trim.body_velocity, problem.automaton[trim.name].body_velocity)
             for trim in piece.trims
         ):

@@ -418,7 +418,7 @@ def _alternative(stated: AlternativeEntry, problem: Problem) -> Alternative | No
     """A costlier plan of trims; None where it has maneuvers."""
     automaton, rows = problem.automaton, stated["primitives"]
     error = _error(stated["terminal_error"])
-    known = all(one["kind"] == "trim" and one["name"] in automaton.trim_names for one in rows)
+    known = all(one["kind"] == "trim" and one["name"] in automaton for one in rows)
     if not known or error is None:
         return None
     plan = Plan(

@@ -146,7 +146,7 @@ def _questions(problem: Problem) -> Iterator[Problem]:
         if automaton is None:
             continue
         named = [problem.start_trim, *(goal.trim for goal in problem.goals)]
-        if any(name is not None and name not in automaton.trim_names for name in named):
+        if any(name is not None and name not in automaton for name in named):
             continue
         yield replace(
             problem,

@@ -87,7 +87,7 @@ class OverManeuvers(StepSearch):
 
     def leaving(self, piece: Plan) -> FailSafe | None:
         """A fail-safe trajectory from the end of a piece; None if its trim is no trim of here."""
-        if not piece.trims or piece.trims[-1].name not in self.here.automaton.trim_names:
+        if not piece.trims or piece.trims[-1].name not in self.here.automaton:
             return None
         at = piece.start_time + piece.duration
         return self.fail_safe_from(piece.end, at, piece.trims[-1].name)
@@ -145,7 +145,7 @@ class OverManeuvers(StepSearch):
         if self.now.last is None:
             return settled(onward)
         name = self.now.trim.name
-        if name not in onward.automaton.trim_names:
+        if name not in onward.automaton:
             return None  # a plan with trims of its own is driven to its end
         return settled(replace(onward, start_trim=name, start_state=None))
 
@@ -248,7 +248,7 @@ class OverManeuvers(StepSearch):
         begin, automaton = self.now.trim, self.here.automaton
         if begin.is_rest or (self.now.last is None and not self.anew):
             return self._standing(self.settings.step)
-        if automaton.rest is None or begin.name not in automaton.trim_names:
+        if automaton.rest is None or begin.name not in automaton:
             return None
         library = priced_library(automaton, Cost(time=1.0))
         source = automaton.index_of(begin.name)

@@ -126,7 +126,7 @@ def _improved(work: _Work) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
     names = [] if plan is None else [trim.name for trim in plan.trims]
-    if plan is not None and len(names) <= LONGEST and set(names) <= set(automaton.trim_names):
+    if plan is not None and len(names) <= LONGEST and all(map(automaton.__contains__, names)):
         word = np.array([automaton.index_of(name) for name in names], dtype=np.int64)
         if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
             known.append(_in_library(work, word, plan.durations))
@@ -164,7 +164,7 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
     binding = (
         not words or min(words, key=attrgetter("cost")).certificate < -ACCURACY * library.scale
     )
-    if most < LONGEST and binding and not library.free_heading and not task.budget.is_over:
+    if most < LONGEST and binding and not library.tail and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
     if prices_switches(problem.cost) and not task.budget.is_over:
         words += _with_fewer_switches(library, words, task.budget)
@@ -225,7 +225,7 @@ def _with_fewer_switches(
     library: InsertionLibrary, words: Sequence[TimedWord], budget: Budget
 ) -> Iterator[TimedWord]:
     """The words found with fewer and fewer trims: where switches cost, these may pay."""
-    if library.free_heading:
+    if library.tail:
         return
     for word in words[:SHORTENED]:
         longer = word
@@ -259,7 +259,9 @@ def _with_insertions(
 
 def _with_short_runs(library: InsertionLibrary, word: TimedWord) -> TimedWord:
     """The word with its runs of two trims that alternate shortened."""
-    if len(word.trims) - library.tail < RUN:
+    last = len(word.trims) - library.tail - RUN
+    parts = (word.trims[k : k + RUN] for k in range(last + 1))
+    if not any(part[2:] == part[:-2] for part in parts):  # no two that take turns
         return word
     trims, times = _with_room(word)
     size, cost, least = _kernels_insertion.word_with_short_runs(
@@ -345,7 +347,7 @@ def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
     if limit is not None and library.rest is not None and word[-1:] != [library.rest]:
         word.append(library.rest)
         times.append(max(0.0, limit - sum(times)))
-    if library.free_heading:
+    if library.tail:
         turned = float(
             library.problem.twists[word, 2] @ np.array(times)
         )  # the rest is turned at 1 rad/s

@@ -88,6 +88,9 @@ def distinct(
     """
     known: list[Plan] = []
     for word in in_order(words):
+        if most == 1:  # nothing to compare it with
+            yield word
+            return
         if len(known) == most or (known and budget.is_over):
             return
         plan = plan_of(problem, word)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton._kept import RECENT, Prepared, kept_by_first
+from maneuver_automaton._kept import RECENT, Prepared, kept_by_first, kept_with
 from maneuver_automaton.collision import AnyObstacle, Obstacle, Shape, Zone
 from maneuver_automaton.collision.advancement import clearances
 from maneuver_automaton.collision.body import body_of
@@ -79,12 +79,8 @@ def _world(setting: Problem, frame: tuple[float, ...]) -> World:
 
 def _frame(problem: Problem) -> tuple[float, ...]:
     """The frame of the worlds of a problem."""
-    return _frame_on(problem.setting) or tuple(problem.goals[0].pose[:3].tolist())
-
-
-@kept_by_first
-def _frame_on(setting: Problem) -> tuple[float, ...]:
-    return frame_at_first(setting.obstacles)
+    first = kept_with(problem.setting, "frame", lambda: frame_at_first(problem.setting.obstacles))
+    return first or tuple(problem.goals[0].pose[:3].tolist())
 
 
 def worlds_around(

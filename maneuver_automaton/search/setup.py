@@ -139,6 +139,8 @@ class Columns:
     twists: Array  # (M, 4)
     rates: Array  # (M,) that of rest taken off where it pads
     weights: Array  # (M,) 0 for the free turn, which takes no time, otherwise 1
+    number_of: IntArray  # (m,) of the automaton's trims their row here, -1 where there is none
+    scale: float  # size of a typical rate
 
 
 @kept_by_first
@@ -149,7 +151,8 @@ def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
         trims = np.append(trims, library.rest)
         twists = np.vstack([twists, np.zeros(4)])
         rates = np.append(rates - library.rest_rate, 0.0)
-    weights = np.ones(len(trims))
+    weights, number_of = np.ones(len(trims)), np.full(library.of, -1, dtype=np.int64)
+    number_of[trims] = np.arange(len(trims))
     if free_heading:
         trims = np.append(trims, UNUSED)
         twists = np.vstack([twists, [0.0, 0.0, 1.0, 0.0]])
@@ -157,7 +160,12 @@ def columns(library: MovingTrims, *, pads: bool, free_heading: bool) -> Columns:
         weights = np.append(weights, 0.0)
     # kernels are compiled for arrays that can be written
     return Columns(
-        trims=trims, twists=np.array(twists, order="C"), rates=np.array(rates), weights=weights
+        trims=trims,
+        twists=np.array(twists, order="C"),
+        rates=np.array(rates),
+        weights=weights,
+        number_of=number_of,
+        scale=float(np.abs(rates).max(initial=1.0)),
     )
 
 
@@ -172,20 +180,11 @@ class InsertionLibrary:
     number_of: IntArray  # from the automaton's indices to these, -1 where there is none
     problem: TimesProblem  # (M,) trims
     rest: int | None  # its number here
-    free_heading: bool
+    tail: int  # how many turns of a free heading follow every word: 0 or 1
     climbs: bool  # whether the first row is altitude
     n_priced: int  # all but the free turn
     fixed_cost: float  # of the whole fixed time at rest
-
-    @property
-    def tail(self) -> int:
-        """How many turns of a free heading follow every word: 0 or 1."""
-        return int(self.free_heading)
-
-    @property
-    def scale(self) -> float:
-        """Size of a typical rate."""
-        return max(1.0, float(np.abs(self.problem.rates).max()))
+    scale: float  # size of a typical rate
 
     def within_time(self, limit: float) -> InsertionLibrary:
         """The library with a column for unused time, so that words last at most `limit` [s].
@@ -235,30 +234,24 @@ def insertion_library(problem: Problem, setup: SearchSetup) -> InsertionLibrary:
     pads = limit is not None and library.rest is not None
     kept = columns(library, pads=pads, free_heading=setup.free_heading)
     n_priced = len(kept.trims) - int(setup.free_heading)
-    number_of = np.full(len(problem.automaton), -1, dtype=np.int64)
-    number_of[kept.trims[:n_priced]] = np.arange(n_priced)
-    rows, targets = [], []
-    if setup.climbs:
-        rows.append(kept.twists[:, 3])
-        targets.append(float(setup.goal[3]))
-    if limit is not None:
-        rows.append(kept.weights)
-        targets.append(limit)
+    met = [(kept.twists[:, 3], setup.goal[3])] if setup.climbs else []
+    met += [] if limit is None else [(kept.weights, limit)]
     return InsertionLibrary(
         trims=kept.trims,
-        number_of=number_of,
+        number_of=kept.number_of,
         problem=TimesProblem(
             twists=kept.twists,
             rates=kept.rates,
-            rows=np.array(rows).reshape(len(rows), len(kept.rates)),
+            rows=np.array([row for row, _ in met]).reshape(len(met), len(kept.rates)),
             goal=np.array(setup.goal),
-            targets=np.array(targets, dtype=np.float64),
+            targets=np.array([target for _, target in met], dtype=np.float64),
         ),
         rest=len(library.trims) if pads else None,
-        free_heading=setup.free_heading,
+        tail=int(setup.free_heading),
         climbs=setup.climbs,
         n_priced=n_priced,
         fixed_cost=library.rest_rate * limit if pads and limit is not None else 0.0,
+        scale=kept.scale,
     )
 
 
@@ -278,6 +271,7 @@ def with_fewer_digits(setup: SearchSetup) -> SearchSetup:
     x, y, turn, z = setup.goal.tolist()
     size = max(abs(x), abs(y), abs(z), abs(math.remainder(turn, 2.0 * math.pi)), TINY)
     finer = max(0, math.ceil(-math.log10(UNUSUAL * size)))
-    goal = setup.goal.round(DIGITS + finer) + 0.0  # no negative zeros
+    unit = 10.0 ** (DIGITS + finer)
+    goal = np.array([round(value * unit) / unit for value in setup.goal.tolist()])
     rounded = replace(setup, goal=goal)
     return setup if rounded.start_is_goal else rounded

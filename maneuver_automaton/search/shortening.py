@@ -33,7 +33,7 @@ def shortened(library: InsertionLibrary, word: TimedWord, most: int) -> TimedWor
     again; then each trim is exchanged for similar ones as long as that pays. Not for goals with a
     free heading.
     """
-    if library.free_heading:
+    if library.tail:
         return None
     best = _solved(library, word.numbers, word.durations)
     while best is not None and len(best.trims) > most:

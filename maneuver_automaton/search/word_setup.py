@@ -93,6 +93,7 @@ class WordSetup:
             twists=twists,
             rates=arrays.rates[rows] + waiting,
             periods=arrays.periods[rows],
+            of=len(arrays.rates),
             rest=self.pad,
             rest_rate=waiting,
             climbs=bool(climbs),

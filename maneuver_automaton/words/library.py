@@ -359,6 +359,7 @@ class MovingTrims:
     twists: Array  # (M, 4)
     rates: Array  # (M,)
     periods: Array  # (M,) [s] time of a full turn, inf for straights
+    of: int  # how many trims the automaton has
     rest: int | None  # index of the cheapest rest
     rest_rate: float
     climbs: bool
@@ -387,6 +388,7 @@ def moving_trims(automaton: Automaton, cost: StageCost) -> MovingTrims:
         twists=twists[moving],
         rates=rates[moving],
         periods=periods[moving],
+        of=len(automaton),
         rest=int(resting[0]) if resting.size else None,
         rest_rate=float(rates[resting[0]]) if resting.size else 0.0,
         climbs=bool(twists[:, 3].any()),

@@ -172,9 +172,7 @@ def word_of_plan(automaton: Automaton, plan: Plan) -> Word | None:
     numbers = {id(maneuver): k for k, maneuver in enumerate(automaton.maneuvers)}
     between = plan.maneuvers or (None,) * max(0, len(plan.trims) - 1)
     transitions = [SWITCH if one is None else numbers.get(id(one)) for one in between]
-    known = all(
-        trim.name in automaton.trim_names and automaton[trim.name] is trim for trim in plan.trims
-    )
+    known = all(trim.name in automaton and automaton[trim.name] is trim for trim in plan.trims)
     if not known or None in transitions:
         return None
     return Word(
