@@ -22,7 +22,7 @@ from maneuver_automaton.budget import Budget
 from maneuver_automaton.planning.blocked import why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
-from maneuver_automaton.planning.no_way import proven_blocked
+from maneuver_automaton.planning.no_way import free_ends
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
@@ -62,8 +62,9 @@ class WithinTolerance(PlanningStep):
             assert result.plan is not None
             any(found.offer(result.plan, index) for index in _goals_met(problem, result.plan))
 
+        questions, ends_blocked = _questions(problem, budget)
         turns = found.ask(
-            list(_questions(problem)),
+            questions,
             self.answer,
             offer,
             budget=budget.before(LOOSENED_SHARE * budget.seconds),
@@ -82,27 +83,48 @@ class WithinTolerance(PlanningStep):
         exact = results[0]
         if not found.plans:
             late = PlanStatus.OUT_OF_BUDGET, found.why_unchecked
-            ended.why = late if late[1] else _why_none(problem, exact, found.why_refused, budget)
+            ended.why = (
+                late if late[1] else _why_none(problem, exact, found.why_refused, ends_blocked)
+            )
             return
         bound = exact.bound if exact.problem.goals == problem.goals else None
         ended.bound, ended.nodes = ended.bound or bound or formula_bound(problem), exact.nodes
 
 
-def _questions(problem: Problem) -> Iterator[Problem]:
-    """The goals where a plan may end there, then the poses nearest to the start, all others."""
-    if problem.automaton.lattice is not None:
+def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:
+    """The goals where a plan may end there, then the poses nearest to the start, all others.
+
+    Also whether every pose within the tolerances is proven to collide.
+    """
+    lattice = problem.automaton.lattice is not None
+    if lattice:
         nodes = tuple(node for goal in problem.goals for node in aims_within(problem, goal))
-        yield replace(problem, goals=nodes or problem.goals)
-        return
-    aims = list(_aims(problem))
-    exact, beside = tuple(aims[: len(problem.goals)]), tuple(aims[len(problem.goals) :])
+        exact, beside = nodes or problem.goals, tuple[Goal, ...]()
+    else:
+        aims = tuple(_aims(problem))
+        exact, beside = aims[: len(problem.goals)], aims[len(problem.goals) :]
+    blocked, proven = all(why_goal_blocked(problem, goal) for goal in exact), False
+    if blocked and not beside:
+        ends = free_ends(problem, budget)
+        proven = all(end is None for end in ends)
+        beside = () if lattice else tuple(_at_free_ends(problem, ends))
     near, others = beside[:1], beside[1:]
-    blocked = all(why_goal_blocked(problem, goal) for goal in exact)
     asked = [goals for goals in (() if blocked and beside else exact, near, others) if goals]
     most = problem.search.max_expansions
     share = None if most is None else max(1, most // len(asked))
-    for goals in asked:
-        yield replace(problem, goals=goals, search=replace(problem.search, max_expansions=share))
+    search = replace(problem.search, max_expansions=share)
+    return [replace(problem, goals=goals, search=search) for goals in asked], proven
+
+
+def _at_free_ends(problem: Problem, ends: list[Array | None]) -> Iterator[Goal]:
+    """Poses that boxes have found within the tolerances, where all that stands admits them."""
+    for goal, end in zip(
+        problem.goals, ends, strict=False
+    ):  # none are asked for where the time is over
+        if end is not None and math.isfinite(end[0]):
+            pose = np.concatenate([end, goal.pose[3:]])
+            free = _exactly(problem, goal, [pose])
+            yield from (aim for aim in free if not why_goal_blocked(problem, aim))
 
 
 def _aims(problem: Problem) -> Iterator[Goal]:
@@ -206,13 +228,13 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
 
 
 def _why_none(
-    problem: Problem, exact: PlanResult, refused: str, budget: Budget
+    problem: Problem, exact: PlanResult, refused: str, ends_blocked: bool
 ) -> tuple[PlanStatus, str]:
     """The verdict on the poses that were aimed at, as far as it holds for all within tolerance."""
     if refused:
         return PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
     if exact.status is PlanStatus.UNREACHABLE and not why_impossible(problem):
         return PlanStatus.NO_PLAN, exact.reason  # proven for these poses alone
-    if exact.status is PlanStatus.GOAL_BLOCKED and not proven_blocked(problem, budget):
+    if exact.status is PlanStatus.GOAL_BLOCKED and not ends_blocked:
         return PlanStatus.NO_PLAN, f"no free pose was found within the tolerance: {exact.reason}"
     return exact.status, exact.reason
