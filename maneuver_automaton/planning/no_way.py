@@ -87,7 +87,7 @@ def free_ends(problem: Problem, budget: Budget) -> list[Array | None]:
     load_kernels("separation")  # the compiler's time is not the budget's
     deadline = Budget.from_now(left).deadline
     if left < FIRST_BOXES:
-        return [np.full(3, math.nan)]
+        return [np.full(3, math.nan) for _ in problem.goals]
     return [
         free_end(problem, goal, most_boxes=MOST_BOXES, deadline=deadline) for goal in problem.goals
     ]
