@@ -4,13 +4,16 @@ A tree of boxes of poses is refined where a way may be. Boxes that collide throu
 Where the rest does not connect a start to a goal, no plan exists, for any vehicle with this body,
 however it moves; where boxes that are wholly free connect them, a way exists. In between, the boxes
 that are not known to be free are split along the way that leads through as little of them as can
-be, so that work goes where the scene is narrow.
+be, so that work goes
+where the scene is narrow. A long corridor has many such ways beside one another: they are split
+together in the end, since to look for one takes longer than to test its boxes.
 """
 
 from __future__ import annotations
 
 import enum
 import functools
+import itertools
 import math
 import time
 from collections.abc import Callable
@@ -34,6 +37,9 @@ HEADINGS = 8  # of the roots of the tree
 MOST_ROOTS = 4096  # in the plane: a long corridor has as small ones as a room
 FINEST = 2e-4  # [m] smallest side of a box ...
 FINEST_SHARE = 1e-8  # ... or this share of the scene: places are counted by 32 bits
+ALONE = 30  # rounds in which the way through as little as can be is split alone ...
+MANY = 30_000  # ... and boxes until which it is, as rounds among few take no time; later ...
+NEARLY = 1.3  # ... the coarsest boxes of ways that cost so many times as much are split with it
 PRICE = 0.85  # power of its side that a box costs: large ones are split before many small ones
 MOST_BOXES = 1_000_000
 AROUND = np.deg2rad([9.0, 27.0, 45.0, 63.0, 81.0])
@@ -118,7 +124,7 @@ def connectivity(
     ends = (starts, goals, give)
     _kernels_connectivity.judge_roots(scene.arrays, grid, cells, *ends)
     answer, to_start, to_goal = Reachability.OPEN, *np.empty((2, len(cells.level)))
-    while answer is Reachability.OPEN:
+    for turn in itertools.count():
         _kernels_connectivity.spread(grid, cells, used, START, NO_WAY, math.inf, to_start)
         leaf = cells.child[:used] < 0
         least = to_start[:used][leaf & (cells.ends[:used] & GOAL > 0)].min(initial=math.inf)
@@ -126,11 +132,14 @@ def connectivity(
             answer = Reachability.CONNECTED if least == 0.0 else Reachability.SEPARATED
             break
         most = float(least) * (1.0 + 2.0 * ROUNDED)
-        _kernels_connectivity.spread(grid, cells, used, GOAL, to_start, most, to_goal)
+        wide = most * (NEARLY if turn > ALONE and used > MANY else 1.0)
+        _kernels_connectivity.spread(grid, cells, used, GOAL, to_start, wide, to_goal)
         levels = cells.level[:used]
         through = to_start[:used] + to_goal[:used] - grid.price[levels]
         able = leaf & (cells.state[:used] == UNKNOWN) & (levels < len(grid.size) - 1)
-        chosen = np.flatnonzero(able & (through <= most))
+        least_way = able & (through <= most)
+        coarsest = levels <= levels[least_way].min(initial=len(grid.size))
+        chosen = np.flatnonzero(least_way | (able & coarsest & (through <= wide)))
         if not len(chosen) or used + 8 * len(chosen) > len(cells.level):
             break
         used = _kernels_connectivity.split_cells(scene.arrays, grid, cells, chosen, used, *ends)
