@@ -1,8 +1,9 @@
 """Plans that end anywhere within the tolerance of their goal, for every search there is.
 
 A search aims at poses. It is asked for the goal itself and for a few poses within its tolerance:
-towards the start, around, and turned to both sides. The end of what it finds is then let loose: the
-coasting times of its word are solved for once more, and the end must be within the tolerance only.
+towards the start, around, and turned to both sides; where none of these is free, for one that boxes
+of poses show to be. The end of what it finds is then let loose: the coasting times of its word are
+solved for once more, and the end must be within the tolerance only.
 """
 
 from __future__ import annotations
@@ -108,22 +109,20 @@ def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:
     if blocked and not beside:
         ends = free_ends(problem, budget)
         proven = all(end is None for end in ends)
-        beside = () if lattice else tuple(_at_free_ends(problem, ends))
+        shown = [
+            aim
+            for goal, end in zip(problem.goals, ends, strict=True)
+            if end is not None and math.isfinite(end[0])
+            for aim in _exactly(problem, goal, [np.append(end, goal.pose[3:])])
+        ]
+        free = tuple(aim for aim in shown if not why_goal_blocked(problem, aim))
+        beside = () if lattice else free
     near, others = beside[:1], beside[1:]
     asked = [goals for goals in (() if blocked and beside else exact, near, others) if goals]
     most = problem.search.max_expansions
     share = None if most is None else max(1, most // len(asked))
     search = replace(problem.search, max_expansions=share)
     return [replace(problem, goals=goals, search=search) for goals in asked], proven
-
-
-def _at_free_ends(problem: Problem, ends: list[Array | None]) -> Iterator[Goal]:
-    """Poses that boxes have found within the tolerances, where all that stands admits them."""
-    for goal, end in zip(problem.goals, ends, strict=True):
-        if end is not None and math.isfinite(end[0]):
-            pose = np.concatenate([end, goal.pose[3:]])
-            free = _exactly(problem, goal, [pose])
-            yield from (aim for aim in free if not why_goal_blocked(problem, aim))
 
 
 def _aims(problem: Problem, blocked: Sequence[bool]) -> Iterator[Goal]:
