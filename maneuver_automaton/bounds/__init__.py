@@ -11,6 +11,6 @@ from maneuver_automaton.bounds.separation import Reachability as Reachability
 from maneuver_automaton.bounds.separation import Separation as Separation
 from maneuver_automaton.bounds.separation import are_apart as are_apart
 from maneuver_automaton.bounds.separation import connectivity as connectivity
-from maneuver_automaton.bounds.separation import goals_blocked as goals_blocked
+from maneuver_automaton.bounds.separation import free_end as free_end
 from maneuver_automaton.bounds.separation import separation as separation
 from maneuver_automaton.bounds.separation import widest_path as widest_path

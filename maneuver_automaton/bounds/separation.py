@@ -4,15 +4,19 @@ A tree of boxes of poses is refined where a way may be. Boxes that collide throu
 Where the rest does not connect a start to a goal, no plan exists, for any vehicle with this body,
 however it moves; where boxes that are wholly free connect them, a way exists. In between, the boxes
 that are not known to be free are split along the way that leads through as little of them as can
-be, so that work goes where the scene is narrow.
+be, so that work goes
+where the scene is narrow. A long corridor has many such ways beside one another: they are split
+together in the end, since to look for one takes longer than to test its boxes.
 """
 
 from __future__ import annotations
 
 import enum
 import functools
+import itertools
 import math
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,11 +37,18 @@ HEADINGS = 8  # of the roots of the tree
 MOST_ROOTS = 4096  # in the plane: a long corridor has as small ones as a room
 FINEST = 2e-4  # [m] smallest side of a box ...
 FINEST_SHARE = 1e-8  # ... or this share of the scene: places are counted by 32 bits
+ALONE = 30  # rounds in which the way through as little as can be is split alone ...
+MANY = 30_000  # ... and boxes until which it is, as rounds among few take no time; later ...
+NEARLY = 1.3  # ... the coarsest boxes of ways that cost so many times as much are split with it
 PRICE = 0.85  # power of its side that a box costs: large ones are split before many small ones
 MOST_BOXES = 1_000_000
+AROUND = np.deg2rad([9.0, 27.0, 45.0, 63.0, 81.0])
+WITHIN = np.column_stack([np.cos(AROUND), np.sin(AROUND)])  # corners on a circle
+NOWHERE = np.full(3, math.nan)
 NO_WAY = np.zeros(0)  # prices of the other way, where they are not known
 TRIES = 10  # lengths by which obstacles draw back that are tried for the narrowest place ...
 MOST_TRIED = 60_000  # ... each with so many boxes
+MOST_AROUND = 4_000  # ... or so many around a goal alone
 AGREE = 0.08  # share of what is missing to which it is found ...
 CLOSE = 5e-4  # [m] ... or this length
 ROUGHLY = 0.5  # share by which a length that is said may be too large
@@ -113,7 +124,7 @@ def connectivity(
     ends = (starts, goals, give)
     _kernels_connectivity.judge_roots(scene.arrays, grid, cells, *ends)
     answer, to_start, to_goal = Reachability.OPEN, *np.empty((2, len(cells.level)))
-    while answer is Reachability.OPEN:
+    for turn in itertools.count():
         _kernels_connectivity.spread(grid, cells, used, START, NO_WAY, math.inf, to_start)
         leaf = cells.child[:used] < 0
         least = to_start[:used][leaf & (cells.ends[:used] & GOAL > 0)].min(initial=math.inf)
@@ -121,11 +132,14 @@ def connectivity(
             answer = Reachability.CONNECTED if least == 0.0 else Reachability.SEPARATED
             break
         most = float(least) * (1.0 + 2.0 * ROUNDED)
-        _kernels_connectivity.spread(grid, cells, used, GOAL, to_start, most, to_goal)
+        wide = most * (NEARLY if turn > ALONE and used > MANY else 1.0)
+        _kernels_connectivity.spread(grid, cells, used, GOAL, to_start, wide, to_goal)
         levels = cells.level[:used]
         through = to_start[:used] + to_goal[:used] - grid.price[levels]
         able = leaf & (cells.state[:used] == UNKNOWN) & (levels < len(grid.size) - 1)
-        chosen = np.flatnonzero(able & (through <= most))
+        least_way = able & (through <= most)
+        coarsest = levels <= levels[least_way].min(initial=len(grid.size))
+        chosen = np.flatnonzero(least_way | (able & coarsest & (through <= wide)))
         if not len(chosen) or used + 8 * len(chosen) > len(cells.level):
             break
         used = _kernels_connectivity.split_cells(scene.arrays, grid, cells, chosen, used, *ends)
@@ -314,18 +328,29 @@ def widest_path(
     ('connected', True, True)
     """
     scene, start, goals = _asked(problem)
-    ask = functools.partial(connectivity, scene, start, goals, bounds=problem.bounds)
-    found, kept, apart = ask(most_boxes=most_boxes, deadline=deadline), 0.0, first
+    ask = functools.partial(
+        connectivity, scene, start, goals, bounds=problem.bounds, deadline=deadline
+    )
+    wider = functools.partial(ask, price=1.0, most_boxes=MOST_TRIED)
+    found, kept = _widened(ask(most_boxes=most_boxes), wider, first=first, deadline=deadline)
     _proofs(problem).extend([found] if found.answer is Reachability.SEPARATED else [])
+    return found.answer, found.path, kept
+
+
+def _widened(
+    found: Connectivity, ask: Callable[..., Connectivity], *, first: float, deadline: float
+) -> tuple[Connectivity, float]:
+    """Of some connections that are tried the one that keeps farthest from all, and how far [m]."""
+    kept, apart = 0.0, first
     for _ in range(TRIES if found.answer is Reachability.CONNECTED else 0):
         if time.monotonic() > deadline or apart - kept <= ROUGHLY * kept / 2.0:
             break
-        wider = ask(give=-apart, price=1.0, most_boxes=MOST_TRIED, deadline=deadline)
+        wider = ask(give=-apart)
         if wider.answer is Reachability.CONNECTED:
             found, kept, apart = wider, apart, (1.0 + ROUGHLY) * apart
         else:
             apart = 0.5 * (kept + apart)
-    return found.answer, found.path, kept
+    return found, kept
 
 
 def are_apart(problem: Problem, *, most_boxes: int, deadline: float = math.inf) -> bool:
@@ -364,20 +389,41 @@ def _proofs(problem: Problem) -> list[Connectivity]:
     return []
 
 
-def goals_blocked(problem: Problem, *, most_boxes: int, deadline: float = math.inf) -> bool:
-    """Whether every pose at which a plan may end is proven to collide or to be out of bounds.
+def free_end(
+    problem: Problem, goal: Goal, *, most_boxes: int, deadline: float = math.inf
+) -> Array | None:
+    """A pose within the tolerance of a goal, with room around it; None: proven that all collide.
 
-    Of all goals, with their tolerances; the proof rests on what that of `separation` rests on.
+    NaN where neither was found. The proof rests on what that of `separation` rests on, and the pose
+    is free of no more than that.
+
+    Examples
+    --------
+    >>> from maneuver_automaton import Automaton, Box, Unicycle
+    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (0, 1)})
+    >>> near, wall = Goal([4.0, 0.0, 0.0], tolerance_m=0.2), Box([2.0, 8.0], [4.95, 0.0])
+    >>> problem = Problem(robot, [0, 0, 0], near, obstacles=wall, footprint=Box([0.2, 0.2]))
+    >>> 3.8 <= free_end(problem, near, most_boxes=20_000)[0].item() <= 3.85
+    True
     """
     scene = pose_scene(problem)
-    for goal in problem.goals:
-        ends = _box_of(scene, goal)
-        proof = connectivity(
-            scene, ends, ends, bounds=problem.bounds, most_boxes=most_boxes, deadline=deadline
-        )
-        if proof.answer is not Reachability.SEPARATED:
-            return False
-    return True
+    whole = _box_of(scene, goal)
+    within = np.repeat(whole, len(WITHIN), axis=0)
+    within[:, 3:5] *= WITHIN  # rectangles in the disc that is admitted, whose square is `whole`
+    x, y = ((at - goal.tolerance_m, at + goal.tolerance_m) for at in goal.pose[:2].tolist())
+    ask = functools.partial(connectivity, scene, bounds=Bounds(x=x, y=y), deadline=deadline)
+    ends = functools.partial(ask, within, within)
+    wider = functools.partial(ends, price=1.0, most_boxes=MOST_AROUND)
+    found, _ = _widened(ends(most_boxes=most_boxes), wider, first=FIRST, deadline=deadline)
+    if found.answer is not Reachability.CONNECTED:
+        outer = ask(whole, whole, most_boxes=most_boxes)
+        return None if outer.answer is Reachability.SEPARATED else NOWHERE
+    off = scene.world.into(found.path[0]) - whole[0, :3]  # of a box that meets a rectangle
+    off[2] = math.remainder(off[2], 2.0 * math.pi) if scene.turns else 0.0
+    nearest = np.clip(off, -within[:, 3:], within[:, 3:])
+    off = nearest[np.abs(nearest - off)[:, :2].max(axis=1).argmin()]
+    place = SE2(scene.world.frame).act(whole[0, :2] + off[:2])
+    return np.append(place, goal.pose[2] + off[2])
 
 
 def _asked(problem: Problem) -> tuple[PoseScene, Array, Array]:

@@ -25,15 +25,14 @@ from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.planning.blocked import (
     blocked_ends,
     goals_left,
-    proven_free,
     why_goal_blocked,
 )
 from maneuver_automaton.planning.bounds import formula_bound, lattice_bound
 from maneuver_automaton.planning.plan import load, plan_in, prepare
 from maneuver_automaton.planning.result import LowerBound, PlanResult, Workspace
 from maneuver_automaton.planning.steps import uses_lattice
-from maneuver_automaton.planning.within_tolerance import aims_within
-from maneuver_automaton.problem import Goal, Problem, moves
+from maneuver_automaton.planning.within_tolerance import free_aims
+from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
 from maneuver_automaton.refinement.improve import NO_WORD, Patience, WordSchedule, words_of
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
@@ -469,15 +468,12 @@ class FleetMember:
 
     def _within_tolerances(self, among: Problem) -> tuple[tuple[int, Goal], ...]:
         """A few free poses within the tolerance of each goal, with its number."""
-        still = tuple(one for one in among.obstacles if not moves(one))
-        found = list[tuple[int, Goal]]()
-        for k, goal in enumerate(among.goals):
-            if goal.tolerance_m or goal.tolerance_rad:
-                aims = list(aims_within(among, goal))
-                free = proven_free(replace(among, obstacles=still), [one.pose for one in aims])
-                rows = (aim for aim, is_free in zip(aims, free, strict=True) if is_free)
-                found += [(k, aim) for aim in itertools.islice(rows, MOST_AIMS)]
-        return tuple(found)
+        return tuple(
+            (k, aim)
+            for k, goal in enumerate(among.goals)
+            if goal.tolerance_m or goal.tolerance_rad
+            for aim in itertools.islice(free_aims(among, goal), MOST_AIMS)
+        )
 
     def _planned(self, problem: Problem, budget: Budget, *, improve: bool) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""

@@ -34,7 +34,6 @@ from maneuver_automaton.words.library import SWITCH
 RESERVED = 0.1  # share of the time that is left for a proof where there is no plan by then
 MOST_BOXES = 300_000  # of poses that are tested
 SOON_BOXES = 40_000  # ... at first while a search goes on: as a few thousand expansions take
-MOST_AT_GOALS = 100_000  # ... within the tolerance of a goal
 MOST_WORK = 40_000_000  # steps times cells of a proof that plans take too long
 ROUNDING = 1e-6  # relative
 BEYOND = 1.25  # times the longest time: plans that take longer are not looked at
@@ -77,16 +76,21 @@ def with_proof(result: PlanResult, budget: Budget) -> PlanResult:
     )
 
 
-def proven_blocked(problem: Problem, budget: Budget) -> bool:
-    """Whether no plan can end within the tolerance of any goal, as far as the time proves it."""
-    from maneuver_automaton.bounds import goals_blocked
+def free_ends(problem: Problem, budget: Budget) -> list[Array | None]:
+    """For each goal a pose (3,) within its tolerance, as boxes find it in half the time left.
 
-    left = budget.left
-    load_kernels("separation")
+    None where all of them are proven to collide; NaN where neither was found.
+    """
+    from maneuver_automaton.bounds import free_end
+
+    left = SHARE * budget.left
+    load_kernels("separation")  # the compiler's time is not the budget's
     deadline = Budget.from_now(left).deadline
-    return left >= FIRST_BOXES and goals_blocked(
-        problem, most_boxes=MOST_AT_GOALS, deadline=deadline
-    )
+    if left < FIRST_BOXES:
+        return [np.full(3, math.nan) for _ in problem.goals]
+    return [
+        free_end(problem, goal, most_boxes=MOST_BOXES, deadline=deadline) for goal in problem.goals
+    ]
 
 
 def too_long(problem: Problem, budget: Budget) -> str:

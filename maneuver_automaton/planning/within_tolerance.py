@@ -1,15 +1,16 @@
 """Plans that end anywhere within the tolerance of their goal, for every search there is.
 
 A search aims at poses. It is asked for the goal itself and for a few poses within its tolerance:
-towards the start, around, and turned to both sides. The end of what it finds is then let loose: the
-coasting times of its word are solved for once more, and the end must be within the tolerance only.
+towards the start, around, and turned to both sides; where none of these is free, for one that boxes
+of poses show to be. The end of what it finds is then let loose: the coasting times of its word are
+solved for once more, and the end must be within the tolerance only.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,12 +20,12 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.headings import trim_headings
 from maneuver_automaton.automaton.same_motion import CONVERGED
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.planning.blocked import why_goal_blocked
+from maneuver_automaton.planning.blocked import proven_free, why_goal_blocked
 from maneuver_automaton.planning.bounds import formula_bound
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
-from maneuver_automaton.planning.no_way import proven_blocked
+from maneuver_automaton.planning.no_way import free_ends
 from maneuver_automaton.planning.result import Answer, PlanResult, PlanStatus
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Goal, Problem, moves
 from maneuver_automaton.refinement.relaxed_end import with_relaxed_end
 from maneuver_automaton.search.lattice_goals import nodes_within
 from maneuver_automaton.search.limits import why_impossible
@@ -62,8 +63,9 @@ class WithinTolerance(PlanningStep):
             assert result.plan is not None
             any(found.offer(result.plan, index) for index in _goals_met(problem, result.plan))
 
+        questions, ends_blocked = _questions(problem, budget)
         turns = found.ask(
-            list(_questions(problem)),
+            questions,
             self.answer,
             offer,
             budget=budget.before(LOOSENED_SHARE * budget.seconds),
@@ -82,40 +84,69 @@ class WithinTolerance(PlanningStep):
         exact = results[0]
         if not found.plans:
             late = PlanStatus.OUT_OF_BUDGET, found.why_unchecked
-            ended.why = late if late[1] else _why_none(problem, exact, found.why_refused, budget)
+            ended.why = (
+                late if late[1] else _why_none(problem, exact, found.why_refused, ends_blocked)
+            )
             return
         bound = exact.bound if exact.problem.goals == problem.goals else None
         ended.bound, ended.nodes = ended.bound or bound or formula_bound(problem), exact.nodes
 
 
-def _questions(problem: Problem) -> Iterator[Problem]:
-    """The goals where a plan may end there, then the poses nearest to the start, all others."""
-    if problem.automaton.lattice is not None:
+def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:
+    """The goals where a plan may end there, then the poses nearest to the start, all others.
+
+    Also whether every pose within the tolerances is proven to collide.
+    """
+    lattice, proven = problem.automaton.lattice is not None, False
+    if lattice:
         nodes = tuple(node for goal in problem.goals for node in aims_within(problem, goal))
-        yield replace(problem, goals=nodes or problem.goals)
-        return
-    aims = list(_aims(problem))
-    exact, beside = tuple(aims[: len(problem.goals)]), tuple(aims[len(problem.goals) :])
+        exact, beside = nodes or problem.goals, tuple[Goal, ...]()
+        blocked = all(why_goal_blocked(problem, goal) for goal in exact)
+    else:
+        touching = [bool(why_goal_blocked(problem, goal)) for goal in problem.goals]
+        exact, beside = problem.goals, tuple(_aims(problem, touching))
+        blocked = all(touching)
+    if blocked and not beside:
+        ends = free_ends(problem, budget)
+        proven = all(end is None for end in ends)
+        shown = [
+            aim
+            for goal, end in zip(problem.goals, ends, strict=True)
+            if end is not None and math.isfinite(end[0])
+            for aim in _exactly(problem, goal, [np.append(end, goal.pose[3:])])
+        ]
+        free = tuple(aim for aim in shown if not why_goal_blocked(problem, aim))
+        beside = () if lattice else free
     near, others = beside[:1], beside[1:]
-    blocked = all(why_goal_blocked(problem, goal) for goal in exact)
     asked = [goals for goals in (() if blocked and beside else exact, near, others) if goals]
     most = problem.search.max_expansions
     share = None if most is None else max(1, most // len(asked))
-    for goals in asked:
-        yield replace(problem, goals=goals, search=replace(problem.search, max_expansions=share))
+    search = replace(problem.search, max_expansions=share)
+    return [replace(problem, goals=goals, search=search) for goals in asked], proven
 
 
-def _aims(problem: Problem) -> Iterator[Goal]:
-    """The goals themselves, then poses within their tolerances that are aimed at exactly."""
-    yield from problem.goals
-    for goal in problem.goals:
-        if why_goal_blocked(problem, goal):
-            free = (aim for aim in aims_within(problem, goal) if not why_goal_blocked(problem, aim))
-            yield from itertools.islice(free, MOST_AIMS)
+def _aims(problem: Problem, blocked: Sequence[bool]) -> Iterator[Goal]:
+    """Poses within the tolerances of goals that are aimed at exactly."""
+    for goal, is_blocked in zip(problem.goals, blocked, strict=True):
+        if is_blocked:
+            yield from itertools.islice(free_aims(problem, goal), MOST_AIMS)
         else:
             yield from _exactly(
                 problem, goal, _poses_within(goal, problem.start, AROUND, RINGS[:1])
             )
+
+
+def free_aims(problem: Problem, goal: Goal) -> Iterator[Goal]:
+    """Poses within the tolerance of a goal that is blocked itself, clear of all that stands.
+
+    In the plane the kernels look at all of them at once: shapely takes 10 to 50 ms for each.
+    """
+    aims = list(aims_within(problem, goal))
+    if aims and problem.start.size == 3 and not goal.free_heading:
+        still = tuple(one for one in problem.obstacles if not moves(one))
+        free = proven_free(replace(problem, obstacles=still), [aim.pose for aim in aims])
+        aims = [aim for aim, is_free in zip(aims, free, strict=True) if is_free]
+    return (aim for aim in aims if not why_goal_blocked(problem, aim))
 
 
 def aims_within(problem: Problem, goal: Goal) -> Iterator[Goal]:
@@ -206,13 +237,13 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
 
 
 def _why_none(
-    problem: Problem, exact: PlanResult, refused: str, budget: Budget
+    problem: Problem, exact: PlanResult, refused: str, ends_blocked: bool
 ) -> tuple[PlanStatus, str]:
     """The verdict on the poses that were aimed at, as far as it holds for all within tolerance."""
     if refused:
         return PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
     if exact.status is PlanStatus.UNREACHABLE and not why_impossible(problem):
         return PlanStatus.NO_PLAN, exact.reason  # proven for these poses alone
-    if exact.status is PlanStatus.GOAL_BLOCKED and not proven_blocked(problem, budget):
+    if exact.status is PlanStatus.GOAL_BLOCKED and not ends_blocked:
         return PlanStatus.NO_PLAN, f"no free pose was found within the tolerance: {exact.reason}"
     return exact.status, exact.reason

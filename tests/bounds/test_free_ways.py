@@ -1,6 +1,7 @@
 """Scenes with a free way that is known by construction: nothing says that there is none."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from benchmarks.free_ways import drawn, wrong
 from maneuver_automaton import Automaton, Box, Disc, Obstacle, PlanStatus, Problem, Unicycle, plan
 from maneuver_automaton.automaton.library import load_stock_library
-from maneuver_automaton.bounds import goals_blocked, separation
+from maneuver_automaton.bounds import free_end, separation
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import UserModel
 from maneuver_automaton.planning.proving import known_bound
@@ -115,13 +116,16 @@ def test_towers_that_can_be_flown_over_enclose_nothing():
 
 
 def test_a_goal_is_blocked_only_if_all_of_its_tolerance_is():
-    def within(radius):
+    def within(width):
         goal = Goal([5.0, 0.0, 0.0], tolerance_m=1.0, tolerance_rad=0.3)
-        around = [Disc(radius, [5.0, 0.0])]
-        return Problem(ROBOT, [0, 0, 0], goal, obstacles=around, footprint=Disc(0.1))
+        walls = [Box([3.0, 2.0], [5.0, side * (1.0 + 0.5 * width) + 0.43]) for side in (1, -1)]
+        return Problem(ROBOT, [0, 0, 0], goal, obstacles=walls, footprint=Box([0.5, 0.2]))
 
-    assert goals_blocked(within(1.5), most_boxes=50_000)
-    assert not goals_blocked(within(0.8), most_boxes=50_000)
+    closed, slot = within(0.19), within(0.24)  # the body is 0.2 m wide
+    assert free_end(closed, closed.goals[0], most_boxes=50_000) is None
+    assert abs(free_end(slot, slot.goals[0], most_boxes=50_000)[1] - 0.43) < 0.02
+    quick = replace(slot, search=SearchSettings(max_expansions=2000, improve=False))
+    assert plan(quick, time_limit=60.0).status is PlanStatus.FOUND
 
 
 def test_a_goal_that_something_comes_to_later_is_not_left_out():
