@@ -179,12 +179,19 @@ def _short_words(
         angles = np.array([between, h - between]) * np.sign(w[[i, j]])
         angles = np.remainder(angles + NONE, math.tau) - NONE
         times = np.where(turns[[i, j]], angles / np.abs(w[[i, j]]), times)
-    times[~((np.abs(times) > NONE) & (np.abs(times) < np.inf))] = 0.0
+    times[~((np.abs(times) < np.inf) & ((times > 0.0) | (times < -NONE)))] = 0.0
     group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
-    ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
-    off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
-    off[:, 2] = wrapped(off[:, 2])
-    off = np.abs(off).max(axis=1)
+
+    def missed(times: Array) -> Array:
+        """By how much (n,) these words miss the goal, with times (2, n) [m, rad]."""
+        ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
+        off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
+        turned = np.abs(wrapped(off[:, 2]))
+        return np.maximum(turned, np.linalg.norm(np.delete(off, 2, axis=1), axis=1))
+
+    without = np.where(times > NONE, times, 0.0)
+    times = np.where((missed(without) <= MET) & (times >= 0.0), without, times)
+    off = missed(times)
     for k in np.flatnonzero((times >= 0.0).all(axis=0) & (off <= MET)).tolist():
         word = [
             (n, time) for n, time in zip((i[k], j[k]), times[:, k].tolist(), strict=True) if time

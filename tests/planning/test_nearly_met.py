@@ -29,7 +29,8 @@ def near_misses(automaton, seed):
     start = np.array([rng.uniform(-1, 1) * far, rng.uniform(-1, 1) * far, rng.uniform(-3, 3)])
     trims = [trim for trim in automaton.trims if not trim.is_rest]
     word = [rng.choice(trims) for _ in range(rng.choice([0, 0, 1, 2]))]
-    plan = ma.Plan(start, word, durations=[rng.uniform(0.3, 2.5) for _ in word])
+    lasting = [rng.choice([rng.uniform(0.3, 2.5), 10 ** rng.uniform(-9, -8)]) for _ in word]
+    plan = ma.Plan(start, word, durations=lasting)
     size, way, turn = (
         10 ** rng.uniform(-12, -9.05),
         rng.uniform(-math.pi, math.pi),
