@@ -123,11 +123,12 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
             ):
                 plan = Plan(start, first, durations=[0.0] * len(first), start_time=clock)
                 found.append((plan, index))
-        elif not goal.free_heading and len(joined := _joined(problem, goal)) <= MOST_TRIMS:
-            for trims, times in _short_words(problem, goal, joined):
-                switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
-                plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
-                found.append((plan, index))
+        elif len(joined := _joined(problem, goal)) <= MOST_TRIMS:
+            for pose in _poses_met(start, goal, joined):
+                for trims, times in _short_words(problem, pose, joined):
+                    switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
+                    plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
+                    found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
 
 
@@ -146,12 +147,25 @@ def _joined(problem: Problem, goal: Goal) -> list[Trim]:
     ]
 
 
+def _poses_met(start: Array, goal: Goal, trims: list[Trim]) -> list[Array]:
+    """The pose of a goal; of any heading: those of single trims that end beside the start."""
+    if not goal.free_heading:
+        return [goal.pose]
+    distance = float(np.linalg.norm(np.delete(goal.pose - start, 2)))
+    if distance > BESIDE:
+        return []
+    rows = [trim.body_velocity for trim in trims]
+    speeds = [float(np.linalg.norm(np.delete(row, 2))) for row in rows]
+    turns = {distance * row[2] / v for row, v in zip(rows, speeds, strict=True) if v > 0.0}
+    return [np.array([*goal.pose[:2], start[2] + turn, *goal.pose[3:]]) for turn in sorted(turns)]
+
+
 def _short_words(
-    problem: Problem, goal: Goal, trims: list[Trim]
+    problem: Problem, goal: Array, trims: list[Trim]
 ) -> Iterator[tuple[list[Trim], list[float]]]:
     """Words of at most two of these trims that end at a goal but for `MET`, with their times."""
     rows = np.array([trim.body_velocity for trim in trims]).reshape(-1, problem.start.size)
-    way = goal.pose - problem.start
+    way = goal - problem.start
     z, h = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
     last = cmath.rect(1.0, h)
     i, j = np.indices((len(trims), len(trims))).reshape(2, -1)

@@ -53,6 +53,12 @@ def test_what_passes_the_checks_is_found(name):
             assert ma.verify(problem, result.plan).passed, seed
 
 
+@pytest.mark.parametrize("place", [(5e-9, 4e-10), (5e-9, -4e-10), (2e-9, 9e-10)])
+def test_nor_does_a_goal_of_any_heading_cost_a_turn(place):
+    goal = ma.Goal([*place, 0.0], free_heading=True)
+    assert ma.plan(ma.Problem(robot("dubins"), [0, 0, 0], goal)).cost < 1e-8
+
+
 def test_a_moved_problem_has_the_moved_plan():
     problem = ma.Problem(robot("left only"), [0, 0, 0], [2.0, 4e-10, 0])
     moved = problem.moved(ma.SE2([3.0, -1.0, 2.0]))
