@@ -103,13 +103,6 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
 
     An exact end next to that of so short a word may need whole turns, or not exist: then the few
     digits by which coordinates are rounded decide what a plan costs.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> [plan.word for plan, _ in nearly_met(Problem(robot, [0, 0, 0], [2, 1e-10, 0]))]
-    [('ahead',)]
     """
     automaton, found = problem.automaton, list[tuple[Plan, int]]()
     start, clock = problem.start, problem.start_time
@@ -140,23 +133,17 @@ def _joined(problem: Problem, goal: Goal) -> list[Trim]:
     classes = automaton.trim_classes.tolist()
     ends = (problem.first_trim.name, problem.last_trim(goal).name)
     first, last = (classes[automaton.index_of(name)] for name in ends)
-    return [
-        trim
-        for trim, kind in zip(automaton.trims, classes, strict=True)
-        if kind == first == last and not trim.is_rest
-    ]
+    both = zip(automaton.trims, classes, strict=True)
+    return [trim for trim, kind in both if kind == first == last and not trim.is_rest]
 
 
 def _poses_met(start: Array, goal: Goal, trims: list[Trim]) -> list[Array]:
     """The pose of a goal; of any heading: those of single trims that end beside the start."""
     if not goal.free_heading:
         return [goal.pose]
-    distance = float(np.linalg.norm(np.delete(goal.pose - start, 2)))
-    if distance > BESIDE:
-        return []
-    rows = [trim.body_velocity for trim in trims]
-    speeds = [float(np.linalg.norm(np.delete(row, 2))) for row in rows]
-    turns = {distance * row[2] / v for row, v in zip(rows, speeds, strict=True) if v > 0.0}
+    far = math.dist(goal.pose[:2], start[:2])
+    rows = [trim.body_velocity for trim in trims if far <= BESIDE]
+    turns = {far * float(row[2]) / v for row in rows if (v := math.hypot(*row[:2]))}
     return [np.array([*goal.pose[:2], start[2] + turn, *goal.pose[3:]]) for turn in sorted(turns)]
 
 
@@ -195,21 +182,13 @@ def _short_words(
         times = np.where(turns[[i, j]], angles / np.abs(w[[i, j]]), times)
     times[~((np.abs(times) < np.inf) & ((times > 0.0) | (times < -NONE)))] = 0.0
     group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
-
-    def missed(times: Array) -> Array:
-        """By how much (n,) these words miss the goal, with times (2, n) [m, rad]."""
-        ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
-        off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
-        turned = np.abs(wrapped(off[:, 2]))
-        return np.maximum(turned, np.linalg.norm(np.delete(off, 2, axis=1), axis=1))
-
-    without = np.where(times > NONE, times, 0.0)
-    times = np.where((missed(without) <= MET) & (times >= 0.0), without, times)
-    off = missed(times)
+    ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
+    off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
+    turned = np.abs(wrapped(off[:, 2]))
+    off = np.maximum(turned, np.linalg.norm(np.delete(off, 2, axis=1), axis=1))
     for k in np.flatnonzero((times >= 0.0).all(axis=0) & (off <= MET)).tolist():
-        word = [
-            (n, time) for n, time in zip((i[k], j[k]), times[:, k].tolist(), strict=True) if time
-        ]
+        both = zip((i[k], j[k]), times[:, k].tolist(), strict=True)
+        word = [(n, time) for n, time in both if time]
         if (numbers := tuple(int(n) for n, _ in word)) not in seen:
             seen.add(numbers)
             yield [trims[n] for n in numbers], [time for _, time in word]
