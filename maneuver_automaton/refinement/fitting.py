@@ -117,7 +117,13 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
                 plan = Plan(start, first, durations=[0.0] * len(first), start_time=clock)
                 found.append((plan, index))
         elif len(joined := _joined(problem, goal)) <= MOST_TRIMS:
-            for pose in _poses_met(start, goal, joined):
+            poses = [goal.pose]
+            if goal.free_heading:  # those of single trims that end beside the start
+                far = math.dist(goal.pose[:2], start[:2])
+                rows = [trim.body_velocity for trim in joined if far <= BESIDE]
+                turns = {far * float(row[2]) / v for row in rows if (v := math.hypot(*row[:2]))}
+                poses = [np.array([*goal.pose[:2], start[2] + t, *goal.pose[3:]]) for t in turns]
+            for pose in poses:
                 for trims, times in _short_words(problem, pose, joined):
                     switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
                     plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
@@ -135,16 +141,6 @@ def _joined(problem: Problem, goal: Goal) -> list[Trim]:
     first, last = (classes[automaton.index_of(name)] for name in ends)
     both = zip(automaton.trims, classes, strict=True)
     return [trim for trim, kind in both if kind == first == last and not trim.is_rest]
-
-
-def _poses_met(start: Array, goal: Goal, trims: list[Trim]) -> list[Array]:
-    """The pose of a goal; of any heading: those of single trims that end beside the start."""
-    if not goal.free_heading:
-        return [goal.pose]
-    far = math.dist(goal.pose[:2], start[:2])
-    rows = [trim.body_velocity for trim in trims if far <= BESIDE]
-    turns = {far * float(row[2]) / v for row in rows if (v := math.hypot(*row[:2]))}
-    return [np.array([*goal.pose[:2], start[2] + turn, *goal.pose[3:]]) for turn in sorted(turns)]
 
 
 def _short_words(
