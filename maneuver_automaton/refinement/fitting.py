@@ -116,11 +116,18 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
             ):
                 plan = Plan(start, first, durations=[0.0] * len(first), start_time=clock)
                 found.append((plan, index))
-        elif not goal.free_heading and len(joined := _joined(problem, goal)) <= MOST_TRIMS:
-            for trims, times in _short_words(problem, goal, joined):
-                switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
-                plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
-                found.append((plan, index))
+        elif len(joined := _joined(problem, goal)) <= MOST_TRIMS:
+            poses = [goal.pose]
+            if goal.free_heading:  # those of single trims that end beside the start
+                far = math.dist(goal.pose[:2], start[:2])
+                rows = [trim.body_velocity for trim in joined if far <= BESIDE]
+                turns = {far * float(row[2]) / v for row in rows if (v := math.hypot(*row[:2]))}
+                poses = [np.array([*goal.pose[:2], start[2] + t, *goal.pose[3:]]) for t in turns]
+            for pose in poses:
+                for trims, times in _short_words(problem, pose, joined):
+                    switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
+                    plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
+                    found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
 
 
@@ -132,19 +139,16 @@ def _joined(problem: Problem, goal: Goal) -> list[Trim]:
     classes = automaton.trim_classes.tolist()
     ends = (problem.first_trim.name, problem.last_trim(goal).name)
     first, last = (classes[automaton.index_of(name)] for name in ends)
-    return [
-        trim
-        for trim, kind in zip(automaton.trims, classes, strict=True)
-        if kind == first == last and not trim.is_rest
-    ]
+    both = zip(automaton.trims, classes, strict=True)
+    return [trim for trim, kind in both if kind == first == last and not trim.is_rest]
 
 
 def _short_words(
-    problem: Problem, goal: Goal, trims: list[Trim]
+    problem: Problem, goal: Array, trims: list[Trim]
 ) -> Iterator[tuple[list[Trim], list[float]]]:
     """Words of at most two of these trims that end at a goal but for `MET`, with their times."""
     rows = np.array([trim.body_velocity for trim in trims]).reshape(-1, problem.start.size)
-    way = goal.pose - problem.start
+    way = goal - problem.start
     z, h = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
     last = cmath.rect(1.0, h)
     i, j = np.indices((len(trims), len(trims))).reshape(2, -1)
@@ -172,16 +176,15 @@ def _short_words(
         angles = np.array([between, h - between]) * np.sign(w[[i, j]])
         angles = np.remainder(angles + NONE, math.tau) - NONE
         times = np.where(turns[[i, j]], angles / np.abs(w[[i, j]]), times)
-    times[~((np.abs(times) > NONE) & (np.abs(times) < np.inf))] = 0.0
+    times[~((np.abs(times) < np.inf) & ((times > 0.0) | (times < -NONE)))] = 0.0
     group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
     ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
     off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
-    off[:, 2] = wrapped(off[:, 2])
-    off = np.abs(off).max(axis=1)
+    turned = np.abs(wrapped(off[:, 2]))
+    off = np.maximum(turned, np.linalg.norm(np.delete(off, 2, axis=1), axis=1))
     for k in np.flatnonzero((times >= 0.0).all(axis=0) & (off <= MET)).tolist():
-        word = [
-            (n, time) for n, time in zip((i[k], j[k]), times[:, k].tolist(), strict=True) if time
-        ]
+        both = zip((i[k], j[k]), times[:, k].tolist(), strict=True)
+        word = [(n, time) for n, time in both if time]
         if (numbers := tuple(int(n) for n, _ in word)) not in seen:
             seen.add(numbers)
             yield [trims[n] for n in numbers], [time for _, time in word]

@@ -29,7 +29,8 @@ def near_misses(automaton, seed):
     start = np.array([rng.uniform(-1, 1) * far, rng.uniform(-1, 1) * far, rng.uniform(-3, 3)])
     trims = [trim for trim in automaton.trims if not trim.is_rest]
     word = [rng.choice(trims) for _ in range(rng.choice([0, 0, 1, 2]))]
-    plan = ma.Plan(start, word, durations=[rng.uniform(0.3, 2.5) for _ in word])
+    lasting = [rng.choice([rng.uniform(0.3, 2.5), 10 ** rng.uniform(-9, -8)]) for _ in word]
+    plan = ma.Plan(start, word, durations=lasting)
     size, way, turn = (
         10 ** rng.uniform(-12, -9.05),
         rng.uniform(-math.pi, math.pi),
@@ -50,6 +51,12 @@ def test_what_passes_the_checks_is_found(name):
             assert result.cost is not None, seed
             assert result.cost <= known.duration + 1e-6, seed
             assert ma.verify(problem, result.plan).passed, seed
+
+
+@pytest.mark.parametrize("place", [(5e-9, 4e-10), (5e-9, -4e-10), (2e-9, 9e-10)])
+def test_nor_does_a_goal_of_any_heading_cost_a_turn(place):
+    goal = ma.Goal([*place, 0.0], free_heading=True)
+    assert ma.plan(ma.Problem(robot("dubins"), [0, 0, 0], goal)).cost < 1e-8
 
 
 def test_a_moved_problem_has_the_moved_plan():
