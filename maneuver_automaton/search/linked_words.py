@@ -185,7 +185,7 @@ def _headings(problem: Problem, goal: Goal) -> Array:
     """Headings at the goal that are steered to: where any will do, seeds from the start's on."""
     if not goal.free_heading:
         return goal.pose[2:3]
-    return problem.start[2] + np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False)
+    return np.linspace(0.0, 2.0 * np.pi, HEADINGS, endpoint=False) + float(problem.start[2])
 
 
 def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[TimedWord]:
