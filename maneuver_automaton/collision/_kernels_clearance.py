@@ -241,12 +241,16 @@ def near_clearance(
     c: float,
     s: float,
     near: float,
+    most: float,
 ) -> float:
-    """Clearance to the solids near the body, exact below `near`; at most the buckets' reach."""
+    """Clearance to the solids near the body, exact below `near`; at most the buckets' reach.
+
+    What is not nearer than `most` is not looked at.
+    """
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     # A solid in no list of this cell is at least that far away from a body whose middle is here.
-    best = buckets.reach
+    best = min(buckets.reach, most)
     i = math.floor((m_x - buckets.origin_x) / buckets.cell)
     j = math.floor((m_y - buckets.origin_y) / buckets.cell)
     if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
@@ -463,6 +467,6 @@ def static_clearance(
     near = max(NEAR * body.reach, 0.25 * world.field.cell)
     bound = field_bound(world.field, body, x, y, c, s)
     if bound <= near:
-        exact = near_clearance(world.buckets, world.solids, body, x, y, c, s, near)
+        exact = near_clearance(world.buckets, world.solids, body, x, y, c, s, near, math.inf)
         bound = exact if exact <= 0.0 else max(bound, exact)
     return bound

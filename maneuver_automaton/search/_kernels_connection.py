@@ -178,9 +178,18 @@ def connection_free(
 
 @bare_inner_kernel
 def connection_place(
-    scene: Scene, lib: LatticeArrays, joint: Joint, word: IntArray, climb: int, times: Array
+    scene: Scene,
+    lib: LatticeArrays,
+    joint: Joint,
+    word: IntArray,
+    climb: int,
+    times: Array,
+    enough: float,
 ) -> float:
-    """Price of the places along a connection, its transitions included, as `connection_free`."""
+    """Price of the places along a connection, its transitions included, as `connection_free`.
+
+    Of a part of it, where that costs `enough` already.
+    """
     pose, before, total = joint.pose, joint.before, 0.0
     for n in range(5):
         trim, t = joint.after, 0.0
@@ -198,6 +207,8 @@ def connection_place(
             at = class_of(lib.library, lib.edges.target[edge])
         before = trim
         total += coast_place(scene, lib, trim, pose, t)
+        if total >= enough:
+            break
         pose = coasted(lib, trim, pose, t)
     return total
 
@@ -230,12 +241,13 @@ def free_candidate(
             break
         word = words[scratch.rows[which]]
         climb, times = scratch.climbs[which], scratch.times[which]
-        if priced:
-            best += connection_place(scene, lib, joint, word, climb, times)
-        if best < whole and connection_free(scene, lib, joint, word, climb, times):
-            whole, found = best, which
+        # Most that are not free meet something soon: that is known before their price is.
+        if connection_free(scene, lib, joint, word, climb, times):
             if not priced:
-                return found
+                return which
+            best += connection_place(scene, lib, joint, word, climb, times, whole - best)
+            if best < whole:
+                whole, found = best, which
         scratch.costs[which] = math.inf
     if found >= 0:
         scratch.costs[found] = whole

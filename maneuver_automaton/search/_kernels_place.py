@@ -46,8 +46,8 @@ def distance_within(
     if field_bound(world.field, body, x, y, c, s) >= within:
         return within
     # Corners are looked at where a clearance is below `SHARP` times the last argument.
-    near = near_clearance(world.buckets, world.solids, body, x, y, c, s, within / SHARP)
-    return max(min(near, within), 0.0)
+    sharp = within / SHARP
+    return max(near_clearance(world.buckets, world.solids, body, x, y, c, s, sharp, within), 0.0)
 
 
 @bare_inner_kernel
