@@ -193,12 +193,16 @@ class Situation:
         if said:
             raise ValueError(f"receding horizon: first: {said}")
         for index, goal in enumerate(here.goals):
-            if missed(plan, goal) <= EXACT * self.size:
+            if self._leads_to(goal, plan):
                 return self.candidate(plan, index, Origin.FIRST)
         raise ValueError(
             f"receding horizon: first ends at {plan.end.round(9).tolist()}, need a plan that ends "
             "at the goal"
         )
+
+    def _leads_to(self, goal: Goal, plan: Plan) -> bool:
+        """Whether a plan ends at a goal: where it is, or anywhere within its tolerances."""
+        return missed(plan, goal) <= EXACT * self.size or within(plan.end, goal)
 
     @property
     def longest(self) -> float | None:
@@ -250,8 +254,7 @@ class Situation:
             return
         here, goal = self.here, self.here.goals[self.last.goal_index]
         pad, under_way = self.settings.pad_of(here), self.busy > 0.0
-        leads = missed(self.rest, goal) <= EXACT * self.size or within(self.rest.end, goal)
-        if self.off_plan == 0.0 and leads:
+        if self.off_plan == 0.0 and self._leads_to(goal, self.rest):
             if self.settings.margin:
                 again = same_word(here, self.rest, goal, pad=pad, under_way=under_way)
                 if again is not None and here.cost_of(again) < here.cost_of(self.rest):

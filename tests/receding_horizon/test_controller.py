@@ -129,6 +129,13 @@ class TestWrongInput:
         with pytest.raises(ValueError, match=r"first ends at \[-1.0, 0.0, 0.0\], need a plan"):
             controller(problem, first=first).step(problem.start)
 
+    def test_a_first_plan_may_end_within_the_tolerance(self):
+        problem = straight()
+        goal = replace(problem.goals[0], tolerance_m=0.1)
+        first = Plan(problem.start, (problem.automaton.trims[1],), durations=[1.95])
+        loop = controller(replace(problem, goals=(goal,)), first=first)
+        assert loop.step(problem.start)[1].plan.durations[0] == 1.95
+
     def test_a_first_plan_that_takes_too_long(self):
         problem = straight(horizon=Horizon(time=1.5))
         first = Plan(problem.start, (problem.automaton.trims[1],), durations=[2.0])
