@@ -4,9 +4,9 @@ A tree of boxes of poses is refined where a way may be. Boxes that collide throu
 Where the rest does not connect a start to a goal, no plan exists, for any vehicle with this body,
 however it moves; where boxes that are wholly free connect them, a way exists. In between, the boxes
 that are not known to be free are split along the way that leads through as little of them as can
-be, so that work goes
-where the scene is narrow. A long corridor has many such ways beside one another: they are split
-together in the end, since to look for one takes longer than to test its boxes.
+be, so that work goes where the scene is narrow. A long corridor has many such ways beside one
+another: they are split together in the end, since to look for one takes longer than to test its
+boxes.
 """
 
 from __future__ import annotations
@@ -410,8 +410,14 @@ def free_end(
     whole = _box_of(scene, goal)
     within = np.repeat(whole, len(WITHIN), axis=0)
     within[:, 3:5] *= WITHIN  # rectangles in the disc that is admitted, whose square is `whole`
-    x, y = ((at - goal.tolerance_m, at + goal.tolerance_m) for at in goal.pose[:2].tolist())
-    ask = functools.partial(connectivity, scene, bounds=Bounds(x=x, y=y), deadline=deadline)
+    sides = []
+    for at, own in zip(goal.pose[:2].tolist(), (problem.bounds.x, problem.bounds.y), strict=True):
+        low, high = own or (-math.inf, math.inf)
+        sides.append((max(low, at - goal.tolerance_m), min(high, at + goal.tolerance_m)))
+        if sides[-1][0] >= sides[-1][1]:
+            return NOWHERE
+    around = Bounds(x=sides[0], y=sides[1])
+    ask = functools.partial(connectivity, scene, bounds=around, deadline=deadline)
     ends = functools.partial(ask, within, within)
     wider = functools.partial(ends, price=1.0, most_boxes=MOST_AROUND)
     found, _ = _widened(ends(most_boxes=most_boxes), wider, first=FIRST, deadline=deadline)

@@ -124,6 +124,8 @@ def test_a_goal_is_blocked_only_if_all_of_its_tolerance_is():
     closed, slot = within(0.19), within(0.24)  # the body is 0.2 m wide
     assert free_end(closed, closed.goals[0], most_boxes=50_000) is None
     assert abs(free_end(slot, slot.goals[0], most_boxes=50_000)[1] - 0.43) < 0.02
+    beside = replace(slot, bounds=Bounds(y=(-9.0, 0.3)))  # which the slot is not in
+    assert free_end(beside, beside.goals[0], most_boxes=50_000) is None
     quick = replace(slot, search=SearchSettings(max_expansions=2000, improve=False))
     assert plan(quick, time_limit=60.0).status is PlanStatus.FOUND
 
