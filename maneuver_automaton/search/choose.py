@@ -11,10 +11,14 @@ and the answer in common.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Automaton, Plan
@@ -22,10 +26,13 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.free_insertion import free_stages
 from maneuver_automaton.search.linked_insertion import linked_stages
-from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus
+from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
+from maneuver_automaton.search.setup import SearchSetup, few_of, search_setup
 from maneuver_automaton.search.word_scan import MOST_TRIMS, tables
-from maneuver_automaton.search.words import search_words
+from maneuver_automaton.search.words import resting, search_words
+from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.library import moving_trims
+from maneuver_automaton.words.word import Word
 
 AFFORDABLE = 2.0  # [s] an exhaustive search may be expected to take when the method is `auto`
 SHORT = 4  # trims of words that are a second opinion
@@ -36,7 +43,7 @@ SECONDS_PER_WORD = (0.0, 1e-6, 1e-6, 1e-6, 5e-5)  # by moving trims, measured, g
 def load_search(problem: Problem) -> None:
     """Compile or load what the search will need: that does not count as searching."""
     if problem.horizon.min_coast > 0.0:
-        load_kernels("words")
+        load_kernels("times")
         return
     affordable = all(_affordable(problem, goal) for goal in problem.goals)
     if problem.search.method == "words" or (problem.search.method == "auto" and affordable):
@@ -68,8 +75,9 @@ def search_goal(
     as cheap (it may find nothing), and insertion improves it beside its own seeds; `second_opinion`
     [s] is what exhaustive search of short words may be expected to take beside insertion.
     """
-    lasting = problem.horizon.min_coast > 0.0  # trims that last a while: words as with maneuvers
-    method = "insertion" if lasting else problem.search.method
+    method = problem.search.method
+    if problem.horizon.min_coast > 0.0:
+        return [search_with_least_times(problem, goal, alternatives=alternatives, budget=budget)]
     upper_bound = math.inf
     if known is not None:
         upper_bound = problem.cost_of(known) if known_cost is None else known_cost
@@ -131,6 +139,99 @@ def _affordable(problem: Problem, goal: Goal) -> bool:
     words = sum(moving * (moving - 1) ** n for n in range(most))
     quick = _seconds(problem.automaton, most, int(goal.free_heading)) <= AFFORDABLE
     return quick and (limit is None or words <= limit)
+
+
+MOST_LASTING = 4  # moving trims of a word
+RESTARTS = 3  # starts of each word beside the first
+
+
+def search_with_least_times(
+    problem: Problem, goal: Goal, *, alternatives: int | None = 0, budget: Budget = UNLIMITED
+) -> SearchResult:
+    """Words in which every moving trim lasts at least ``horizon.min_coast``.
+
+    The least time of each trim gives a fixed displacement after it; the time beyond is solved for.
+    Each word is solved from several starts, so solutions may be missed. Of a large library only the
+    trims that reach far are combined.
+    """
+    setup = search_setup(problem, goal)
+    if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
+        return resting(problem, setup)
+    padded = problem.horizon.time is not None and setup.library.rest is not None
+    most = min(problem.horizon.max_trims or MOST_LASTING + 1, MOST_LASTING + int(padded))
+    found: list[Word] = []
+    words = 0
+    status = SearchStatus.EXHAUSTED
+    reaching = np.flatnonzero(np.isin(setup.library.trims, few_of(setup.library).trims)).tolist()
+    for word in _words(reaching, most):
+        if budget.is_over or words == problem.search.max_expansions:
+            status = SearchStatus.OUT_OF_BUDGET
+            break
+        words += 1
+        for rest in (False, True) if padded else (False,):
+            if len(word) + rest <= most:
+                found += _solved(problem, setup, word, rest=rest)
+    solutions = tuple(in_order(found))
+    if alternatives is not None:
+        solutions = solutions[: alternatives + 1]
+    return SearchResult(
+        status=SearchStatus.FOUND if solutions else status,
+        solutions=solutions,
+        complete=False,
+        counts={"expansions": words},
+    )
+
+
+def _words(trims: list[int], most: int) -> Iterator[tuple[int, ...]]:
+    """Words of these trims without equal neighbours, shorter ones first."""
+    for n in range(1, most + 1):
+        for word in itertools.product(trims, repeat=n):
+            if all(a != b for a, b in itertools.pairwise(word)):
+                yield word
+
+
+def _solved(
+    problem: Problem, setup: SearchSetup, word: tuple[int, ...], *, rest: bool
+) -> list[Word]:
+    """The word with its best times, if it reaches the goal."""
+    rows = list(word)
+    least = problem.horizon.min_coast
+    twists, rates = setup.library.twists[rows], setup.library.rates[rows]
+    floors = np.full(len(rows), least)
+    trims = setup.library.trims[rows]
+    if rest and setup.library.rest is not None:
+        twists = np.vstack([twists, np.zeros(4)])
+        rates = np.append(rates, setup.library.rest_rate)
+        floors = np.append(floors, 0.0)
+        trims = np.append(trims, setup.library.rest)
+    longest = problem.horizon.max_time
+    # Where the cheapest times are too long, the greatest time binds: it becomes a fixed one.
+    for total in (problem.horizon.time,) if longest is None else (None, longest):
+        solved = solve_switching_times(
+            twists,
+            rates,
+            setup.goal,
+            total=total,
+            free_heading=setup.free_heading,
+            least=floors,
+            restarts=RESTARTS,
+        )
+        if solved.status is TimesStatus.FAILED:
+            return []
+        if longest is None or solved.durations.sum() <= longest + 1e-9:
+            break
+    times = solved.durations
+    if longest is not None and times.sum() > longest + 1e-9:
+        return []
+    if rest and times[-1] <= 1e-9:
+        return []  # the same word without rest is tried too
+    return [_priced(problem, Word(trims=trims, durations=times, cost=0.0), rates)]
+
+
+def _priced(problem: Problem, solution: Word, rates: Array) -> Word:
+    velocities = problem.automaton.body_velocities[solution.trims]
+    cost = float(rates @ solution.durations) + problem.cost.switching(velocities)
+    return replace(solution, cost=cost)
 
 
 def search_insertion(

@@ -286,11 +286,8 @@ def word_setup(
     `steers`, the library lists the words to be steered along.
     """
     automaton = problem.automaton
-    if automaton.is_kinematic:  # any trim will do
-        start_trim = goal_trim = automaton.rest or 0
-    else:
-        start_trim = automaton.index_of(problem.first_trim.name)
-        goal_trim = automaton.index_of(problem.last_trim(goal).name)
+    start_trim = automaton.index_of(problem.first_trim.name)
+    goal_trim = automaton.index_of(problem.last_trim(goal).name)
     wanted = tuple(sorted({start_trim, goal_trim, *also}))
     useful = trims_between(automaton, start_trim, [goal_trim])
     kept = None if len(useful) == len(automaton) else tuple(useful.tolist())
