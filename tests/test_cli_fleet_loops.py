@@ -24,7 +24,7 @@ NEAR = "tolerance_m: 0.05, tolerance_rad: 0.05}"
 LOOP = (
     FLEET.replace("goal: {pose: [4, 0, 0]}", "goal: {pose: [4, 0, 0], " + NEAR)
     .replace("goal: {pose: [0.0, 2.0, 1.5]}", "goal: {pose: [0.0, 2.0, 1.5], " + NEAR)
-    .replace("time_limit_s: 1}", "time_limit_s: 0.5}")
+    .replace("time_limit_s: 1}", "time_limit_s: 60}")
     + "receding_horizon: {step_s: 0.5, disturbance: {position_m: 0.003, seed: 3}}\n"
 )
 
