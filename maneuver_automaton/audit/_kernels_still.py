@@ -47,7 +47,7 @@ class Ways(NamedTuple):
     offset: complex  # [m] from the origin of the edges to that of the frames
 
 
-class Found(NamedTuple):
+class StillClearance(NamedTuple):
     """The least clearance."""
 
     distance: float  # [m] no instant has less
@@ -57,7 +57,7 @@ class Found(NamedTuple):
     touches: bool  # a chord touches an edge: nothing else is known
 
 
-class _Near(NamedTuple):
+class _Bounds(NamedTuple):
     """What is known of a stretch and an edge."""
 
     least: float  # [m] the clearance is never less
@@ -94,7 +94,7 @@ def _near(
     then: complex,
     turned: complex,
     doubt: float,
-) -> _Near:
+) -> _Bounds:
     """What is known of an edge, while the frame moves from a place to another in `lasting` [s]."""
     eighth = 0.125 * lasting * lasting
     off, off_by_reach = eighth * ways.bend[element], eighth * ways.swerve[element]
@@ -120,7 +120,7 @@ def _near(
     size = max(max(abs(place.real), abs(place.imag)), max(abs(then.real), abs(then.imag)))
     size = max(size, max(abs(a.real), abs(a.imag)))
     least -= doubt + ROUNDING * size
-    return _Near(max(least, 0.0), max(begin, 0.0), max(end, 0.0), chord)
+    return _Bounds(max(least, 0.0), max(begin, 0.0), max(end, 0.0), chord)
 
 
 @inner_kernel
@@ -142,7 +142,7 @@ def _nearest(
     doubt: float,
     enough: float,
     contact: float,
-) -> Found:
+) -> StillClearance:
     """The least clearance over pairs of stretches and edges, by number.
 
     Places (2, s) and directions of the body are those as stretches begin and end.
@@ -185,7 +185,7 @@ def _nearest(
                 at, towards, places[top], turns[top], doubt,
             )  # fmt: skip
             if near.chord <= 0.0:
-                return Found(0.0, 0.0, here, now, True)
+                return StillClearance(0.0, 0.0, here, now, True)
             if near.begin < measured:
                 measured, where, share = near.begin, here, now
             if near.end < measured:
@@ -207,7 +207,7 @@ def _nearest(
                 floor = min(floor, near.least)
                 now, at, towards = ends[top], places[top], turns[top]
                 waiting -= 1
-    return Found(min(floor, measured), measured, where, share, False)
+    return StillClearance(min(floor, measured), measured, where, share, False)
 
 
 @inner_kernel
@@ -259,7 +259,7 @@ def nearest_still(
     doubt: float,
     enough: float,
     contact: float,
-) -> Found:
+) -> StillClearance:
     """The least clearance of a body over stretches of time to edges, of which there is one.
 
     ``doubt`` [m] is taken off all bounds, ``enough`` is the clearance that decides, and what is
@@ -287,7 +287,7 @@ def nearest_still(
                 _grow(boxes[s], at, pad)
                 _grow(own[s], (at - place[0, s]) * back, pad)
     if _overlaps(body, place[0, 0], turn[0, 0], edges, index):
-        return Found(0.0, 0.0, 0, 0.0, True)
+        return StillClearance(0.0, 0.0, 0, 0.0, True)
     # Further and further away, until a distance is measured within which none is left out.
     met = np.empty(index.number.size, dtype=np.int64)
     within = FIRST_WITHIN * body.size + SPARE
@@ -321,4 +321,4 @@ def nearest_still(
         if found.touches or found.measured <= within:
             return found
         within = found.measured
-    return Found(0.0, 0.0, 0, 0.0, True)
+    return StillClearance(0.0, 0.0, 0, 0.0, True)

@@ -146,7 +146,7 @@ def _in_closed_form(
         yield tuple(one for one in both if may_drive(model, one))
 
 
-class _Known:
+class _ModelKey:
     """A model as a key of a cache, which holds it: by what it is, or itself if it has no hash."""
 
     def __init__(self, model: Model) -> None:
@@ -160,20 +160,20 @@ class _Known:
         return self._key[1]
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Known) and self._key == other._key
+        return isinstance(other, _ModelKey) and self._key == other._key
 
 
 def _limited(model: Model) -> bool:
-    return _is_limited(_Known(model))
+    return _is_limited(_ModelKey(model))
 
 
 @functools.lru_cache(maxsize=MODELS)
-def _is_limited(known: _Known) -> bool:
+def _is_limited(known: _ModelKey) -> bool:
     return has_limited_rates(known.model)
 
 
 @functools.lru_cache(maxsize=MODELS)
-def _program_of(known: _Known) -> TransferProgram:
+def _program_of(known: _ModelKey) -> TransferProgram:
     """The program of short maneuvers of a model, written down once."""
     return transfer_program(known.model, settings=FEW)
 
@@ -183,7 +183,7 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
     start, end = source.reduced_state, target.reduced_state
     for factor, swing in GUESSES:
         found = solve_transfer(
-            _program_of(_Known(model)),
+            _program_of(_ModelKey(model)),
             start=start,
             end=end,
             controls=np.stack([target.control, target.control]),
@@ -213,4 +213,4 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
 def prepare_maneuvers(model: Model) -> None:
     """Have the program of a model ready, before a clock runs."""
     if not (isinstance(model, CarWithTrailer) or _limited(model)):
-        _program_of(_Known(model))
+        _program_of(_ModelKey(model))

@@ -73,7 +73,7 @@ def free_stages(task: InsertionTask) -> Iterator[SearchResult]:
     found = BestWords(problem, task.alternatives + 1, task.budget)
     exact, setup = setup.goal, with_fewer_digits(setup)
     seeds = _usual_seeds(task, setup) if task.seeds is None else task.seeds
-    work = _Work(problem, setup, insertion_library(problem, setup), exact, task, seeds)
+    work = _Insertion(problem, setup, insertion_library(problem, setup), exact, task, seeds)
     most_time = problem.horizon.max_time
     free = _improved(work)
     latest = math.inf if most_time is None else most_time + LATE
@@ -99,7 +99,7 @@ def _usual_seeds(task: InsertionTask, setup: SearchSetup) -> int:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Work:
+class _Insertion:
     """One search by insertion: for what, and with which library."""
 
     problem: Problem
@@ -122,7 +122,7 @@ class _Work:
         return LONGEST if most is None else min(most + int(self.limit is not None), LONGEST)
 
 
-def _improved(work: _Work) -> SearchResult:
+def _improved(work: _Insertion) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
     names = [] if plan is None else [trim.name for trim in plan.trims]
@@ -141,7 +141,7 @@ def _improved(work: _Work) -> SearchResult:
     return _improved_from(work, [*known, *seeds])
 
 
-def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
+def _improved_from(work: _Insertion, begun: list[TimedWord]) -> SearchResult:
     """Solutions of some words and of what insertion makes of them, each word once."""
     problem, library, task, most = work.problem, work.library, work.task, work.most
     many = len(work.setup.library.trims) > FEW
@@ -179,13 +179,13 @@ def _improved_from(work: _Work, begun: list[TimedWord]) -> SearchResult:
     )
 
 
-def _fitting(work: _Work, rounds: int) -> int:
+def _fitting(work: _Insertion, rounds: int) -> int:
     """As many of some rounds of insertion as fit into the time left, at least one."""
     fits = work.task.budget.left / (SECONDS_A_ROUND * len(work.library.problem.rates))
     return max(1, int(min(rounds, fits)))
 
 
-def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
+def _closed(work: _Insertion, words: Sequence[TimedWord]) -> list[Word]:
     """Solutions of words; where one is asked for, or the time is over, no costlier ones."""
     budget = work.task.budget
     in_turn = work.task.alternatives == 0 and not prices_switches(work.problem.cost)
@@ -203,7 +203,7 @@ def _closed(work: _Work, words: Sequence[TimedWord]) -> list[Word]:
 
 
 def _from_longer(
-    work: _Work, begun: list[TimedWord], counts: dict[str, int]
+    work: _Insertion, begun: list[TimedWord], counts: dict[str, int]
 ) -> Iterator[TimedWord]:
     """The word of the cheapest seed that may grow first, and is shortened afterwards."""
     library, most, grown = work.library, work.most, []
@@ -283,7 +283,7 @@ def _with_room(word: TimedWord) -> tuple[IntArray, Array]:
     return trims, times
 
 
-def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
+def _solutions(work: _Insertion, word: TimedWord) -> Iterator[Word]:
     """The solution from a word under work, closed at the exact goal; none if it cannot be."""
     problem, library = work.problem, work.library
     numbers = word.numbers
@@ -304,7 +304,7 @@ def _solutions(work: _Work, word: TimedWord) -> Iterator[Word]:
     )
 
 
-def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
+def _words_of_few(work: _Insertion, problem: Problem) -> list[TimedWord]:
     """Cheapest words of the sub-library, in the library's numbers, rest and free turn appended."""
     solutions = search_setup_words(
         problem,
@@ -316,7 +316,7 @@ def _words_of_few(work: _Work, problem: Problem) -> list[TimedWord]:
     return [_in_library(work, solution.trims, solution.durations) for solution in solutions]
 
 
-def _fast_words(work: _Work) -> list[TimedWord]:
+def _fast_words(work: _Insertion) -> list[TimedWord]:
     """For a time that no seed meets: first insert for least time, then fill up the time."""
     limit = work.total
     hurry = replace(work.problem, cost=Cost(time=1.0), horizon=Horizon())
@@ -339,7 +339,7 @@ def _fast_words(work: _Work) -> list[TimedWord]:
     return met
 
 
-def _in_library(work: _Work, trims: IntArray, durations: Array) -> TimedWord:
+def _in_library(work: _Insertion, trims: IntArray, durations: Array) -> TimedWord:
     """A word of the automaton in the library's numbers, rest and free turn appended."""
     library, limit = work.library, work.total
     word = library.number_of[trims].tolist()

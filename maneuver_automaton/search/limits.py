@@ -158,7 +158,7 @@ def sole_bound(problem: Problem, goal: Goal) -> float:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Prices:
+class _LeastPrices:
     """Best prices of a library; what rest costs is taken off where it pads."""
 
     per_metre: float
@@ -172,7 +172,7 @@ class _Prices:
 
 
 @kept_by_first
-def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None:
+def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _LeastPrices | None:
     """None where a trim is cheaper than the rest that pads."""
     library = moving_trims(automaton, cost)
     rates = library.rates - (library.rest_rate if pads else 0.0)
@@ -185,7 +185,7 @@ def _prices(automaton: Automaton, cost: StageCost, pads: bool) -> _Prices | None
         level = np.hypot(library.twists[:, 0], library.twists[:, 1])
         climb = library.twists[:, 3]
         up, down = (np.where(v > 0.0, rates / v, np.inf) for v in (climb, -climb))
-        return _Prices(
+        return _LeastPrices(
             per_metre=float(metre.min()),
             per_metre_level=float(np.where(level > 0.0, rates / level, np.inf).min()),
             per_metre_up_down=(float(up.min()), float(down.min())),

@@ -101,23 +101,18 @@ def _so_far(task: InsertionTask, found: BestWords) -> SearchResult:
 
 
 def improve_linked_words(
-    problem: Problem,
-    goal: Goal,
-    seeds: Sequence[Word],
-    *,
-    budget: Budget = UNLIMITED,
-    most_tries: int = MOST_TRIES,
+    problem: Problem, goal: Goal, seeds: Sequence[Word], *, budget: Budget = UNLIMITED
 ) -> Iterator[SearchResult]:
     """Insert, replace, split and delete trims of words with maneuvers while that gains.
 
-    Yields the solution of each seed in turn, a local optimum: none of up to `most_tries` changes of
+    Yields the solution of each seed in turn, a local optimum: none of up to `MOST_TRIES` changes of
     it, those of the least prices, is cheaper. With maneuvers of finite size no reduced cost
     certifies more than that. The `budget` limits the time; ``search.max_expansions`` of the problem
     limits the number of words that are solved for instead, the same at every call.
     """
     used = tuple(sorted({trim for seed in seeds for trim in seed.trims.tolist()}))
     setup = word_setup(problem, goal, most_trims=MOST_TRIMS, also=used)
-    climb = _Climb(setup, budget, most_tries)
+    climb = _Climb(setup, budget)
     for seed in seeds:
         solved, changes = climb.solved, climb.changes
         timed = setup.timed(seed)
@@ -146,7 +141,6 @@ class _Climb:
 
     setup: WordSetup
     budget: Budget
-    most_tries: int
     solved: int = 0
     changes: int = 0
 
@@ -171,7 +165,7 @@ class _Climb:
         changes = sorted(self._changes(word), key=lambda one: (one.price, one.trims))
         best: TimedWord | None = None
         tried = 0
-        for change in changes[: self.most_tries]:
+        for change in changes[:MOST_TRIES]:
             if self.is_over():
                 break
             if change.trims in seen:
