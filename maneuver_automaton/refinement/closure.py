@@ -92,8 +92,8 @@ def closed(
         room = np.minimum(np.minimum(u - low, high - u), 1.0)
         columns = np.hstack([(by_control * room).reshape(len(by_control), -1), by_pace[:, None]])
         change = np.linalg.lstsq(columns[wanted], miss, rcond=None)[0]
-        if not change[-1] > -1.0:
-            break  # no pace leads there: times would be negative
+        if not abs(change[-1]) < 1.0:
+            break  # times would be negative, or so long that to follow the motion takes minutes
         u = np.clip(u + room * change[:-1].reshape(u.shape), low, high)
         h = h * (1.0 + change[-1])
     assert best is not None

@@ -103,6 +103,10 @@ def test_closure_brings_a_motion_to_its_end_within_the_limits() -> None:
                   durations=durations)  # fmt: skip
     assert not isinstance(free, str)
     assert np.abs(free.course.pose[-1, :2] - end[:2]).max() < 1e-12
+    # an end that only a pace of hours meets is none to follow, which would take minutes
+    far = closed(CAR, np.zeros(2), [9e6, *end[1:]], control=control, durations=durations)
+    assert isinstance(far, str)
+    assert far.startswith("the end could not be closed")
 
 
 def test_the_goal_needs_a_place_and_the_start_its_limits() -> None:
