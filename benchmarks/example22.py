@@ -17,15 +17,14 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from benchmarks.uniform_effort import (
+from maneuver_automaton.optimal_control import Guess, TimeGrid, solve, solve_uniform_effort_example
+from maneuver_automaton.optimal_control.uniform_effort import (
     DURATION_S,
     END,
     START,
     UniformEffortExample,
     example_problem,
-    solve_uniform_effort_example,
 )
-from maneuver_automaton.optimal_control import Guess, TimeGrid, solve
 from tests.optimal_control import pontryagin
 
 

@@ -14,12 +14,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
 sys.path.insert(0, str(Path(__file__).parent))
 from symmetry import INK, tidy
 
 import maneuver_automaton as ma
-from benchmarks.uniform_effort import END_NODES, UniformEffortExample, solve_uniform_effort_example
 from maneuver_automaton.analysis import (
     CertifiedHorizon,
     FeasibleSet,
@@ -30,6 +28,8 @@ from maneuver_automaton.analysis import (
     ring_poses,
     turnpike,
 )
+from maneuver_automaton.optimal_control import UniformEffortExample, solve_uniform_effort_example
+from maneuver_automaton.optimal_control.uniform_effort import END_NODES
 from maneuver_automaton.primitives import trims_of
 from maneuver_automaton.primitives.closed_form import bang_bang
 from maneuver_automaton.receding_horizon import (

@@ -24,3 +24,9 @@ from maneuver_automaton.optimal_control.transcription import (
 from maneuver_automaton.optimal_control.transcription import Transcription as Transcription
 from maneuver_automaton.optimal_control.transcription import solve as solve
 from maneuver_automaton.optimal_control.transcription import transcribe as transcribe
+from maneuver_automaton.optimal_control.uniform_effort import (
+    UniformEffortExample as UniformEffortExample,
+)
+from maneuver_automaton.optimal_control.uniform_effort import (
+    solve_uniform_effort_example as solve_uniform_effort_example,
+)

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.uniform_effort import solve_uniform_effort_example
 from maneuver_automaton.analysis import FeasibleSet, certified_horizon, growth_bound, ring_poses
+from maneuver_automaton.optimal_control import solve_uniform_effort_example
 from maneuver_automaton.receding_horizon.unconstrained import simulate_unconstrained
 from tests.plotting.loops import parking
 from tests.receding_horizon.unconstrained_cases import MIXED, PARKING, even, problem_of

@@ -5,9 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.uniform_effort import END, START, example_problem, solve_uniform_effort_example
 from maneuver_automaton.models import Unicycle
-from maneuver_automaton.optimal_control import Guess, SolveStatus
+from maneuver_automaton.optimal_control import (
+    Guess,
+    SolveStatus,
+    solve_uniform_effort_example,
+)
+from maneuver_automaton.optimal_control.uniform_effort import END, START, example_problem
 from tests.optimal_control import pontryagin
 from tests.reference_dynamics import dynamics_defect
 

@@ -143,12 +143,24 @@ def solve_uniform_effort_example(
 
 
 def quadratic_effort(x: Components, u: Components) -> Any:
-    """``4 u1^2 + u2^2 - 3 u1 u2``: the quadratic part of the stage cost."""
+    """``4 u1^2 + u2^2 - 3 u1 u2``: the quadratic part of the stage cost.
+
+    Examples
+    --------
+    >>> quadratic_effort((), (1.0, 2.0))
+    2.0
+    """
     return 4.0 * u[0] ** 2 + u[1] ** 2 - 3.0 * u[0] * u[1]
 
 
 def relative_spread(values: Sequence[float] | Array) -> float:
-    """Greatest less least over mean."""
+    """Greatest less least over mean.
+
+    Examples
+    --------
+    >>> relative_spread([1.0, 2.0, 3.0])
+    1.0
+    """
     return float(np.ptp(values) / np.mean(values))
 
 
