@@ -126,7 +126,7 @@ def _improved(work: _Insertion) -> SearchResult:
     """Solutions of all seeds, or of the known plan's where none are asked for, each word once."""
     known, plan, automaton = [], work.task.known, work.problem.automaton
     names = [] if plan is None else [trim.name for trim in plan.trims]
-    if plan is not None and len(names) <= LONGEST and all(map(automaton.__contains__, names)):
+    if plan is not None and len(names) <= LONGEST and all(name in automaton for name in names):
         word = np.array([automaton.index_of(name) for name in names], dtype=np.int64)
         if (work.library.number_of[word] >= 0).all():  # its trims are those of the library
             known.append(_in_library(work, word, plan.durations))
