@@ -12,11 +12,11 @@ from maneuver_automaton.models.dynamic import Helicopter as Helicopter
 from maneuver_automaton.models.dynamic import Hovercraft as Hovercraft
 from maneuver_automaton.models.dynamic import SingleTrack as SingleTrack
 from maneuver_automaton.models.in_world import InWorld as InWorld
-from maneuver_automaton.models.in_world import as_stated as as_stated
 from maneuver_automaton.models.in_world import in_world as in_world
 from maneuver_automaton.models.model import Model as Model
 from maneuver_automaton.models.model import OnLattice as OnLattice
 from maneuver_automaton.models.model import OnlyTranslated as OnlyTranslated
+from maneuver_automaton.models.model import as_stated as as_stated
 from maneuver_automaton.models.robots import LatticeBody as LatticeBody
 from maneuver_automaton.models.robots import Omnidirectional as Omnidirectional
 from maneuver_automaton.models.robots import SecondOrderUnicycle as SecondOrderUnicycle

@@ -10,7 +10,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, translations
-from maneuver_automaton.models.model import Model, OnlyTranslated
+from maneuver_automaton.models.model import Model
 from maneuver_automaton.models.vehicle import Components
 
 HEADING = "heading"  # name of the component of a reduced state that is the heading [rad]
@@ -198,8 +198,3 @@ def in_world(model: Model) -> Model:
     'unicycle'
     """
     return InWorld(model) if model.group in GROUPS else model
-
-
-def as_stated(model: Model) -> Model:
-    """The model as its author stated it, on the group that is its symmetry."""
-    return model.stated if isinstance(model, OnlyTranslated) else model

@@ -125,3 +125,8 @@ class OnlyTranslated(Model, Protocol):
     def seen(self, reduced_state: Array) -> Array:
         """Reduced states (..., n_z) of those of `stated`."""
         ...
+
+
+def as_stated(model: Model) -> Model:
+    """The model as its author stated it, on the group that is its symmetry."""
+    return model.stated if isinstance(model, OnlyTranslated) else model

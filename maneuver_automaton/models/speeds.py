@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
-from maneuver_automaton.models.model import Model, OnlyTranslated
+from maneuver_automaton.models.model import Model, as_stated
 
 STANDING = 1e-3  # [m/s] slower is to stand
 TURNED = 1e-9  # [rad] between two samples, that is no rounding
@@ -72,8 +72,7 @@ def greatest_speed(model: Model, *, axes: tuple[int, ...] = (0, 1, 3)) -> float:
     Source: Moore, Kearfott, Cloud (2009), *Introduction to Interval Analysis*, Ch. 5: the value of
     an expression on intervals contains all its values.
     """
-    if isinstance(model, OnlyTranslated):  # it is as fast seen from the world as from its body
-        model = model.stated
+    model = as_stated(model)  # it is as fast seen from the world as from its body
     state = [Interval(low, high) for low, high in model.reduced_limits.tolist()]
     control = [Interval(low, high) for low, high in model.control_limits.tolist()]
     try:

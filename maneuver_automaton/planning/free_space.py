@@ -17,12 +17,11 @@ from maneuver_automaton.planning.checking import Condition, load_checking
 from maneuver_automaton.planning.incumbents import Candidate, Incumbents, PlanningStep
 from maneuver_automaton.planning.result import LowerBound, PlanStatus, Workspace
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search import SearchStatus
 from maneuver_automaton.search.certificate import certificate
 from maneuver_automaton.search.choose import insertion_stages, load_search, search_goal
 from maneuver_automaton.search.limits import outside, why_impossible
 from maneuver_automaton.search.linked_words import ALPHABET
-from maneuver_automaton.search.result import InsertionTask, SearchResult, plan_of
+from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, plan_of
 from maneuver_automaton.search.word_setup import word_setup
 from maneuver_automaton.words.maneuver_words import maneuver_words
 from maneuver_automaton.words.word import Word, word_of_plan
@@ -205,25 +204,37 @@ def _least_time(problem: Problem, budget: Budget) -> tuple[PlanStatus, str] | No
 class FreeWords(PlanningStep):
     """Words of free space before the lattice is searched; among obstacles some may be free."""
 
+    first_share = LATER_SHARE  # of the time, where there is no plan yet
+    others = IN_SPACE
+
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
-        """Load the kernels, and what the words of each goal are made of."""
+        """Load the kernels."""
         load_checking()
-        if not problem.has_inertia:
-            load_search(problem)
-            return
-        load_kernels("words")
-        for goal in problem.goals:
-            word_setup(problem, goal, most_trims=ALPHABET, steers=True)
+        load_search(problem)
 
     def offer(self, found: Incumbents) -> None:
         """Offer words as they are found."""
         problem = found.problem
         guarded = bool(problem.obstacles) or not problem.bounds.are_open
-        others = max(found.alternatives, (OTHERS if problem.has_inertia else IN_SPACE) * guarded)
-        share = WORDS_SHARE if problem.has_inertia and not found.plans else LATER_SHARE
+        others = max(found.alternatives, self.others * guarded)
+        share = LATER_SHARE if found.plans else self.first_share
         stages = free_words(found, goals_left(problem), others=others, share=share)
         plans = ((plan_of(problem, word), index) for word, index in words_once(stages))
         found.offer_as_they_come(plans, proven=not problem.obstacles)
+
+
+class LinkedWords(FreeWords):
+    """The same of trims that maneuvers link."""
+
+    first_share = WORDS_SHARE
+    others = OTHERS
+
+    def prepare(self, problem: Problem, workspace: Workspace) -> None:
+        """Load the kernels, and what the words of each goal are made of."""
+        load_checking()
+        load_kernels("words")
+        for goal in problem.goals:
+            word_setup(problem, goal, most_trims=ALPHABET, steers=True)
 
 
 class TurnedByManeuvers(PlanningStep):

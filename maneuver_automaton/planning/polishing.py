@@ -107,10 +107,12 @@ def _frames_take_symbols(model: Model) -> bool:
 def left_out(*problems: Problem) -> tuple[str, ...]:
     """What plans of some problems do without that they should have, and why: a sentence each."""
     for one in problems:
-        why = why_not_polished(one) if one.has_inertia else ""
+        if not one.has_inertia:
+            continue
+        why = why_not_polished(one)
         if why and why in (why_no_casadi(), NUMBERS_ALONE):
             return (f"plans are not polished, and may cost much more: {why}",)
-        if one.has_inertia and not why and terms_of(one.cost) is None:
+        if not why and terms_of(one.cost) is None:
             return (f"plans are polished in time alone: {NO_TERMS}",)
     return ()
 

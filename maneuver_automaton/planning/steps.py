@@ -28,6 +28,7 @@ from maneuver_automaton.planning.checking import load_checking, load_checks
 from maneuver_automaton.planning.free_space import (
     AllWords,
     FreeWords,
+    LinkedWords,
     TurnedByManeuvers,
     certificate_of,
 )
@@ -156,7 +157,7 @@ def search_steps(problem: Problem) -> Steps:
     if along:
         steps.append(AlongPaths(polish))
     if linked and (not searched or (method == "auto" and _suits_words(problem))):
-        steps.append(FreeWords())
+        steps.append(LinkedWords())
     on_nodes = automaton.lattice is not None and not automaton.body_velocities.any() and searched
     if only_maneuvers_turn(automaton) and not on_nodes:  # a sequence ends at a node by chance
         steps.append(TurnedByManeuvers())

@@ -28,8 +28,7 @@ def turns_between(
     A turn begins in a trim, keeps its other controls, and ends in the trim that has these, or
     else in the first one, at the other heading. It takes the shorter side; half a turn, both.
     """
-    rate = _turning_control(model)
-    if rate is None:
+    if not isinstance(model, OnlyTranslated) or (rate := _turning_control(model)) is None:
         return ()
     chosen = list(_chosen(model, trims, pairs, rate))
     if not chosen:
@@ -62,12 +61,11 @@ def _side(turn: float) -> str:
     return " by the left" if turn > 0.0 else " by the right"
 
 
-def _turning_control(model: Model) -> int | None:
+def _turning_control(model: OnlyTranslated) -> int | None:
     """The limited control that is the rate of the heading, the only reduced state; or None."""
-    if not isinstance(model, OnlyTranslated) or len(model.stated.reduced_names) != 1:
-        return None
-    if model.reduced_names == model.stated.reduced_names:
-        return None  # it has a constant heading, and something else that changes
+    names = model.stated.reduced_names
+    if len(names) != 1 or model.reduced_names == names:
+        return None  # or it has a constant heading, and something else that changes
     n_controls = len(model.control_names)
     rng = np.random.default_rng(0)
     states, controls = rng.uniform(-3.0, 3.0, (5, 1)), rng.uniform(-1.0, 1.0, (5, n_controls))
@@ -80,10 +78,9 @@ def _turning_control(model: Model) -> int | None:
 
 
 def _chosen(
-    model: Model, trims: Sequence[Trim], pairs: Pairs, rate: int
+    model: OnlyTranslated, trims: Sequence[Trim], pairs: Pairs, rate: int
 ) -> Iterator[tuple[int, int, float]]:
     """Positions of source and target, and the turn [rad] from one to the other."""
-    assert isinstance(model, OnlyTranslated)
     headings = np.array([model.heading(trim.reduced_state) for trim in trims])
     if not isinstance(pairs, str):
         for a, b in pairs:

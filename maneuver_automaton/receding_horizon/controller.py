@@ -40,7 +40,7 @@ from maneuver_automaton.receding_horizon.over_maneuvers import (
     with_trims_at_ends,
     within_its_margin,
 )
-from maneuver_automaton.receding_horizon.settings import Settings, filling_rest, switches_at_will
+from maneuver_automaton.receding_horizon.settings import Settings, filling_rest
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.receding_horizon.step_search import StepSearch
 from maneuver_automaton.search.choose import load_search as load_words
@@ -158,7 +158,6 @@ class RecedingHorizon:
             pieces=pieces,
             gap=None if retimed or pieces else gap,
             pad=filling_rest(problem),
-            at_will=switches_at_will(problem),
             look_ahead=look_ahead,
             stand=stand,
         )

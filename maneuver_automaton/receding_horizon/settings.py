@@ -28,7 +28,6 @@ class Settings:
     pieces: int = 0  # of equal time, with controls between those of the library; 0: its trims alone
     gap: float | None = None  # share of the cost that may be left to gain; None: nothing is proven
     pad: Trim | None = None  # the rest that prolongs a plan
-    at_will: bool = True  # trims are: nothing is ever committed, and a motion may end anywhere
     look_ahead: float = 60.0  # [s] that a fail-safe trajectory must be free
     stand: float = 2.0  # [s] that the goal must stay free after arrival
 
@@ -75,7 +74,7 @@ class Settings:
         """Raise ValueError if plans of a problem cannot be driven with other controls."""
         what = "plans with pieces" if self.pieces else "retimed plans"
         terms = terms_of(problem.cost)
-        if not self.at_will or problem.zones or problem.climbs_among_obstacles:
+        if not switches_at_will(problem) or problem.zones or problem.climbs_among_obstacles:
             raise ValueError(
                 f"receding horizon: {'pieces are' if self.pieces else 'retimed is'} for vehicles "
                 "without inertia, and no zones or heights: at another pace a maneuver leads "
@@ -104,7 +103,7 @@ class Settings:
 def switches_at_will(problem: Problem) -> bool:
     """Whether the vehicle may change to any trim of its library, and so stop, at any moment.
 
-    This is the one place of the room where a problem is asked for it.
+    Then nothing is ever committed, and a motion may end anywhere.
     """
     return not problem.has_inertia
 

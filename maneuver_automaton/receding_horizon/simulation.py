@@ -28,6 +28,7 @@ from maneuver_automaton.receding_horizon.controller import RecedingHorizon
 from maneuver_automaton.receding_horizon.failsafe import settled
 from maneuver_automaton.receding_horizon.log import ClosedLoop, Guarantee, Step, Violation
 from maneuver_automaton.receding_horizon.rest_of_plan import moves_on
+from maneuver_automaton.receding_horizon.settings import switches_at_will
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -234,8 +235,8 @@ def simulate(
         look_ahead=look_ahead,
         stand=stand,
     )
-    at_will = controller.settings.at_will
-    if upset.twist_scale is not None and not at_will:
+    stops_at_will = switches_at_will(problem)
+    if upset.twist_scale is not None and not stops_at_will:
         raise ValueError(
             "receding horizon: disturbance: twist_scale is for vehicles without inertia: "
             "a maneuver is driven as its model says"
@@ -261,11 +262,11 @@ def simulate(
         passed=() if last is None else last.passed,
     )
     track.inside.append(track.is_inside)
-    stops = controller.arrival is None and at_will  # where it likes
+    stops = controller.arrival is None and stops_at_will  # where it likes
     arrived = track.inside[-1] and (
         _arrives(last, stops=stops)
         if last is not None  # within a maneuver, maybe, where there is no first trim
-        else at_will or problem.first_trim.is_rest
+        else stops_at_will or problem.first_trim.is_rest
     )
     with patient():
         for number in range(begin, begin + steps):

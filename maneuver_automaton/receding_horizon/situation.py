@@ -45,7 +45,7 @@ from maneuver_automaton.receding_horizon.rest_of_plan import (
     rested,
     same_word,
 )
-from maneuver_automaton.receding_horizon.settings import EXACT, Settings
+from maneuver_automaton.receding_horizon.settings import EXACT, Settings, switches_at_will
 from maneuver_automaton.search.result import TIE
 
 FINISHED = 2  # candidates of a step for which controls between those of the library are sought
@@ -179,7 +179,7 @@ class Situation:
         if self.rest is not None and not moves_on(self.rest):
             return True
         fixed = self.here.horizon.time is not None and self.settings.pad is None
-        return self.settings.at_will and not fixed
+        return switches_at_will(self.here) and not fixed
 
     def given(self, first: Plan) -> StepPlan:
         """The plan that the first step was told to apply, which may not take too long."""

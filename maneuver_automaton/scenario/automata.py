@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from decimal import Decimal
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from maneuver_automaton.formats.yaml_source import Document, Where, shown
 from maneuver_automaton.models import (
     Car,
     FourWheelSteeringCar,
+    LatticeBody,
     Model,
     RearSteeredCar,
     SecondOrderCar,
@@ -269,10 +271,6 @@ def _fitting(automaton: Automaton, model: Model) -> Automaton:
 
 Controls = Mapping[str, tuple[float, ...]]
 
-KINEMATIC = ("table2", "reeds_shepp", "dubins")
-INERTIAL = ("parking", "road")
-LATTICES = {"lattice_ackermann": False, "lattice_diff": True}  # whether they turn on the spot
-PRESETS = (*KINEMATIC, *INERTIAL, *LATTICES, "crab")
 TABLE_2: Controls = {
     "rest": (0.0, 0.0),
     "straight": (1.5, 0.0),
@@ -313,36 +311,20 @@ def preset_automaton(name: str, model: Model) -> Automaton:
     if name not in PRESETS:
         known = (*PRESETS, *stock_libraries())
         raise ValueError(f"got {name!r}, need one of {', '.join(known)}")
-    if name in KINEMATIC:
-        if not isinstance(model, Unicycle | Car | RearSteeredCar):
-            raise ValueError(
-                f"got {name!r}, which is for vehicles without inertia, not the {model.name}"
-            )
-        return Automaton.of_controls(model, _controls(name, model))
-    if name in LATTICES:
-        return _lattice(name, model)
-    if name == "crab":
-        if not isinstance(model, FourWheelSteeringCar):
-            raise ValueError(
-                f"got 'crab', which is for a four_wheel_steering_car, not the {model.name}"
-            )
-        return Automaton.of_controls(model, _crab(model))
-    if not isinstance(model, SecondOrderUnicycle | SecondOrderCar):
-        need = "second_order_unicycle and second_order_car"
-        raise ValueError(f"got {name!r}, which is for {need}, not the {model.name}")
-    return _parking(model) if name == "parking" else _road(model)
+    preset = PRESETS[name]
+    if not isinstance(model, preset.models):
+        raise ValueError(f"got {name!r}, which is for {preset.what}, not the {model.name}")
+    made = preset.make(model)
+    return made if isinstance(made, Automaton) else Automaton.of_controls(model, made)
 
 
-def _lattice(name: str, model: Model) -> Automaton:
+def _lattice(model: LatticeBody, *, spins: bool) -> Automaton:
     from maneuver_automaton.formats.lattice import automaton_of_lattice, lattice_of_arcs
-    from maneuver_automaton.models.robots import LatticeBody
 
-    if not isinstance(model, LatticeBody):
-        raise ValueError(f"got {name!r}, which is for a lattice_body, not the {model.name}")
     if model.turning_radius is None:
         raise ValueError("needs the least radius of its arcs, state vehicle.turning_radius_m")
     lattice = lattice_of_arcs(
-        resolution=model.resolution, turning_radius=model.turning_radius, spins=LATTICES[name]
+        resolution=model.resolution, turning_radius=model.turning_radius, spins=spins
     )
     return automaton_of_lattice(lattice)
 
@@ -363,16 +345,10 @@ def _crab(car: FourWheelSteeringCar) -> Controls:
     return controls
 
 
-def _controls(name: str, vehicle: Unicycle | Car | RearSteeredCar) -> Controls:
-    if name == "table2":
-        if not isinstance(vehicle, Unicycle):
-            raise ValueError(f"got 'table2', which is for the unicycle, not the {vehicle.name}")
-        return TABLE_2
+def _on_circles(vehicle: Unicycle | Car | RearSteeredCar, *, reverses: bool) -> Controls:
     speed = min(1.0, vehicle.max_speed or 1.0)
-    ahead = _turns(vehicle, speed)
-    if name == "dubins":
-        return ahead
-    return ahead | {f"reverse {word}": c for word, c in _turns(vehicle, -speed).items()}
+    back = _turns(vehicle, -speed).items() if reverses else ()
+    return _turns(vehicle, speed) | {f"reverse {word}": control for word, control in back}
 
 
 def _turns(vehicle: Unicycle | Car | RearSteeredCar, speed: float) -> dict[str, tuple[float, ...]]:
@@ -439,3 +415,26 @@ def _trim(model: SecondOrderUnicycle | SecondOrderCar, state: tuple[float, float
         control=control,
         reduced_state=reduced,
     )
+
+
+class Preset(NamedTuple):
+    """A library by name: the vehicles that it is for, in words too, and what makes it of one."""
+
+    models: tuple[type[Any], ...]
+    what: str
+    make: Callable[[Any], Automaton | Controls]
+
+
+AT_WILL = (Unicycle, Car, RearSteeredCar), "vehicles without inertia"
+WITH_SPEED = (SecondOrderUnicycle, SecondOrderCar), "second_order_unicycle and second_order_car"
+ON_LATTICE = (LatticeBody,), "a lattice_body"
+PRESETS: Mapping[str, Preset] = {
+    "table2": Preset((Unicycle,), "the unicycle", lambda _: TABLE_2),
+    "reeds_shepp": Preset(*AT_WILL, functools.partial(_on_circles, reverses=True)),
+    "dubins": Preset(*AT_WILL, functools.partial(_on_circles, reverses=False)),
+    "parking": Preset(*WITH_SPEED, _parking),
+    "road": Preset(*WITH_SPEED, _road),
+    "lattice_ackermann": Preset(*ON_LATTICE, functools.partial(_lattice, spins=False)),
+    "lattice_diff": Preset(*ON_LATTICE, functools.partial(_lattice, spins=True)),
+    "crab": Preset((FourWheelSteeringCar,), "a four_wheel_steering_car", _crab),
+}
