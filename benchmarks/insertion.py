@@ -21,8 +21,9 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Horizon, Problem
-from maneuver_automaton.search import search_insertion, search_words
 from maneuver_automaton.search.certificate import certificate
+from maneuver_automaton.search.choose import search_insertion
+from maneuver_automaton.search.words import search_words
 from tests.search.cases import end_off_goal
 
 SIDES = (9, 21, 41, 81, 201)

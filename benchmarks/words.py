@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from benchmarks.timing import median_ms
-from maneuver_automaton.search import search_words
+from maneuver_automaton.search.words import search_words
 from tests.reference import Word, brute_force
 from tests.search.cases import REVERSED_SPIN, TABLE_2, parking
 

@@ -42,16 +42,11 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
         if array.ndim == 0 or array.shape[-1] not in admitted:
             need = " or ".join(str(n) for n in admitted)
             raise ValueError(f"{name}: got shape {array.shape}, need {need} components last")
-    if not _is_finite(array):
+    few = array.size <= FEW
+    if not (all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()):
         bad = array[~np.isfinite(array)].flat[0]
         raise ValueError(f"{name}: got {bad}, need finite numbers")
     return array
-
-
-def _is_finite(array: Array) -> bool:
-    if array.size <= FEW:
-        return all(map(math.isfinite, array.ravel().tolist()))
-    return bool(np.isfinite(array).all())
 
 
 def freeze(instance: Any, name: str, *, last: int | Sequence[int] | None = None) -> None:

@@ -18,7 +18,7 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.library import automaton_hash, load_library, save_library
 from maneuver_automaton.cli import check_command, run
 from maneuver_automaton.cli.terminal import COMPILING
-from maneuver_automaton.formats import load_plan
+from maneuver_automaton.formats.plan_json import load_plan
 from maneuver_automaton.models import rollout
 from maneuver_automaton.planning import PlanResult, PlanStatus
 from maneuver_automaton.problem import Bounds, Horizon, Problem

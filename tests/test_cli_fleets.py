@@ -13,15 +13,13 @@ from maneuver_automaton import fleet
 from maneuver_automaton.cli import run
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.fleet import FleetProblem, plan_fleet, verify_fleet
-from maneuver_automaton.formats import (
-    fleet_to_dict,
+from maneuver_automaton.formats.fleet_json import fleet_to_dict, load_fleet, save_fleet
+from maneuver_automaton.formats.plan_json import (
     load_plan,
     load_plans,
     plan_to_dict,
-    save_fleet,
+    read_plan_document,
 )
-from maneuver_automaton.formats.fleet_json import load_fleet
-from maneuver_automaton.formats.plan_json import read_plan_document
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.fleets import crossing, least_distances
 from tests.formats.outside import DATA, needs_data

@@ -28,7 +28,7 @@ from maneuver_automaton import (
     plan,
     verify,
 )
-from maneuver_automaton.formats import plan_to_dict
+from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.places import gradient_of, least_of
 
 CONTROLS = {f"{v:+d} {s:+.1f}": (v, s) for v in (1, -1) for s in (-0.5, 0.0, 0.5)}

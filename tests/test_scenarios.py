@@ -12,7 +12,7 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton.audit import audit_plan
 from maneuver_automaton.collision.blocked import touched
-from maneuver_automaton.formats import plan_to_dict
+from maneuver_automaton.formats.plan_json import plan_to_dict
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 FILES = sorted(FOLDER.glob("*.yaml"))

@@ -17,6 +17,7 @@ from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.audit import TerminalError
 from maneuver_automaton.automaton import Plan, Primitive
 from maneuver_automaton.automaton.library import automaton_hash
+from maneuver_automaton.bounds.separation import Narrowest
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.documents import (
     FLEET,
@@ -387,8 +388,6 @@ def load_result(path: Path | str, problem: Problem) -> PlanResult:
 
 def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> PlanResult:
     """The result of a document that is read already; `place` is where it stands, for messages."""
-    from maneuver_automaton.bounds import Narrowest  # with kernels
-
     if document.get("automaton_hash") != automaton_hash(problem.automaton):
         raise InvalidScenario(f"{place}: automaton_hash: this was planned with another library")
     passage, bound = document.get("narrowest"), document.get("bound")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +15,9 @@ from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.models.speeds import greatest_speed
 from maneuver_automaton.planning.result import LowerBound
 from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.limits import closed_bounds
 from maneuver_automaton.words.library import moving_trims
-
-if TYPE_CHECKING:
-    from maneuver_automaton.search.lattice_query import LatticeQuery
 
 
 def formula_bound(problem: Problem, goals: Sequence[Goal] = ()) -> LowerBound:
@@ -111,7 +108,6 @@ def bound_along_paths(problem: Problem) -> LowerBound:
     the acceleration a, or ``2 sqrt(B v / a)`` where v is not reached.
     """
     from maneuver_automaton.refinement.stop_and_steer import follows_paths, kinematic_problem
-    from maneuver_automaton.search.lattice_query import lattice_query
 
     model, cost = problem.automaton.model, terms_of(problem.cost)
     known = straight_bound(problem, problem.goals)

@@ -6,7 +6,7 @@ import enum
 import functools
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol, TypeAlias
+from typing import Protocol, TypeAlias
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
@@ -14,14 +14,12 @@ from maneuver_automaton._display import Played
 from maneuver_automaton._kept import RECENT, Prepared
 from maneuver_automaton.audit import Audit, Surroundings, TerminalError, surroundings_around
 from maneuver_automaton.automaton import Plan
+from maneuver_automaton.bounds.separation import Narrowest
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import AnyObstacle, Shape
 from maneuver_automaton.collision.fcl_checker import FclChecker
 from maneuver_automaton.planning.on_the_way import Passed, passed_on_the_way
 from maneuver_automaton.problem import Problem
-
-if TYPE_CHECKING:
-    from maneuver_automaton.bounds import Narrowest
 
 _Map: TypeAlias = tuple[tuple[AnyObstacle, ...], tuple[float, float]]
 

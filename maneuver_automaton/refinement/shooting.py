@@ -171,7 +171,7 @@ def least_effort(
     >>> better = least_effort(plan, Unicycle(), pieces=8)
     >>> bool(np.allclose(better.end, plan.end)), better.duration
     (True, 3.0)
-    >>> from maneuver_automaton.refinement import effort_report
+    >>> from maneuver_automaton.refinement.retiming import effort_report
     >>> round(effort_report(plan).cost, 2), round(effort_report(better).cost, 2)
     (4.0, 3.72)
     """

@@ -14,7 +14,7 @@ from maneuver_automaton.audit import Audit, TerminalError, audit_plan
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.automaton.library import automaton_hash
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats import load_plan, plan_to_dict, save_plan
+from maneuver_automaton.formats.plan_json import load_plan, plan_to_dict, save_plan
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import Alternative, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem

@@ -8,7 +8,7 @@ from maneuver_automaton import Cost, Horizon, SearchSettings, plan
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.bounds.levels import Proof
 from maneuver_automaton.budget import Budget
-from maneuver_automaton.formats import plan_to_dict
+from maneuver_automaton.formats.plan_json import plan_to_dict
 from maneuver_automaton.planning import PlanResult, PlanStatus, proving
 from maneuver_automaton.planning.no_way import (
     FIRST_BOXES,

@@ -11,7 +11,8 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Car, Unicycle
 from maneuver_automaton.problem import Goal, Horizon, Problem
-from maneuver_automaton.refinement import effort_report, least_effort, retime
+from maneuver_automaton.refinement.retiming import effort_report, retime
+from maneuver_automaton.refinement.shooting import least_effort
 
 ROBOT = Automaton.of_controls(
     Unicycle(),

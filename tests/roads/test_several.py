@@ -20,8 +20,8 @@ import shapely
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
 from maneuver_automaton.exports import open_result
-from maneuver_automaton.formats import load_plans
 from maneuver_automaton.formats.commonroad import n_problems, read_commonroad
+from maneuver_automaton.formats.plan_json import load_plans
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads import RoadVehicle, drive_roads, judged, plan_roads
 from maneuver_automaton.roads.several import driving

@@ -17,13 +17,10 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
-from maneuver_automaton.search import (
-    SearchStatus,
-    search_insertion,
-    search_words,
-)
 from maneuver_automaton.search.certificate import certificate
-from maneuver_automaton.search.result import plan_of
+from maneuver_automaton.search.choose import search_insertion
+from maneuver_automaton.search.result import SearchStatus, plan_of
+from maneuver_automaton.search.words import search_words
 from tests import reference
 from tests.inertia import unicycle_automaton
 from tests.quickly import quick_are

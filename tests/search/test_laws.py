@@ -13,7 +13,8 @@ from hypothesis.extra.numpy import arrays
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search import search_insertion, search_words
+from maneuver_automaton.search.choose import search_insertion
+from maneuver_automaton.search.words import search_words
 from tests.search.cases import (
     REEDS_SHEPP,
     REVERSED_SPIN,

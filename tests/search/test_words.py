@@ -12,7 +12,8 @@ from maneuver_automaton.costs import Cost
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import UserModel
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
-from maneuver_automaton.search import SearchStatus, search_words
+from maneuver_automaton.search.result import SearchStatus
+from maneuver_automaton.search.words import search_words
 from tests.reference import Word, words_of
 from tests.search.cases import (
     INTERPRETED,
