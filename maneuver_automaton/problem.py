@@ -457,14 +457,12 @@ class Problem:
             )
             object.__setattr__(self, "start_state", state)
             object.__setattr__(self, "start_trim", trim)
-        if any(goal.state is not None for goal in self.goals):
-            object.__setattr__(self, "goals", tuple(map(self._with_state, self.goals)))
-
-    def _with_state(self, goal: Goal) -> Goal:
-        if goal.state is None:
-            return goal
-        state, trim = settled_state(self.automaton, goal.state, "goal", trim=goal.trim)
-        return replace(goal, state=state, trim=trim)
+        goals = list(self.goals)
+        for k, goal in enumerate(goals):
+            if goal.state is not None:
+                state, trim = settled_state(self.automaton, goal.state, "goal", trim=goal.trim)
+                goals[k] = replace(goal, state=state, trim=trim)
+                object.__setattr__(self, "goals", tuple(goals))
 
     def _check_rests(self) -> None:
         """A vehicle with inertia begins and ends in a trim, or in a state that is stated."""

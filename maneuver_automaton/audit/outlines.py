@@ -29,18 +29,13 @@ from maneuver_automaton.collision.shapes import (
 LOST = 1e-9  # share of an area, that a union may lose
 
 
-def outline_of(shapes: Sequence[Shape], origin: tuple[float, float] = (0.0, 0.0)) -> Outline:
-    """The outline of shapes counted from an origin [m]; of none a point."""
-    if not shapes:
-        point = np.zeros(1, dtype=np.complex128)
-        return Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
-    return _outlined(shapes, np.tile(origin, (len(shapes), 1)))[0]
-
-
 @functools.lru_cache(maxsize=32)
 def body_outline(shapes: tuple[Shape, ...]) -> BodyOutline:
     """The outline of a body; those of the last bodies are kept."""
-    edges = outline_of(shapes)
+    point = np.zeros(1, dtype=np.complex128)
+    edges = Outline(point, point, np.zeros(1), np.zeros(1, dtype=np.int64))
+    if shapes:
+        edges = _outlined(shapes, np.zeros((len(shapes), 2)))[0]
     corners, reach = edges.begins, np.abs(edges.begins)
     x, y = corners.real, corners.imag
     middle = complex(0.5 * (x.min() + x.max()), 0.5 * (y.min() + y.max()))

@@ -149,7 +149,11 @@ def bounds_of(
     sides[0, :n], sides[1, :n] = a, b
     sides[0, n:], sides[1, n:] = own.begins[:, None], own.ends[:, None]
     off = _off(body, around, pairs, paths, np.abs(a))
-    near = _near(paths, sides, off, _radius(body, around, pairs))
+    radius = None  # of what comes near (2 n, m) [m]; all have corners
+    if around.rounds or body.outline.radius:
+        radii = np.concatenate([body.outline.edges.radius] * 2)
+        radius = np.asarray(radii[:, None] + around.outline.radius[pairs.edge])
+    near = _near(paths, sides, off, radius)
     doubtful = (near[0] <= 0.0) | overlaps
     coordinates = max(np.abs(one.view(np.float64)).max() for one in (place, a))
     near[1] -= body.doubt * (1.0 + body.outline.most_reach) + ROUNDING * coordinates
@@ -168,14 +172,6 @@ def bounds_of(
         heights = around.heights[pairs.edge]
         apart = np.hypot(apart, _apart_in_height(body, pairs, heights, places.altitude))
     return ClearanceBounds(*apart)
-
-
-def _radius(body: AuditedBody, around: Surroundings, pairs: EdgePairs) -> Array | None:
-    """Radii of what comes near (2 n, m) [m]; None if all have corners."""
-    own = body.outline.edges.radius
-    if not (around.rounds or body.outline.radius):
-        return None
-    return np.asarray(np.concatenate([own, own])[:, None] + around.outline.radius[pairs.edge])
 
 
 def _near(paths: Points, sides: Points, off: Array, radius: Array | None) -> Array:

@@ -93,14 +93,6 @@ Inputs = tuple[Array, Array]  # until when (n,) [s], and the controls (n, n_u)
 Flags = np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
 
 
-def inputs_entry(until: Array, control: Array) -> dict[str, Any]:
-    """Controls in order, and until when each holds [s] unless they all take equally long."""
-    entry: dict[str, Any] = {"control": [listed(row) for row in control]}
-    if not np.array_equal(until, even_times(float(until[-1]), until.size)):
-        entry["until"] = listed(until)
-    return entry
-
-
 def samples_entry(course: Trajectory) -> dict[str, Any]:
     """All samples."""
     others = {name: [listed(row) for row in getattr(course, name)] for name in SAMPLED[1:]}
@@ -210,7 +202,12 @@ def maneuver_entry(maneuver: Maneuver, inputs: Inputs | None) -> dict[str, Any]:
         entry["cost_multiplier"] = float(maneuver.cost_multiplier)
     if inputs is None:
         inputs = None if maneuver.course is None else inputs_of(maneuver.course)
-    return entry if inputs is None else entry | inputs_entry(*inputs)
+    if inputs is not None:  # controls in order, and until when [s] unless all take equally long
+        until, control = inputs
+        entry["control"] = [listed(row) for row in control]
+        if not np.array_equal(until, even_times(float(until[-1]), until.size)):
+            entry["until"] = listed(until)
+    return entry
 
 
 def maneuver_of(k: int, entry: Any, model: Model) -> tuple[Maneuver, Inputs | None]:

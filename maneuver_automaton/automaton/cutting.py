@@ -199,7 +199,11 @@ def _cut_at(maneuver: Maneuver, time: float) -> tuple[Trajectory, int]:
     course = _course(maneuver)
     if (k := _sample_at(course, time)) is not None:
         return course, k
-    return _with_rows(course, np.array([time]), *_between_samples(course, time))
+    at = np.array([time])
+    if course.model is not None:
+        return _with_rows(course, at, *along(course, at, course.model))
+    states = [np.interp(time, course.time, column) for column in course.reduced_state.T]
+    return _with_rows(course, at, course.pose_at(time)[None], np.array(states).reshape(1, -1))
 
 
 def _begin_of(maneuver: Maneuver, until: float) -> Maneuver:
@@ -237,14 +241,6 @@ def _part(maneuver: Maneuver, course: Trajectory) -> Maneuver:
 def _sample_at(course: Trajectory, time: float) -> int | None:
     k = int(np.abs(course.time - time).argmin())
     return k if abs(float(course.time[k]) - time) <= NOTHING else None
-
-
-def _between_samples(course: Trajectory, time: float) -> tuple[Array, Array]:
-    """Pose and reduced state, a row each, between two samples; both even if no model is known."""
-    if course.model is not None:
-        return along(course, np.array([time]), course.model)
-    states = [np.interp(time, course.time, column) for column in course.reduced_state.T]
-    return course.pose_at(time)[None], np.array(states).reshape(1, -1)
 
 
 def _sampled(maneuver: Maneuver, since: Array, model: Model) -> Maneuver:

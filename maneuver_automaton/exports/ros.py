@@ -133,7 +133,10 @@ def ros_messages(
     frames: list[Message] = []
     for mover in recording.drivers:
         begin = start + round((mover.start_time - recording.begin) * NANO)
-        name = f"{_ros_name(mover.name)}/" if len(recording.movers) > 1 else ""
+        name = ""
+        if len(recording.movers) > 1:  # ROS takes letters, digits and underscores
+            name = re.sub(r"[^A-Za-z0-9_]", "_", mover.name) + "/"
+            name = name if name[0].isalpha() else f"vehicle_{name}"
         messages = _messages(
             mover, step=step, begin=begin, frame=frame, body_frame=name + body_frame, prefix=name
         )
@@ -186,12 +189,6 @@ def _messages(
     if steering is not None:
         messages["ackermann_cmd"] = _ackermann(rows, steering, stamps, body_frame)
     return messages | {"tf": _frames(frames, headers)}
-
-
-def _ros_name(name: str) -> str:
-    """A name that ROS takes for a part of a topic: letters, digits and underscores."""
-    kept = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    return kept if kept[:1].isalpha() else f"vehicle_{kept}"
 
 
 def _trajectory(

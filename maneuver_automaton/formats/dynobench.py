@@ -103,7 +103,9 @@ def dynobench_model(path: Path, document: Document, *, robot: int = 0) -> Stated
     """The model of a robot of a problem, by its number."""
     where: Where = ("robots", robot, "type")
     name = value_at(document, where, str, "the name of a model")
-    file = _model_file(path, name)
+    is_name = name == Path(name).name and "\0" not in name
+    above = [folder / "models" / f"{name}.yaml" for folder in path.absolute().parents if is_name]
+    file = next((one for one in above if one.is_file()), None)
     if file is not None:
         model = parse(read_text(file, what="a model"), name=str(file), what="a model")
     elif name in _KNOWN:
@@ -122,14 +124,6 @@ def dynobench_model(path: Path, document: Document, *, robot: int = 0) -> Stated
             f"version; need {READ}",
         )
     return StatedModel(name=name, dynamics=dynamics, document=model)
-
-
-def pose_and_state(dynamics: str, numbers: tuple[float, ...]) -> tuple[Array, Array]:
-    """The pose (3,) and the reduced state (n_z,) of a start or goal."""
-    pose, rest = np.array(numbers[:3]), np.array(numbers[3:])
-    if dynamics == "car_with_trailers":
-        rest = wrapped(pose[2] - rest)
-    return pose, rest
 
 
 def _first_order(name: str, model: Document, states: Sequence[Array]) -> StatedVehicle:
@@ -213,16 +207,6 @@ def _with(levels: Array, values: Array) -> Array:
     within = values[(values >= levels.min()) & (values <= levels.max())]
     kept = levels[(np.abs(levels[:, None] - within) > NEXT_TO).all(axis=1)]
     return np.unique(np.concatenate([kept, within])) + 0.0
-
-
-def _model_file(path: Path, name: str) -> Path | None:
-    """The nearest file of a model above a problem."""
-    if name != Path(name).name or "\0" in name:
-        return None
-    for folder in path.absolute().parents:
-        if (file := folder / "models" / f"{name}.yaml").is_file():
-            return file
-    return None
 
 
 def _limits(model: Document, least: str, most: str) -> tuple[float, float]:
@@ -315,7 +299,8 @@ def _end(document: Document, robot: int, what: str, model: StatedModel) -> tuple
         raise document.error(
             (*where, 2), f"got the heading {numbers[2]:g}, need at most {MOST_HEADING:g} rad"
         )
-    return pose_and_state(model.dynamics, numbers)
+    pose, rest = np.array(numbers[:3]), np.array(numbers[3:])
+    return pose, wrapped(pose[2] - rest) if model.dynamics == "car_with_trailers" else rest
 
 
 def _check_state(

@@ -28,8 +28,6 @@ from maneuver_automaton.formats.documents import check_value, misstated
 from maneuver_automaton.formats.entries import Flag, Number, Positive, Whole
 from maneuver_automaton.formats.lattice import (
     ON_GRID,
-    SPEED,
-    TURN_RATE,
     Lattice,
     Move,
     arcs,
@@ -130,9 +128,7 @@ def save_nav2_lattice(file: Nav2File, path: Path) -> None:
     write_text_atomically(path, json.dumps(file, indent="\t", allow_nan=False) + "\n")
 
 
-def automaton_of_nav2_lattice(
-    file: Nav2File, *, speed: float = SPEED, turn_rate: float = TURN_RATE, name: str = ""
-) -> Automaton:
+def automaton_of_nav2_lattice(file: Nav2File, *, name: str = "") -> Automaton:
     """The automaton of a file, its times as `automaton_of_lattice` has them."""
     head = file["lattice_metadata"]
     lattice = Lattice(
@@ -142,7 +138,7 @@ def automaton_of_nav2_lattice(
         turning_radius=head["turning_radius"],
         name=name,
     )
-    return automaton_of_lattice(lattice, speed=speed, turn_rate=turn_rate)
+    return automaton_of_lattice(lattice)
 
 
 def nav2_lattice_of_automaton(automaton: Automaton) -> Nav2File:

@@ -75,9 +75,7 @@ def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float
     return float(plan.switching_times[k] - plan.start_time + free[k])
 
 
-def stands_free(
-    problem: Problem, pose: Array, *, time: float, duration: float, margin: float = PROVEN
-) -> float:
+def stands_free(problem: Problem, pose: Array, *, time: float, duration: float) -> float:
     """How long from `time` on [s] it is proven free to stand at a pose, at most `duration`."""
     query = lattice_query(problem, (0,))
     (free,) = free_times(
@@ -85,7 +83,7 @@ def stands_free(
         query.world.into(pose)[None],
         twists=np.zeros((1, 3)),
         durations=[duration],
-        margin=min(margin, PROVEN_SHARE * query.margin),
+        margin=min(PROVEN, PROVEN_SHARE * query.margin),
         keep=problem.margin,
         times=[time],
     )

@@ -11,10 +11,8 @@ from maneuver_automaton.models import Model, VectorField, rollout
 from maneuver_automaton.models.speeds import is_too_sharp
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.maneuvers import (
-    ManeuverObjective,
     Transfer,
     TransferProgram,
-    TransferSettings,
     drawn_in,
     duration_guess,
     solve_transfer,
@@ -123,8 +121,6 @@ def connect(
     source: Trim,
     target: Trim,
     *,
-    objective: ManeuverObjective | None = None,
-    settings: TransferSettings | None = None,
     program: TransferProgram | None = None,
     control_limits: Array | None = None,
 ) -> TrimConnection:
@@ -136,7 +132,7 @@ def connect(
 
     Source: Frazzoli, Dahleh, Feron (2005), Sec. III-B.
     """
-    program = program or transfer_program(model, objective=objective, settings=settings)
+    program = program or transfer_program(model)
     outside = _outside(model, source) or _outside(model, target)
     if np.array_equal(source.reduced_state, target.reduced_state):
         raise ValueError(

@@ -171,19 +171,16 @@ def follows_paths(model: Model) -> bool:
     return hasattr(model, "kinematic") and hasattr(model, "state_along")
 
 
-def kinematic_problem(
-    problem: Problem, *, switch: float = SWITCH_SHARE, direction_change: float = 0.0
-) -> Problem:
+def kinematic_problem(problem: Problem, *, switch: float = SWITCH_SHARE) -> Problem:
     """The problem of the kinematic vehicle at its greatest speeds between the same obstacles.
 
-    Its cost is time; `switch` and `direction_change` are prices in units of the time that the
-    vehicle with inertia takes to change its reduced state from one limit to the other.
+    Its cost is time; `switch` is a price in units of the time that the vehicle with inertia takes
+    to change its reduced state from one limit to the other.
     """
     model = problem.automaton.model
     automaton = extreme_automaton(model)  # type: ignore[arg-type]
     slowest = float(np.max(np.ptp(model.reduced_limits, axis=1) / model.control_limits[:, 1]))
-    cost = Cost(time=1.0, switch=switch * slowest, direction_change=direction_change * slowest)
-    return simpler_problem(problem, automaton, cost=cost)
+    return simpler_problem(problem, automaton, cost=Cost(time=1.0, switch=switch * slowest))
 
 
 def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Problem:

@@ -44,14 +44,13 @@ def steer_linked_words(
     alternatives: int = 0,
     budget: Budget = UNLIMITED,
     upper_bound: float = math.inf,
-    alphabet: int = ALPHABET,
 ) -> SearchResult:
     """Words of up to three trims, and a climb, from the steering function; see `scan_linked_words`.
 
     A first answer, and a bound for all that follows: it takes a hundredth of the time of a scan.
     Where more is asked of a word than to end at the goal, its times are a start to be solved from.
     """
-    setup = word_setup(problem, goal, most_trims=alphabet, steers=True)
+    setup = word_setup(problem, goal, most_trims=ALPHABET, steers=True)
     # the times of so few trims follow from the pose: to meet a time exactly is left to the scan
     headings = _headings(problem, goal)[: 0 if setup.exactly else None]
     refined = bool(goal.free_heading or setup.limit or problem.horizon.min_coast)

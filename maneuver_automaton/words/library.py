@@ -262,14 +262,13 @@ def library_of(
     *,
     rates: ArrayLike | None = None,
     maneuver_costs: ArrayLike | None = None,
-    most_trims: int = MOST_TRIMS,
     trims: Sequence[int] | None = None,
 ) -> Library:
     """All trims of an automaton, the transitions between them, and the words that are tried.
 
     `rates`: cost per second of each trim; 1 if omitted, so that cost is time. `maneuver_costs`:
-    cost of each maneuver; its duration if omitted. `most_trims`: trims that words are made of; of a
-    larger library those that differ most. `trims`: the trims that words are made of, instead.
+    cost of each maneuver; its duration if omitted. `trims`: those that words are made of; if
+    omitted, of a large library the few that differ most.
     """
     m = len(automaton)
     per_second = _costs("rates", np.ones(m) if rates is None else rates, m)
@@ -280,7 +279,7 @@ def library_of(
     twists = four_columns(automaton.body_velocities)
     transitions = transitions_of(automaton, prices)
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
-    chosen = moving[most_different(twists[moving], most_trims)].tolist() if trims is None else trims
+    chosen = moving[most_different(twists[moving], MOST_TRIMS)].tolist() if trims is None else trims
     words, n_few = words_of([int(k) for k in chosen], transitions)
     arrays = library_arrays(
         twists,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from maneuver_automaton.audit.outlines import outline_of
+from maneuver_automaton.audit.outlines import body_outline
 from maneuver_automaton.collision import Box, Polygon
 from maneuver_automaton.collision.outline import outlines, rings_of, united
 
@@ -83,5 +83,5 @@ def test_a_piece_that_a_union_loses_is_found_again(monkeypatch):
     assert united(squares).area == pytest.approx(4.5)
     assert sum(part.area for part in outlines(knot)) == pytest.approx(2.0)
     assert united([squares[0], squares[3]]).area == pytest.approx(3.0)
-    rings = outline_of((knot,))
+    rings = body_outline((knot,)).edges
     assert rings.holds(np.array([0.3 + 1.0j, 1.7 + 1.0j])).tolist() == [[True, True]]
