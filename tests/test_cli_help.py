@@ -10,8 +10,7 @@ import typer.main
 
 import maneuver_automaton as ma
 from maneuver_automaton.cli import run
-from maneuver_automaton.cli.app import app
-from maneuver_automaton.cli.help_texts import EXAMPLES
+from maneuver_automaton.cli.app import EXAMPLES, app
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 ROOT = typer.main.get_command(app)

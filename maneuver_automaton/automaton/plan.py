@@ -18,7 +18,7 @@ from maneuver_automaton._display import Played
 from maneuver_automaton.automaton.plan_arrays import PlanArrays, plan_arrays
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.groups import SE2, LieGroup, group_of
-from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting
+from maneuver_automaton.groups.se2 import chained, coasted, end_of_coasting
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from maneuver_automaton.primitives.driving import along

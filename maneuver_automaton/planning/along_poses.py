@@ -71,11 +71,6 @@ class Chain:
     legs: tuple[PlanResult, ...] = ()
     goal_index: int | None = None
 
-    @property
-    def mask(self) -> int:
-        """The poses on the way that were passed, as bits."""
-        return sum(1 << k for k in self.passed)
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AlongPoses(PlanningStep):

@@ -266,11 +266,6 @@ class Cast:
         """Whether they are too many for a legend."""
         return len(self.actors) > MOST_NAMES
 
-    @property
-    def flies(self) -> bool:
-        """Whether they are vehicles in space."""
-        return all(one.track.start.size > 3 for one in self.actors)
-
 
 def cast_of(recording: Recording) -> Cast:
     """The vehicles of a recording, and what is around them."""

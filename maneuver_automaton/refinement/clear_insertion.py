@@ -22,7 +22,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.groups.chain import coasted
+from maneuver_automaton.groups.se2 import coasted
 from maneuver_automaton.refinement.fitting import TIME_TOLERANCE
 from maneuver_automaton.refinement.work import SNAP, VIA
 from maneuver_automaton.search import _kernels_insertion

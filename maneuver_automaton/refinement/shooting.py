@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.se2 import chained
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.refinement.retiming import control_box, driftless

@@ -16,7 +16,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.groups.chain import chained, coasted
+from maneuver_automaton.groups.se2 import chained, coasted
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search import _kernels_price as kernels
 from maneuver_automaton.words._kernels_times import TimesProblem

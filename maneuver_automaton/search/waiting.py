@@ -6,7 +6,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.groups.chain import coasted
+from maneuver_automaton.groups.se2 import coasted
 from maneuver_automaton.search import _kernels_waiting as kernels
 from maneuver_automaton.search.arrays import PathArrays, PathSearch
 from maneuver_automaton.search.lattice_pass import with_cost

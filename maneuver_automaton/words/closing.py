@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained, coasted
+from maneuver_automaton.groups.se2 import chained, coasted
 from maneuver_automaton.words import _kernels_closing
 from maneuver_automaton.words import _kernels_steering as kernels
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from maneuver_automaton.groups import group_of
-from maneuver_automaton.groups.chain import chained, coasted, end_of_coasting, seen_from
+from maneuver_automaton.groups.se2 import chained, coasted, end_of_coasting, seen_from
 
 RATES = st.sampled_from([0.0, 1.0]) | st.floats(-3.0, 3.0) | st.floats(-1e-7, 1e-7)
 

@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 
 from maneuver_automaton._arrays import wrapped
 from maneuver_automaton.groups import SE2, group_of
-from maneuver_automaton.groups.chain import chained
+from maneuver_automaton.groups.se2 import chained
 from maneuver_automaton.words import TimesStatus, solve_switching_times
 from maneuver_automaton.words.closing import closed_at, conjugated
 
