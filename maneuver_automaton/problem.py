@@ -515,11 +515,10 @@ class Problem:
         return self.automaton.trims[int(np.argmin(off))]
 
     def _trim_or_rest(self, name: str | None) -> Trim:
+        """A trim by its name, or rest; any trim where there is no rest and it is left at will."""
         if name is not None:
             return self.automaton[name]
-        if self.automaton.rest is None:
-            raise ValueError(f"the {self.automaton.model.name} has no trim that stands still")
-        return self.automaton.trims[self.automaton.rest]
+        return self.automaton.trims[self.automaton.rest or 0]
 
     @property
     def rates(self) -> Array:

@@ -37,7 +37,6 @@ from maneuver_automaton.receding_horizon.log import (
 from maneuver_automaton.receding_horizon.over_maneuvers import (
     OverManeuvers,
     needs_maneuvers,
-    with_trims_at_ends,
     within_its_margin,
 )
 from maneuver_automaton.receding_horizon.settings import Settings, filling_rest
@@ -421,11 +420,9 @@ def _started(
 ) -> tuple[Situation, StepSearch]:
     """A step under way, and where its plans come from; the parameters are those of `Situation`."""
     maneuvers, broken = needs_maneuvers(here), ""
-    if maneuvers:
-        here = with_trims_at_ends(here)
-        if here.margin and here.obstacles and here.start.size == 3:
-            here, broken = within_its_margin(here)
-    elif here.obstacles:
+    if maneuvers and here.margin and here.obstacles and here.start.size == 3:
+        here, broken = within_its_margin(here)
+    elif not maneuvers and here.obstacles:
         here, broken = as_it_stands(here)
     now = Situation(
         settings, here, last, passed=passed, budget=budget, changed=changed, state=state

@@ -304,29 +304,6 @@ def needs_maneuvers(problem: Problem) -> bool:
     return bool(problem.zones) or problem.climbs_among_obstacles
 
 
-def with_trims_at_ends(problem: Problem) -> Problem:
-    """The problem with a trim at its start and goals, where a kinematic vehicle has no rest.
-
-    Which one it is makes no difference: it lasts no time, and is left at will.
-
-    Examples
-    --------
-    >>> from maneuver_automaton import Automaton, Unicycle
-    >>> robot = Automaton.of_controls(Unicycle(), {"ahead": (1, 0), "left": (1, 1)})
-    >>> with_trims_at_ends(Problem(robot, [0, 0, 0], [1, 0, 0])).start_trim
-    'ahead'
-    """
-    automaton = problem.automaton
-    if automaton.rest is not None or not automaton.is_kinematic:
-        return problem
-    name = automaton.trim_names[0]
-    return replace(
-        problem,
-        start_trim=problem.start_trim or name,
-        goals=tuple(replace(goal, trim=goal.trim or name) for goal in problem.goals),
-    )
-
-
 def within_its_margin(here: Problem) -> tuple[Problem, str]:
     """The problem with a margin that the vehicle's own body keeps, and the one that it breaks.
 
