@@ -207,7 +207,7 @@ def _defect(problem: Problem, pieces: Sequence[Plan]) -> str:
             audit = audit_plan(piece, goal, problem.automaton.model, footprint=(), obstacles=())
             if not audit.passed:
                 return f"at {piece.start_time:.6g} s: {audit.reason}"
-        if problem.has_inertia and piece.trims:
+        if piece.trims:
             was = problem.first_trim.reduced_state if before is None else end_state(before)
             now, before = begin_state(piece), piece
             if not same_state(now, was):

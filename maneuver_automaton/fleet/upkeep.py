@@ -192,9 +192,8 @@ def _drives_beside(now: Moment, k: int, found: OwnPlan, choices: Sequence[OwnPla
     tube, here = now.state.settings.tube_m, now.from_here(k).plan
     back = back_onto(vehicle, found, now.time, now.poses[k], step, tube)
     # A step later all but the pose must be as the plan that is held has it.
-    at_will, wanted = switches_at_will(vehicle.problem), state_after(here)
-    ways = [one.plan for one in choices]
-    plans = [here, *(one for one in ways if at_will or same_state(state_after(one), wanted))]
+    wanted, ways = state_after(here), [one.plan for one in choices]
+    plans = [here, *(one for one in ways if same_state(state_after(one), wanted))]
     for plan in [*([] if back is None else [back]), *sorted(plans, key=farthest)]:
         if not why_not_free(vehicle, vehicle.course_of(begin_of(vehicle, plan, step)), 0.0):
             now.beside[k] = plan

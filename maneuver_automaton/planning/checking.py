@@ -115,10 +115,8 @@ def check_plan(
             prices=tuple(one.price for one in prices),
             whole=problem.cost_of(plan) if prices else 0.0,
         )
-        ends = None  # reduced states in which a vehicle with inertia begins and ends
-        if not problem.automaton.is_kinematic:
-            last = problem.last_trim(replace(goal, pose=plan.end))
-            ends = problem.first_trim.reduced_state, last.reduced_state
+        last = problem.last_trim(replace(goal, pose=plan.end))
+        ends = problem.first_trim.reduced_state, last.reduced_state  # in which it begins and ends
         audit = audit_plan(
             plan,
             goal,

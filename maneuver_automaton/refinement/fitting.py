@@ -134,8 +134,6 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
 def _joined(problem: Problem, goal: Goal) -> list[Trim]:
     """The moving trims that need no maneuver on the way from the first trim to the last."""
     automaton = problem.automaton
-    if automaton.is_kinematic:
-        return [trim for trim in automaton.trims if not trim.is_rest]
     classes = automaton.trim_classes.tolist()
     ends = (problem.first_trim.name, problem.last_trim(goal).name)
     first, last = (classes[automaton.index_of(name)] for name in ends)
