@@ -148,8 +148,7 @@ class _Legs:
     def __post_init__(self) -> None:
         automaton, stays = self.between.automaton, replace(self.between.horizon, stay=False)
         # Each leg names its trims; of a vehicle that cannot stand still, one must be named before.
-        moves = automaton.rest is None and not automaton.is_kinematic
-        some = automaton.trim_names[0] if moves else None
+        some = automaton.trim_names[0] if automaton.rest is None else None
         self.last = replace(self.between, start_trim=some, start_state=None)
         to = Goal(self.between.start, trim=some)
         self.middle = replace(self.last, goals=(to,), horizon=stays)
