@@ -13,7 +13,14 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.groups import group_of
 from maneuver_automaton.models import Model
-from maneuver_automaton.places import PlaceCost, allowed, gradient_of, rates_along, scale_of
+from maneuver_automaton.places import (
+    PlaceCost,
+    allowed,
+    gradient_of,
+    rates_along,
+    scale_of,
+    smoothed,
+)
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import along
 from maneuver_automaton.primitives.primitive import Trajectory
@@ -95,12 +102,13 @@ class TimedPrices:
     """What the places of a word cost, by its coasting times: a smooth stand-in for the price.
 
     Gauss's rule with as many points as suit the times it begins with, so that the price changes
-    smoothly with them. A trim that lasts longer moves all that follows about where it ends; so the
-    gradients of rates add up, backwards over the word, to the derivatives of the price.
+    smoothly with them. A trim that lasts longer moves its own points in its direction, each by its
+    share, and all that follows with its end; so the gradients of rates add up, backwards over the
+    word, to the derivatives of the same sum.
     """
 
     def __init__(self, costs: Sequence[PlaceCost], plan: Plan, model: Model) -> None:
-        self.costs, self.plan, self.model = costs, plan, model
+        self.costs, self.plan, self.model = [smoothed(one) for one in costs], plan, model
         longer = replace(plan, durations=np.maximum(LONGER * plan.durations, LEAST_S))
         self.timed = np.flatnonzero([isinstance(one, Trim) for one in longer.primitives])
         stretches = _first_stretches(longer, min(map(scale_of, costs)))
@@ -115,32 +123,36 @@ class TimedPrices:
         # Beside maneuvers a plan leaves trims out that last no time.
         plan = replace(self.plan, durations=np.maximum(durations, MOMENT))
         lasting = plan.primitive_durations[self.piece]
+        weights = self.weights * lasting
+        spatial = self._spatial(plan)
         price, slopes = 0.0, np.zeros(len(self.timed))
         for cost in self.costs:
             motion = _Motion(cost, plan, self.model)
             poses, twists, states = motion.steps(self.piece, self.shares * lasting)
             rates, moved = motion.slopes(poses, twists, states)
-            weights = self.weights * lasting
             price += float(weights @ rates)
-            x, y = poses[:, 0], poses[:, 1]
-            turned = moved[:, 2] + x * moved[:, 1] - y * moved[:, 0]  # about the origin
-            moved[:, 2] = turned
-            later = np.zeros((len(plan.primitives), moved.shape[1]))
-            np.add.at(later, self.piece, weights[:, None] * moved)
-            later = later[::-1].cumsum(axis=0)[::-1] - later
-            slopes += self._slopes(motion, later[self.timed])
+            x, y = (poses[:, :2] - plan.start[:2]).T
+            moved[:, 2] += x * moved[:, 1] - y * moved[:, 0]  # about the start
+            moved *= weights[:, None]
+            longer = np.zeros(len(plan.primitives))
+            inside, later = (np.zeros((len(plan.primitives), plan.start.size)) for _ in range(2))
+            np.add.at(longer, self.piece, self.weights * rates)
+            np.add.at(inside, self.piece, self.shares[:, None] * moved)
+            np.add.at(later, self.piece, moved)
+            inside += later[::-1].cumsum(axis=0)[::-1] - later
+            slopes += (longer + (spatial * inside).sum(axis=1))[self.timed]
         return price, slopes
 
-    def _slopes(self, motion: _Motion, later: Array) -> Array:
-        """Derivatives by the coasting times: of what is `later` (n, dof), and where each ends."""
-        ends = motion.plan.switching_poses[self.timed + 1]
-        twists, states = motion.twists[self.timed], motion.states[self.timed]
-        c, s, turn = np.cos(ends[:, 2]), np.sin(ends[:, 2]), twists[:, 2]
-        v_x = c * twists[:, 0] - s * twists[:, 1] + turn * ends[:, 1]  # seen from the origin
-        v_y = s * twists[:, 0] + c * twists[:, 1] - turn * ends[:, 0]
-        spatial = np.column_stack([v_x, v_y, turn, twists[:, 3:]])
-        rates, _ = motion.slopes(ends, twists, states)
-        return np.asarray(rates + (spatial * later).sum(axis=1))
+    def _spatial(self, plan: Plan) -> Array:
+        """Twists (n, dof) of the coasts, seen from the place of the start; 0 of maneuvers."""
+        rest, begins = np.zeros(plan.start.size), plan.switching_poses[:-1]
+        every = [one.body_velocity if isinstance(one, Trim) else rest for one in plan.primitives]
+        spatial = np.array(every)
+        (x, y), (v, w) = (begins[:, :2] - plan.start[:2]).T, spatial[:, :2].T
+        c, s = np.cos(begins[:, 2]), np.sin(begins[:, 2])
+        turn = spatial[:, 2]
+        spatial[:, 0], spatial[:, 1] = c * v - s * w + turn * y, s * v + c * w - turn * x
+        return spatial
 
 
 class _Motion:

@@ -46,7 +46,8 @@ class PlaceCost(Protocol):
     Rates and `per` are all that it takes. It may also have ``gradient(poses, velocities)``, its
     derivatives (..., dof) by the pose; ``least(low, high)``, a number that no rate is below while
     x and y [m] are in a box; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the cost once
-    it knows obstacles and body; ``scale`` [m], the size of its finest feature;
+    it knows obstacles and body; ``smooth()``, nearly the same without jumps, for better coasting
+    times; ``scale`` [m], the size of its finest feature;
     and ``allows(poses, velocities)``, where the vehicle may be at all. What is missing is found by
     differences, is 0, or is the cost at poses moved back.
 
@@ -227,6 +228,7 @@ class Ground:
     price: float = 1.0
     per: str = field(default="metre", kw_only=True)
     raster: Raster | None = field(default=None, kw_only=True)
+    edge: float = field(default=0.0, kw_only=True)  # [m] over which the price of areas rises
 
     __repr__ = brief
 
@@ -369,7 +371,8 @@ class Ground:
     def rates(self, poses: Array, velocities: Array) -> Array:
         """Rates (...,) at poses (..., dof) under body velocities (..., dof)."""
         if self.raster is None:
-            return np.asarray(self.price * self._inside(poses[..., :2]))
+            inside = self._depths if self.edge else self._inside
+            return np.asarray(self.price * inside(poses[..., :2]))
         if not self.raster.are_heights:
             return np.asarray(self.price * self.raster.at(self.raster.values, poses[..., :2]))
         uphill, speed = self.raster.climb(poses, velocities)
@@ -394,6 +397,10 @@ class Ground:
         solid = [part.core for part in parts_of(self.areas) if not part.radius]
         return self.price if solid and shapely.union_all(solid).covers(box) else 0.0
 
+    def smooth(self) -> Ground:
+        """Ground that is nearly the same, but has no jump at the edge of an area."""
+        return self if self.raster is not None else replace(self, edge=self.scale)
+
     def moved(self, by: LieGroup) -> Ground:
         """The ground moved by a planar pose."""
         raster = None if self.raster is None else self.raster.moved(by)
@@ -412,6 +419,23 @@ class Ground:
             shapely.prepare(part.core)
             inside[near] = shapely.intersects_xy(part.core, places[near])
         return inside
+
+    def _depths(self, places: Array) -> Array:
+        """From 0 half an edge outside of all areas to 1 as far inside of one, without a kink."""
+        import shapely
+
+        parts, points = parts_of(self.areas), shapely.points(places)
+        depth = np.full(places.shape[:-1], -math.inf)
+        for disc in parts:
+            if disc.radius:
+                away = disc.radius - np.hypot(*np.moveaxis(places - disc.middle, -1, 0))
+                depth = np.maximum(depth, away)
+        if solid := [part.core for part in parts if not part.radius]:
+            whole = shapely.union_all(solid)
+            away = shapely.distance(whole.boundary, points)
+            depth = np.maximum(depth, np.where(shapely.intersects(whole, points), away, -away))
+        share = np.clip(0.5 + depth / self.edge, 0.0, 1.0)
+        return np.asarray(share * share * (3.0 - 2.0 * share))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -558,6 +582,12 @@ def least_of(cost: PlaceCost, low: ArrayLike, high: ArrayLike) -> float:
     return 0.0 if own is None else own(low, high)
 
 
+def smoothed(cost: PlaceCost) -> PlaceCost:
+    """The cost without jumps; itself if it does not say."""
+    own: Callable[[], PlaceCost] | None = getattr(cost, "smooth", None)
+    return cost if own is None else own()
+
+
 def extent_of(cost: PlaceCost) -> tuple[Shape, ...]:
     """Shapes outside of which it is 0; none if the cost does not say."""
     own: tuple[Shape, ...] = getattr(cost, "extent", ())
@@ -590,14 +620,19 @@ def gradient_of(
     own: Callable[[Array, Array], Array] | None = getattr(cost, "gradient", None)
     if own is not None:
         return np.array(own(poses, velocities))
-    slopes = np.empty(poses.shape)
-    for k in range(poses.shape[-1]):
-        step = np.zeros(poses.shape[-1])
-        step[k] = STEP
+    axes = np.zeros((poses.shape[-1], *poses.shape))  # the vehicle's, which move with a problem
+    for k, axis in enumerate(axes):
+        axis[..., k] = 1.0
+    c, s = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    axes[0, ..., 0], axes[0, ..., 1] = c, s
+    axes[1, ..., 0], axes[1, ..., 1] = -s, c
+    slopes = np.zeros(poses.shape)
+    for axis in axes:
         ahead, behind = (
-            rates_along(cost, poses + sign * step, velocities, states) for sign in (1.0, -1.0)
+            rates_along(cost, poses + sign * STEP * axis, velocities, states)
+            for sign in (1.0, -1.0)
         )
-        slopes[..., k] = (ahead - behind) / (2.0 * STEP)
+        slopes += ((ahead - behind) / (2.0 * STEP))[..., None] * axis
     return slopes
 
 

@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import NOTHING
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.groups import group_of
+from maneuver_automaton.optimal_control.scene import settled
 from maneuver_automaton.place_prices import TimedPrices
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.refinement.fitting import without_nothing
@@ -22,7 +23,7 @@ from maneuver_automaton.words.closing import EndConditions, conjugated
 INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100
 ACCURACY = 1e-12  # of the cost, relative to itself
-ROUGHLY = 1e-8  # the same where places cost something, whose price is not that smooth
+ROUGHLY = 1e-6  # the same where places cost something, whose price is not that smooth
 CLOSING_STEPS = 4
 RANK = 1e-9  # singular values below this, relative, count as none
 
@@ -95,22 +96,23 @@ class _Relaxation:
 
     @cached_property
     def _ending(self) -> EndConditions:
-        """Conditions of the times to end at the goal, seen from its place."""
+        """Conditions of the times to end at the goal, seen from there as a moved problem is."""
         plan, group = self.plan, group_of(self.plan.start.size)
         goal, start = np.array(self.goal.pose), np.array(plan.start)
         places = [0, 1, *range(3, start.size)]
         start[places] -= goal[places]  # places first, so that no digit is lost
         goal[places] = 0.0
+        start = (group(goal).inverse() @ group(start)).pose
         twists = np.array([trim.body_velocity for trim in plan.trims])
         if any(plan.maneuvers):
             steps = [one.displacement if one else np.zeros(start.size) for one in plan.maneuvers]
             twists, product = conjugated(twists, np.array(steps))
             twists = twists @ group(product).inverse().adjoint().T
             start = (group(start) @ group(product)).pose
-        return EndConditions(start=start, twists=twists, goal=goal)
+        return EndConditions(start=start, twists=twists, goal=np.zeros(start.size))
 
     def off(self, times: Array) -> tuple[Array, Array]:
-        """Last pose (dof,) seen from the place of the goal; how it follows the times (dof, n)."""
+        """Last pose (dof,) seen from the goal; how it follows the times (dof, n)."""
         missing, columns = self._ending.missing(times)
         return -missing, columns
 
@@ -164,13 +166,17 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
         conditions.append(
             {
                 "type": "eq",
-                "fun": lambda t: task.exact(t)[0][rows],
-                "jac": lambda t: task.exact(t)[1][rows],
+                "fun": lambda t: settled(task.exact(t)[0][rows]),
+                "jac": lambda t: settled(task.exact(t)[1][rows]),
             }
         )
     if task.room(begin)[0].size:
         conditions.append(
-            {"type": "ineq", "fun": lambda t: task.room(t)[0], "jac": lambda t: task.room(t)[1]}
+            {
+                "type": "ineq",
+                "fun": lambda t: settled(task.room(t)[0]),
+                "jac": lambda t: settled(task.room(t)[1]),
+            }
         )
 
     def ask(times: Array) -> None:
@@ -181,8 +187,11 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
     places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
 
     def cost(times: Array) -> tuple[float, Array]:
-        price, slopes = places.at(times) if places else (0.0, 0.0)
-        return (float(rates @ times) + price) / scale, (rates + slopes) / scale
+        if places is None:
+            return float(rates @ times) / scale, rates / scale
+        price, slopes = places.at(times)
+        value = settled((rates @ times + price) / scale)
+        return float(value), settled((rates + slopes) / scale)
 
     try:
         solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
@@ -193,7 +202,10 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
             bounds=Bounds(least, longest),
             constraints=conditions,
             callback=ask,
-            options={"maxiter": ITERATIONS, "ftol": ROUGHLY if costs else ACCURACY},
+            options={
+                "maxiter": ITERATIONS,
+                "ftol": ROUGHLY * cost(begin)[0] if costs else ACCURACY,
+            },
         )
     except _OutOfTime:
         return None

@@ -33,7 +33,12 @@ COSTS = {
         np.add.outer(np.arange(8.0)[::-1] ** 2, np.zeros(20)), resolution=1.0, origin=[-2, -4, 0]
     ),
     "own": Dear(),
-}
+    "hills": ma.Ground.of_elevation(
+        3.0 * np.exp(-np.add.outer((np.arange(20) - 7) ** 2, (np.arange(40) - 19) ** 2) / 16.0),
+        resolution=0.5, origin=[-2, -4, 0], price=6.0,
+    ),
+    "area": ma.Ground(ma.Box([3.0, 2.0], [7.0, 1.0], heading=0.3), price=2.0),
+}  # fmt: skip
 
 
 def problem(cost):
@@ -59,7 +64,7 @@ def optimum(here, begin):
     return minimize(cost, begin[[0, 3]], method="Nelder-Mead", options={"maxfev": 60}).fun
 
 
-@pytest.mark.parametrize("name", ["raster", "own"])
+@pytest.mark.parametrize("name", ["raster", "own", "hills"])
 def test_times_are_as_good_as_an_independent_optimum(name):
     here = problem(COSTS[name])
     better = with_relaxed_end(here, BEGUN, here.goals[0])
@@ -70,14 +75,25 @@ def test_times_are_as_good_as_an_independent_optimum(name):
 
 
 @pytest.mark.parametrize("name", COSTS)
+def test_a_moved_word_has_the_same_times(name):
+    here = problem(COSTS[name])
+    by = ma.SE2([30.0, -17.0, 2.1])
+    there = here.moved(by)
+    one = with_relaxed_end(here, BEGUN, here.goals[0])
+    other = with_relaxed_end(there, BEGUN.moved(by), there.goals[0])
+    assert other.durations == pytest.approx(one.durations, abs=1e-6)
+    assert there.cost_of(other) == pytest.approx(here.cost_of(one), rel=1e-8)
+
+
+@pytest.mark.parametrize("name", COSTS)
 def test_slopes_are_differences(name):
     prices = TimedPrices(problem(COSTS[name]).bound_place_costs, BEGUN, CAR.model)
     price, slopes = prices.at(BEGUN.durations)
     whole = sum(one.price for one in problem(COSTS[name]).place_prices_of(BEGUN))
-    assert price == pytest.approx(whole, rel=2e-3)
+    assert price == pytest.approx(whole, rel=2e-3 if name != "area" else 2e-2)
     for k, step in enumerate(1e-4 * np.eye(5)):
         ahead, behind = (prices.at(BEGUN.durations + sign * step)[0] for sign in (1.0, -1.0))
-        assert slopes[k] == pytest.approx((ahead - behind) / 2e-4, abs=0.05 * np.abs(slopes).max())
+        assert slopes[k] == pytest.approx((ahead - behind) / 2e-4, abs=1e-3 * np.abs(slopes).max())
 
 
 @pytest.mark.slow

@@ -1,6 +1,7 @@
 """What places cost, in searches: the same as along the plan, and worth a detour."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -138,11 +139,12 @@ def test_dear_ground_in_the_open_is_worth_a_detour():
     result = ma.plan(problem)
     straight = ma.plan(ma.Problem(CAR, [0, 0, 0], [20, 0, 0])).plan
     assert problem.cost_of(straight) == pytest.approx(20.0 + 18.0, rel=1e-3)
-    assert result.cost < 24.0
+    assert result.cost < 21.5
     assert problem.place_prices_of(result.plan)[0].price < 1.0
-    word = word_of_plan(CAR, result.plan)
-    seen = with_cost(word, lattice_query(problem, [0])).cost
-    assert seen == pytest.approx(result.cost, rel=5e-3, abs=0.1)
+    # Best times lead along the edge, which the raster of the search blurs; its own word does not.
+    first = ma.plan(replace(problem, search=replace(problem.search, improve=False)))
+    seen = with_cost(word_of_plan(CAR, first.plan), lattice_query(problem, [0])).cost
+    assert seen == pytest.approx(first.cost, rel=5e-3, abs=0.1)
 
 
 @pytest.mark.slow
