@@ -189,6 +189,7 @@ def _words(moving: IntArray, twists: Array) -> IntArray:
 
 DIRECTIONS = 8  # straight, on the spot, and between the two, with both signs
 NEAR = 0.03  # [rad] from a direction, within which the cheapest trim stands for it
+COVERED = 0.8  # share of what the farthest trim reaches in a direction that a few have to reach
 LOOKS = 720  # directions in which the trims that pay are looked for
 SAME_PATH = 1e-12  # of the cosine between two twists that lead along one path
 PACES, STEPS = 8, 128  # prices of time that double, and how many are tried on either side
@@ -200,12 +201,13 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
 
     In the plane of speed and turn rate, each divided by its greatest, some directions are taken;
     for each the trim that is the cheapest for what it covers, of equal ones the nearest to the
-    direction, then the fastest. Where nothing turns on the spot, the sharpest turns too, and the
-    cheapest straight motions aside. Twists are (m, 3) or (m, 4), rates (m,) are costs per second,
-    and the number of directions is a multiple of eight.
+    direction, then the fastest. Where nothing turns on the spot, the sharpest turns too; last,
+    aside and between all three, what reaches far for its cost where none of these does. Twists are
+    (m, 3) or (m, 4), rates (m,) are costs per second, and the number of directions is a multiple
+    of eight.
     """
-    aside = twists[:, 1] != 0.0
-    along = np.flatnonzero(~aside) if not aside.all() else np.arange(len(twists))
+    ahead = np.abs(twists[:, 1]) <= np.abs(twists[:, 0])
+    along = np.flatnonzero(ahead) if ahead.any() else np.arange(len(twists))
     chosen: list[int] = []
     plane = _plane(twists[along])
     angles, sizes = np.arctan2(plane[:, 1], plane[:, 0]), np.hypot(*plane.T)
@@ -224,12 +226,14 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
                 most = float(sharp[turning].max(initial=0.0))
                 sharpest = np.flatnonzero(turning & (sharp >= most * (1.0 - 1e-9)))
                 chosen += _cheapest(along, sharpest, rates[along], np.abs(plane[:, 0]), -sizes)
-    for sign in (1.0, -1.0):
-        sideways = np.flatnonzero((sign * twists[:, 1] > 0.0) & (twists[:, 2] == 0.0))
-        off = np.abs(twists[:, 0])
-        straight = sideways[off[sideways] == off[sideways].min(initial=math.inf)]
-        every = np.arange(len(twists))
-        chosen += _cheapest(every, straight, rates, sign * twists[:, 1], -sign * twists[:, 1])
+    with np.errstate(divide="ignore"):
+        reach = _scaled(twists[:, :3]) / rates[:, None].clip(min=1e-300)
+    for direction in sorted(itertools.product((-1.0, 0.0, 1.0), repeat=3), key=np.count_nonzero):
+        covered = reach @ np.array(direction)
+        most = float(covered.max())
+        if covered[chosen].max(initial=0.0) < COVERED * most:
+            sizes = np.where(covered >= most * (1.0 - 1e-9), np.abs(reach).sum(axis=1), math.inf)
+            chosen += np.flatnonzero(sizes <= sizes.min() * (1.0 + 1e-9)).tolist()
     return np.array(sorted(set(chosen)), dtype=np.int64)
 
 
@@ -255,8 +259,12 @@ def paying_trims(twists: Array, rates: Array) -> IntArray:
 
 def _plane(twists: Array) -> Array:
     """Speed and turn rate (m, 2), each divided by the greatest."""
-    plane = twists[:, [0, 2]]
-    return np.asarray(plane / np.abs(plane).max(axis=0, initial=0.0).clip(min=1e-300))
+    return _scaled(twists[:, [0, 2]])
+
+
+def _scaled(velocities: Array) -> Array:
+    """Components of velocities (m, n), each divided by the greatest."""
+    return np.asarray(velocities / np.abs(velocities).max(axis=0, initial=0.0).clip(min=1e-300))
 
 
 def _cheapest(
