@@ -201,18 +201,15 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
 
     In the plane of speed and turn rate, each divided by its greatest, some directions are taken;
     for each the trim that is the cheapest for what it covers, of equal ones the nearest to the
-    direction, then the fastest. Where nothing turns on the spot, the sharpest turns too; last,
-    aside and between all three, what reaches far for its cost where none of these does. Twists are
-    (m, 3) or (m, 4), rates (m,) are costs per second, and the number of directions is a multiple
-    of eight.
+    direction, then the fastest; where nothing turns on the spot, the sharpest turns; last what gets
+    far for its cost, aside as well, where none of these does. Rates (m,) are costs per second.
     """
     ahead = np.abs(twists[:, 1]) <= np.abs(twists[:, 0])
     along = np.flatnonzero(ahead) if ahead.any() else np.arange(len(twists))
     chosen: list[int] = []
     plane = _plane(twists[along])
     angles, sizes = np.arctan2(plane[:, 1], plane[:, 0]), np.hypot(*plane.T)
-    for k in range(directions):
-        angle = 2.0 * math.pi * k / directions
+    for angle in np.arange(directions) * (2.0 * math.pi / directions):
         off = np.abs(np.remainder(angles - angle + math.pi, 2.0 * math.pi) - math.pi)
         near = np.flatnonzero((off <= NEAR) & (sizes > 0.0))
         covered = plane @ np.array([math.cos(angle), math.sin(angle)])
@@ -220,19 +217,18 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     drives = (plane[:, 0] != 0.0) & (plane[:, 1] != 0.0)
     if not ((plane[:, 0] == 0.0) & (plane[:, 1] != 0.0)).any() and drives.any():
         sharp = np.where(drives, np.abs(plane[:, 1]) / np.abs(plane[:, 0]).clip(min=1e-300), 0.0)
-        for gear in (1.0, -1.0):
-            for side in (1.0, -1.0):
-                turning = drives & (plane[:, 0] * gear > 0.0) & (plane[:, 1] * gear * side > 0.0)
-                most = float(sharp[turning].max(initial=0.0))
-                sharpest = np.flatnonzero(turning & (sharp >= most * (1.0 - 1e-9)))
-                chosen += _cheapest(along, sharpest, rates[along], np.abs(plane[:, 0]), -sizes)
-    with np.errstate(divide="ignore"):
-        reach = _scaled(twists[:, :3]) / rates[:, None].clip(min=1e-300)
+        for gear, side in itertools.product((1.0, -1.0), repeat=2):
+            turning = drives & (plane[:, 0] * gear > 0.0) & (plane[:, 1] * gear * side > 0.0)
+            most = float(sharp[turning].max(initial=0.0))
+            sharpest = np.flatnonzero(turning & (sharp >= most * (1.0 - 1e-9)))
+            chosen += _cheapest(along, sharpest, rates[along], np.abs(plane[:, 0]), -sizes)
+    reach = twists[:, :3] / np.abs(twists[:, :3]).max(axis=0).clip(min=1e-300)
+    reach /= rates[:, None].clip(min=1e-300)
     for direction in sorted(itertools.product((-1.0, 0.0, 1.0), repeat=3), key=np.count_nonzero):
         covered = reach @ np.array(direction)
-        most = float(covered.max())
-        if covered[chosen].max(initial=0.0) < COVERED * most:
-            sizes = np.where(covered >= most * (1.0 - 1e-9), np.abs(reach).sum(axis=1), math.inf)
+        if covered[chosen].max(initial=0.0) < COVERED * covered.max():
+            farthest = covered >= covered.max() * (1.0 - 1e-9)
+            sizes = np.where(farthest, np.abs(reach).sum(axis=1), math.inf)
             chosen += np.flatnonzero(sizes <= sizes.min() * (1.0 + 1e-9)).tolist()
     return np.array(sorted(set(chosen)), dtype=np.int64)
 
@@ -259,12 +255,8 @@ def paying_trims(twists: Array, rates: Array) -> IntArray:
 
 def _plane(twists: Array) -> Array:
     """Speed and turn rate (m, 2), each divided by the greatest."""
-    return _scaled(twists[:, [0, 2]])
-
-
-def _scaled(velocities: Array) -> Array:
-    """Components of velocities (m, n), each divided by the greatest."""
-    return np.asarray(velocities / np.abs(velocities).max(axis=0, initial=0.0).clip(min=1e-300))
+    plane = twists[:, [0, 2]]
+    return np.asarray(plane / np.abs(plane).max(axis=0, initial=0.0).clip(min=1e-300))
 
 
 def _cheapest(
