@@ -17,24 +17,16 @@ FEW = 16  # numbers that are looked at faster one by one
 
 
 def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None) -> Array:
-    """`value` as finite float64 with `last` components in its last axis.
+    """`value` as finite float64 with `last` components in its last axis; `name` is for messages.
 
-    Parameters
-    ----------
-    name : str
-        What the message calls the value.
-    value : array_like
-        Numbers; anything that NumPy can turn into float64.
-    last : int or sequence of int, optional
-        Admitted lengths of the last axis; `None` admits any shape.
-
-    Returns
-    -------
-    array
-        A float64 array in the order of C; `value` itself if it is one.
+    Anything that NumPy can turn into float64 but text, of any shape where `last` is None. The array
+    is in the order of C, and `value` itself if it is one.
     """
     try:
-        array = np.asarray(value, dtype=np.float64, order="C")
+        known = np.asarray(value)
+        if known.dtype.kind in "SU":
+            raise TypeError("a text is no number")
+        array = np.asarray(known, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: got {value!r}, need numbers") from error
     if last is not None:

@@ -51,6 +51,7 @@ def test_without_a_length_any_shape_will_do():
         ("abc", None, "speed: got 'abc', need numbers"),
         ([1.0, [2.0]], None, "speed: got [1.0, [2.0]], need numbers"),
         ([{}], None, "speed: got [{}], need numbers"),
+        ([1.0, "2"], None, "speed: got [1.0, '2'], need numbers"),
         ([1.0, 2.0], 3, "speed: got shape (2,), need 3 components last"),
         ([[1.0, 2.0]], (3, 4), "speed: got shape (1, 2), need 3 or 4 components last"),
         (1.0, 1, "speed: got shape (), need 1 components last"),

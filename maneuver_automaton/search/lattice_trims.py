@@ -189,6 +189,7 @@ def _words(moving: IntArray, twists: Array) -> IntArray:
 
 DIRECTIONS = 8  # straight, on the spot, and between the two, with both signs
 NEAR = 0.03  # [rad] from a direction, within which the cheapest trim stands for it
+COVERED = 0.8  # share of what the farthest trim reaches in a direction that a few have to reach
 LOOKS = 720  # directions in which the trims that pay are looked for
 SAME_PATH = 1e-12  # of the cosine between two twists that lead along one path
 PACES, STEPS = 8, 128  # prices of time that double, and how many are tried on either side
@@ -200,17 +201,15 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
 
     In the plane of speed and turn rate, each divided by its greatest, some directions are taken;
     for each the trim that is the cheapest for what it covers, of equal ones the nearest to the
-    direction, then the fastest. Where nothing turns on the spot, the sharpest turns too, and the
-    cheapest straight motions aside. Twists are (m, 3) or (m, 4), rates (m,) are costs per second,
-    and the number of directions is a multiple of eight.
+    direction, then the fastest; where nothing turns on the spot, the sharpest turns; last what gets
+    far for its cost, aside as well, where none of these does. Rates (m,) are costs per second.
     """
-    aside = twists[:, 1] != 0.0
-    along = np.flatnonzero(~aside) if not aside.all() else np.arange(len(twists))
+    ahead = np.abs(twists[:, 1]) <= np.abs(twists[:, 0])
+    along = np.flatnonzero(ahead) if ahead.any() else np.arange(len(twists))
     chosen: list[int] = []
     plane = _plane(twists[along])
     angles, sizes = np.arctan2(plane[:, 1], plane[:, 0]), np.hypot(*plane.T)
-    for k in range(directions):
-        angle = 2.0 * math.pi * k / directions
+    for angle in np.arange(directions) * (2.0 * math.pi / directions):
         off = np.abs(np.remainder(angles - angle + math.pi, 2.0 * math.pi) - math.pi)
         near = np.flatnonzero((off <= NEAR) & (sizes > 0.0))
         covered = plane @ np.array([math.cos(angle), math.sin(angle)])
@@ -218,18 +217,19 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     drives = (plane[:, 0] != 0.0) & (plane[:, 1] != 0.0)
     if not ((plane[:, 0] == 0.0) & (plane[:, 1] != 0.0)).any() and drives.any():
         sharp = np.where(drives, np.abs(plane[:, 1]) / np.abs(plane[:, 0]).clip(min=1e-300), 0.0)
-        for gear in (1.0, -1.0):
-            for side in (1.0, -1.0):
-                turning = drives & (plane[:, 0] * gear > 0.0) & (plane[:, 1] * gear * side > 0.0)
-                most = float(sharp[turning].max(initial=0.0))
-                sharpest = np.flatnonzero(turning & (sharp >= most * (1.0 - 1e-9)))
-                chosen += _cheapest(along, sharpest, rates[along], np.abs(plane[:, 0]), -sizes)
-    for sign in (1.0, -1.0):
-        sideways = np.flatnonzero((sign * twists[:, 1] > 0.0) & (twists[:, 2] == 0.0))
-        off = np.abs(twists[:, 0])
-        straight = sideways[off[sideways] == off[sideways].min(initial=math.inf)]
-        every = np.arange(len(twists))
-        chosen += _cheapest(every, straight, rates, sign * twists[:, 1], -sign * twists[:, 1])
+        for gear, side in itertools.product((1.0, -1.0), repeat=2):
+            turning = drives & (plane[:, 0] * gear > 0.0) & (plane[:, 1] * gear * side > 0.0)
+            most = float(sharp[turning].max(initial=0.0))
+            sharpest = np.flatnonzero(turning & (sharp >= most * (1.0 - 1e-9)))
+            chosen += _cheapest(along, sharpest, rates[along], np.abs(plane[:, 0]), -sizes)
+    reach = twists[:, :3] / np.abs(twists[:, :3]).max(axis=0).clip(min=1e-300)
+    reach /= rates[:, None].clip(min=1e-300)
+    for direction in sorted(itertools.product((-1.0, 0.0, 1.0), repeat=3), key=np.count_nonzero):
+        covered = reach @ np.array(direction)
+        if covered[chosen].max(initial=0.0) < COVERED * covered.max():
+            farthest = covered >= covered.max() * (1.0 - 1e-9)
+            sizes = np.where(farthest, np.abs(reach).sum(axis=1), math.inf)
+            chosen += np.flatnonzero(sizes <= sizes.min() * (1.0 + 1e-9)).tolist()
     return np.array(sorted(set(chosen)), dtype=np.int64)
 
 

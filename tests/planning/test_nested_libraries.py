@@ -70,6 +70,26 @@ def without_a_third(vehicle):
     return replace(whole, trims=trims, maneuvers=tuple(maneuvers))
 
 
+def test_of_many_trims_that_drift_aside_in_turns_some_that_turn_are_searched():
+    """Of more than ten a few are: for a boat they were the straights alone, and it had no plan."""
+    boat, course = VEHICLES["boat"], ma.Disc(0.6, [3.5, 1.0])
+    controls = {
+        f"{speed} m/s, {turn} rad/s": (speed, turn)
+        for speed in (1.0, -0.5)
+        for turn in (-0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6)
+    }
+    some = {name: turn for name, turn in controls.items() if abs(turn[1]) in (0.0, 0.6)}
+    whole = boat.problem(obstacles=[course], search=SEARCH)
+    few, best = (
+        ma.plan(
+            replace(whole, automaton=ma.Automaton.of_controls(boat.automaton.model, chosen)),
+            time_limit=120,
+        )
+        for chosen in (some, controls)
+    )
+    assert best.cost <= few.cost * (1.0 + AMONG)
+
+
 @pytest.mark.parametrize(
     "name",
     [*QUICK, *(pytest.param(n, marks=LONGEST) for n in ("car", "hovercraft", "user"))],
