@@ -114,7 +114,7 @@ class RoadVehicle:
 
 
 LONGEST_TICK = 0.1  # [s] the proof between two ticks is for motions this short
-DURATION = 0.5  # [s] of a maneuver, or the nearest number of ticks
+DURATION = 0.5  # [s] of a maneuver, or the nearest number of time steps
 SPEED_STEP = 1.0  # [m/s]
 FASTER = 0.2  # [m/s] than a speed of the grid
 SHARES = (0.0, 0.05, 0.16, 0.36, 0.66, 1.0)  # of the sharpest angle, to either side
@@ -168,13 +168,14 @@ def road_library(
     vehicle: RoadVehicle,
     *,
     top_speed: float,
-    tick: float = LONGEST_TICK,
+    step: float = LONGEST_TICK,
     within: Sequence[tuple[float, float]] = (),
     at: Sequence[float] = (),
 ) -> RoadLibrary:
     """Trims of speeds up to `top_speed`, and all maneuvers of them.
 
-    Some are `within` each interval, and some `at` each speed of a list [m/s].
+    A maneuver lasts a whole number of a scene's time steps [s], so that controls change at these.
+    Some trims are `within` each interval, and some `at` each speed of a list [m/s].
 
     Examples
     --------
@@ -194,7 +195,8 @@ def road_library(
     exact = [one for one in at if one < grid[-1] and one % SPEED_STEP > FASTER]
     speeds = np.union1d(grid, [*np.mean(np.reshape(more, (-1, 2)), axis=1), *exact])
     most_steps = MOST_STEPS + len(speeds) - len(grid)
-    ticks = max(round(DURATION / tick), 1)
+    tick = tick_of(step)
+    ticks = max(round(DURATION / step), 1) * round(step / tick)
     angles = [
         _angles(float(sharpest), most=vehicle.model.max_steering_rate * tick * ticks)
         for sharpest in vehicle.sharpest(speeds)

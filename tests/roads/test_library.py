@@ -51,9 +51,10 @@ def test_the_automaton_says_what_the_arrays_do():
 
 
 @pytest.mark.parametrize(
-    ("step", "tick", "ticks"), [(0.1, 0.1, 5), (0.25, 0.25 / 3, 6), (0.04, 0.04, 12)]
+    ("step", "tick", "ticks"),
+    [(0.1, 0.1, 5), (0.25, 0.25 / 3, 6), (0.04, 0.04, 12), (0.2, 0.1, 4), (0.3, 0.1, 6)],
 )
-def test_ticks_divide_the_time_step(step, tick, ticks):
+def test_ticks_divide_the_time_step_and_steps_a_maneuver(step, tick, ticks):
     assert tick_of(step) == pytest.approx(tick)
-    limits = road_library(VEHICLE, top_speed=2.0, tick=tick_of(step)).limits
+    limits = road_library(VEHICLE, top_speed=2.0, step=step).limits
     assert (limits.tick, limits.ticks) == (tick_of(step), ticks)
