@@ -27,6 +27,7 @@ from maneuver_automaton.roads.arrays import (
     HorizonTask,
     RoadArrays,
 )
+from maneuver_automaton.roads.hopeless import hopeless, turned_back
 from maneuver_automaton.roads.plans import (
     AT_REST,
     ROUND,
@@ -36,7 +37,7 @@ from maneuver_automaton.roads.plans import (
     polished_controls,
 )
 from maneuver_automaton.roads.route import Route, hindrance, route_of
-from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules, hopeless
+from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
@@ -131,7 +132,8 @@ class RoadPlanner:
         """
         there = self.plan_of(self.start_state, np.zeros((0, 2)))
         scene = replace(self.scene, traffic=(*self.scene.traffic, *others))
-        return hopeless(scene, self.vehicle, there)
+        why = hopeless(scene, self.vehicle, there)
+        return why or turned_back(self.local, self.vehicle, self.route)
 
     def wider(self, width: int, *, horizon_s: float) -> RoadPlanner:
         """A planner like this one that searches another width, and another time ahead [s]."""

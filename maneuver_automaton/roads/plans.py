@@ -219,17 +219,14 @@ def polished_controls(
     controls, state, moved, turn = np.array(plan.controls), np.array(plan.states[0]), 0, 0
     every = horizon.goals.every
     for k in range(rounds):
-        first, made = plan.tick // every + k * passes, 0
+        first, made, moves = plan.tick // every + k * passes, 0, MOVES[turn]
         for number in range(first, first + passes):
+            row = number % len(PATTERNS)
+            size = number // len(PATTERNS) % len(SIZES)
+            one = Moves(moves.pattern[[row]], moves.blocks[[row]], moves.size[[size]])
+            begin = every * number
             made += _kernels_polish.polish(
-                horizon,
-                _moves_of(MOVES[turn], number),
-                state,
-                controls,
-                plan.lasting,
-                plan.tick,
-                every * number,
-                1,
+                horizon, one, state, controls, plan.lasting, plan.tick, begin, 1
             )
         moved += made
         if not made:
@@ -237,9 +234,3 @@ def polished_controls(
             if turn == len(MOVES):
                 break
     return controls if moved else None
-
-
-def _moves_of(moves: Moves, number: int) -> Moves:
-    """The pattern and the size that a pass tries."""
-    row, size = number % len(moves.blocks), number // len(moves.blocks) % len(moves.size)
-    return Moves(moves.pattern[[row]], moves.blocks[[row]], moves.size[[size]])
