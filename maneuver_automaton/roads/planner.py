@@ -461,9 +461,10 @@ def road_planner(
 ) -> RoadPlanner:
     """Everything for driving on a scene, made once."""
     vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
-    top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
     tick = tick_of(scene.step)
     wanted = [one.speed for one in scene.goals if one.speed is not None]
+    fastest = math.ceil(max(scene.start.speed, *(low for low, _ in wanted), settings.top_speed))
+    top = min(fastest, vehicle.model.max_speed)
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)

@@ -152,6 +152,8 @@ def _turned(goal: GoalRegion, extent: Array, route: Route) -> tuple[float, float
 def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
     """Weights of the cost per second; without a place to go the drive keeps its speed."""
     placed = any(goal.places is not None for goal in scene.goals)
+    least = min(goal.speed[0] if goal.speed is not None else 0.0 for goal in scene.goals)
+    wanted = least if least > scene.start.speed else 0.0  # where the engine gives less than it can
     return Weights(
         offset=0.05,
         turned=1.0,
@@ -162,7 +164,7 @@ def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
         aside=0.05,
         lateral=vehicle.lateral,
         braking=vehicle.model.max_acceleration,
-        gain=vehicle.engine,
+        gain=vehicle.engine * vehicle.power_speed / max(wanted, vehicle.power_speed),
     )
 
 

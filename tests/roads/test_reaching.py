@@ -72,6 +72,7 @@ def test_it_stops_at_a_place_exactly(tmp_path, lanes, begin, where, time):
         (10.0, (0.0, 0.5), (30, 40)),
         (20.0, (3.1, 3.3), (0, 35)),
         (14.0, (7.31, 7.31), (0, 25)),
+        (23.0, (31.2, 31.5), (0, 60)),
     ],
 )
 def test_a_speed_without_a_place_is_reached_on_two_lanes(tmp_path, begin, wanted, time):
