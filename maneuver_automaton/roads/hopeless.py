@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import RECENT
@@ -179,14 +180,15 @@ def turned_back(scene: RoadScene, vehicle: RoadVehicle, route: Route) -> tuple[s
         return None
     axes = [a + CELL * np.arange(n) for a, n in zip(low, counts, strict=True)]
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    near = KDTree(route.points).query(places)[1]
+    near = np.asarray(KDTree(route.points).query(places)[1])
     ahead = np.stack([np.cos(route.heading[near]), np.sin(route.heading[near])], axis=-1)
     station = SPACING * near + ((places - route.points[near]) * ahead).sum(axis=-1)
     heading = np.interp(station, SPACING * np.arange(len(route.points)), route.heading)
     start = tuple(np.round((rear[:2] - low) / CELL).astype(int))
     half = CELL * math.sqrt(0.5)
     on = shapely.contains_xy(shapely.buffer(road, half), places[..., 0], places[..., 1])
-    parts, _ = ndimage.label(on & (station >= station[start] - CELL), np.ones((3, 3)))
+    onward = on & (station >= station[start] - CELL)
+    parts = np.asarray(ndimage.label(onward, np.ones((3, 3)))[0])
     on = (parts == parts[start]) & (parts > 0)
     bends = np.abs(np.diff(route.heading[np.unique(near[on])])).max(initial=0.0)
     turned = 2.0 * _steepest(heading, on) + float(bends)
@@ -213,14 +215,14 @@ def turned_back(scene: RoadScene, vehicle: RoadVehicle, route: Route) -> tuple[s
     )
 
 
-def _against(interval: tuple[float, float], headings: Array) -> Array:
+def _against(interval: tuple[float, float], headings: Array) -> NDArray[np.bool_]:
     """Whether all of an interval is more than a quarter turn from headings (n,)."""
     off = 0.5 * (interval[0] + interval[1]) - headings
     turn = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
     return np.asarray(turn - 0.5 * (interval[1] - interval[0]) > 0.5 * math.pi)
 
 
-def _steepest(values: Array, on: Array) -> float:
+def _steepest(values: Array, on: NDArray[np.bool_]) -> float:
     """Greatest difference of neighbours of a grid (n, m) that are both `on`."""
     along = np.abs(np.diff(values, axis=0))[on[1:] & on[:-1]].max(initial=0.0)
     return float(
