@@ -29,7 +29,6 @@ from maneuver_automaton.roads import (
     road_planner,
 )
 from maneuver_automaton.roads.search_arrays import LONGEST
-from maneuver_automaton.roads.vehicle import tick_of
 from maneuver_automaton.scenario import RoadScenario, load_roads, load_scenario
 
 TIME_LIMIT = 10.0  # [s] of one plan
@@ -76,7 +75,8 @@ def driven(job: Job, _: None) -> JobResult:
             before = plan_before(planner, time_limit=limit)
         if before is not None and before.plan is None and planner.hopeless() is None:
             complain(f"{job.path}: no plan before the start: {before.reason}")
-        most = min(budgets.steps or planner.last_tick, planner.last_tick)
+        last = planner.last_tick // planner.every
+        most = min(budgets.steps or last, last)
         with progress_bar("steps", most, quiet=job.options.quiet) as advance:
             drive = drive_scene(
                 planner,
@@ -129,8 +129,8 @@ def _drives(job: Job) -> JobResult:
     steps, quiet = job.options.budgets.steps, job.options.quiet
     limit = job.options.budgets.time_limit or TIME_LIMIT * len(scenes)
     lasting = [min(one.last_time - one.start.time, LONGEST) for one in scenes.values()]
-    ticks = [tick_of(one.step) for one in scenes.values()]
-    ends = [max(math.ceil(s / tick), 1) for s, tick in zip(lasting, ticks, strict=True)]
+    clocks = [one.step for one in scenes.values()]
+    ends = [max(math.ceil(s / step), 1) for s, step in zip(lasting, clocks, strict=True)]
     most = sum(n if steps is None else min(steps, n) for n in ends)  # so that a bar has an end
     shown = progress_bar("planning before the start, then steps", most, quiet=quiet)
     with shown as advance, naming(job.path):

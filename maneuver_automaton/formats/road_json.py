@@ -225,7 +225,7 @@ def road_drive_to_dict(drive: RoadDrive, *, before: RoadPlanResult | None = None
         **_library(drive.planner),
         cost=spent[-1],
         duration_s=driven.duration,
-        step_s=drive.planner.tick,
+        step_s=drive.planner.scene.step,
         steps_bound=None,
         planned_before_s=None if before is None else before.search_s,
         audit={**_audit(verdict), "pieces": len(drive.steps), "failed": len(verdict.faults)},
@@ -282,7 +282,7 @@ def library_hash(library: RoadLibrary) -> str:
 def _step(planner: RoadPlanner, step: RoadStep, spent: float) -> DriveStepEntry:
     decision = step.decision
     # Words need no samples, which take most of the time to make.
-    held = planner.plan_of(step.state, decision.controls, tick=step.number, max_step=math.inf)
+    held = planner.plan_of(step.state, decision.controls, tick=decision.tick, max_step=math.inf)
     plan = _primitives(held)
     return entry(
         DriveStepEntry,

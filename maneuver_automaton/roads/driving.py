@@ -1,6 +1,6 @@
 """One vehicle on a road: a plan, searched wider and wider, and a drive in closed loop.
 
-The loop plans, drives one tick, and plans again.
+The loop plans, drives one time step of the scene, and plans again.
 """
 
 from __future__ import annotations
@@ -74,7 +74,8 @@ class RoadDrive(Played):
         """What the file states and is not obeyed, or was read otherwise: a sentence each."""
         after = [_state_after(self.planner, s.state, s.control) for s in self.steps[-1:]]
         states = [*(step.state for step in self.steps), *after]
-        return self.planner.notes(np.array(states or [self.planner.start_state]))
+        states = states or [self.planner.start_state]
+        return self.planner.notes(np.array(states), ticks=self.planner.every)
 
     @property
     def cost(self) -> float:
@@ -115,7 +116,7 @@ def drive_scene(
         while not (driver.is_done or stopped()):
             driver.step(driver.planner)
             if progress is not None:
-                progress(driver.tick)
+                progress(len(driver.done))
     return driver.drive(planner.scene)
 
 
@@ -133,7 +134,8 @@ class Driver:
         last = planner.last_tick
         self.planner = planner
         self.hopeless = planner.hopeless(others)
-        self.limit = 0 if self.hopeless else min(last if steps is None else steps, last)
+        most = last if steps is None else min(steps * planner.every, last)
+        self.limit = 0 if self.hopeless else most
         self.state = planner.start_state
         self.tail = first
         self.tick = 0
@@ -150,18 +152,23 @@ class Driver:
         return self.reached or self.tick >= self.limit
 
     def step(self, planner: RoadPlanner) -> None:
-        """Decide as a planner says, which knows the traffic of now, and drive a tick."""
+        """Decide as a planner says, which knows the traffic of now, and drive a step."""
         self.done.append(_step(planner, self.state, tick=self.tick, tail=self.tail))
         decision = self.done[-1].decision
         self.state = _state_after(planner, self.state, decision.controls[0])
-        self.tick, self.tail = self.tick + 1, decision.tail()
+        self.tick, self.tail = self.tick + planner.every, decision.tail(planner.every)
         self.planner = self.planner.opened(self.state)
 
     @property
     def driven(self) -> Plan:
         """All that it drove, in the coordinates and on the clock of the scene."""
+        return self.planner.plan_of(self.planner.start_state, self.applied)
+
+    @property
+    def applied(self) -> Array:
+        """The controls (n, 2) of all ticks so far."""
         applied = np.array([step.control for step in self.done]).reshape(-1, 2)
-        return self.planner.plan_of(self.planner.start_state, applied)
+        return np.repeat(applied, self.planner.every, axis=0)
 
     def drive(self, scene: RoadScene) -> RoadDrive:
         """The drive, judged among the traffic of a scene."""
@@ -194,12 +201,12 @@ def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision |
     decision, replanned = planner.decide(state, tick=tick, tail=tail)
     wall, cpu = time.perf_counter() - wall, time.thread_time() - cpu
     return RoadStep(
-        number=tick,
+        number=tick // planner.every,
         time=planner.time_of(tick),
         state=state,
         decision=decision,
         value=planner.price(decision),
-        applied_cost=planner.price(decision, ticks=1),
+        applied_cost=planner.price(decision, ticks=planner.every),
         replanned=replanned,
         solve_s=wall,
         cpu_s=cpu,
@@ -207,9 +214,9 @@ def _step(planner: RoadPlanner, state: Array, *, tick: int, tail: RoadDecision |
 
 
 def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
-    """The state (5,) that a control (2,) leads to in a tick, by the model's own equations."""
+    """The state (5,) that a control (2,) leads to in a step, by the model's own equations."""
     course = drive(
-        planner.vehicle.model, state[3:], control=control[None], durations=[planner.tick]
+        planner.vehicle.model, state[3:], control=control[None], durations=[planner.scene.step]
     )
     pose = (SE2(state[:3]) @ SE2(course.pose[-1])).pose
     speed, steering = course.reduced_state[-1].tolist()
@@ -219,14 +226,14 @@ def _state_after(planner: RoadPlanner, state: Array, control: Array) -> Array:
 def _ending(
     planner: RoadPlanner, states: Array, *, stood: Sequence[float], reached: bool
 ) -> tuple[str, str]:
-    """Status and reason after the `states` (n, 5) at all ticks, some of them `stood` at [s]."""
+    """Status and reason after the `states` (n, 5) at all steps, some of them `stood` at [s]."""
     if reached:
         return "reached", ""
-    tick = len(states) - 1
+    steps = len(states) - 1
+    tick = steps * planner.every
     now, over = planner.time_of(tick), tick >= planner.last_tick
-    looked_at = np.arange(0, len(states), planner.horizon.goals.every)
-    times = np.array([planner.time_of(k) for k in looked_at.tolist()])
-    why = nearest_miss(planner.local.goals, planner.vehicle, times, states[looked_at])
+    times = np.array([planner.time_of(k * planner.every) for k in range(len(states))])
+    why = nearest_miss(planner.local.goals, planner.vehicle, times, states)
     if stood:
         first, last = stood[0], stood[-1]
         since = f"at {first:.6g} s" if first == last else f"from {first:.6g} s to {last:.6g} s"
@@ -235,7 +242,7 @@ def _ending(
     if over:
         why += planner.hindrance
         return "missed", f"no goal was reached until {now:.6g} s, when the last one is over; {why}"
-    return "steps_spent", f"no goal was reached in {tick} steps, until {now:.6g} s; {why}"
+    return "steps_spent", f"no goal was reached in {steps} steps, until {now:.6g} s; {why}"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -339,7 +346,7 @@ def _driven(planner: RoadPlanner, deadline: float) -> tuple[RoadPlanResult, str]
     if not drive.reached:
         said = f"; driven step by step until {planner.time_of(driver.tick):.6g} s: {drive.status}"
         return RoadPlanResult(planner=planner), f"{said}, {drive.reason}"
-    controls = np.array([step.control for step in driver.done]).reshape(-1, 2)
+    controls = driver.applied
     plan = planner.of_controls(planner.start_state, 0, controls, len(controls), reaches=True)
     return _judged(planner, plan), ""
 
@@ -376,7 +383,8 @@ def _past_stops(planner: RoadPlanner, state: Array, tick: int) -> RoadDecision |
     for sooner in SOONER:
         if found is None or found.reaches:
             break
-        for k, there in enumerate(found.states):
+        for k in range(0, len(found.states), planner.every):
+            there = found.states[k]
             if (opened := planner.opened(there)) is not planner:
                 onward = _past_stops(opened, there, tick + k)
                 best = found if onward is None else found.then(onward, after=k)
@@ -386,9 +394,8 @@ def _past_stops(planner: RoadPlanner, state: Array, tick: int) -> RoadDecision |
         if all(one.stop_line.phases for one in planner.barriers):
             break
         # The search knows nothing of the way after the stop, so it is told to hurry.
-        found = planner.until(planner.last_tick - round(sooner / planner.tick)).search(
-            state, tick=tick
-        )
+        before = planner.every * round(sooner / planner.scene.step)
+        found = planner.until(planner.last_tick - before).search(state, tick=tick)
     return best
 
 
@@ -396,7 +403,7 @@ def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
     """How near the plan that leads furthest comes to a goal."""
     if found is None or not found.lasting:
         return "; no motion leads on from the start"
-    ticks = np.arange(0, found.lasting + 1, planner.horizon.goals.every)
+    ticks = np.arange(0, found.lasting + 1, planner.every)
     times = np.array([planner.time_of(k) for k in ticks.tolist()])
     why = nearest_miss(planner.local.goals, planner.vehicle, times, found.states[ticks])
     lasts = planner.time_of(found.lasting)

@@ -27,6 +27,7 @@ from maneuver_automaton.roads.arrays import (
     HorizonTask,
     RoadArrays,
 )
+from maneuver_automaton.roads.hopeless import hopeless, turned_back
 from maneuver_automaton.roads.plans import (
     AT_REST,
     ROUND,
@@ -36,7 +37,7 @@ from maneuver_automaton.roads.plans import (
     polished_controls,
 )
 from maneuver_automaton.roads.route import Route, hindrance, route_of
-from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules, hopeless
+from maneuver_automaton.roads.rules import DEEP, Barrier, barriers, broken_rules
 from maneuver_automaton.roads.scene import RoadScene, moved_obstacle, presence_of
 from maneuver_automaton.roads.search_arrays import (
     beam_arrays,
@@ -83,8 +84,13 @@ class RoadPlanner:
 
     @property
     def tick(self) -> float:
-        """Time between two plans [s]."""
+        """Time that is proven at once [s]: a part of the scene's step if that is long."""
         return self.library.limits.tick
+
+    @property
+    def every(self) -> int:
+        """Ticks of a step of the scene, from which on controls are held until the next one."""
+        return self.horizon.goals.every
 
     @property
     def last_tick(self) -> int:
@@ -126,7 +132,8 @@ class RoadPlanner:
         """
         there = self.plan_of(self.start_state, np.zeros((0, 2)))
         scene = replace(self.scene, traffic=(*self.scene.traffic, *others))
-        return hopeless(scene, self.vehicle, there)
+        why = hopeless(scene, self.vehicle, there)
+        return why or turned_back(self.local, self.vehicle, self.route)
 
     def wider(self, width: int, *, horizon_s: float) -> RoadPlanner:
         """A planner like this one that searches another width, and another time ahead [s]."""
@@ -194,16 +201,16 @@ class RoadPlanner:
         """What may keep the vehicle from its route, as the end of a sentence."""
         return hindrance(self.route, self.local, self.vehicle)
 
-    def notes(self, states: Array) -> tuple[str, ...]:
-        """What of the file, and of its rules on states (n, 5) from the start, is not obeyed."""
-        times = np.array([self.time_of(k) for k in range(len(states))])
+    def notes(self, states: Array, *, ticks: int = 1) -> tuple[str, ...]:
+        """What of the file, and of its rules on states (n, 5) `ticks` apart, is not obeyed."""
+        times = np.array([self.time_of(k * ticks) for k in range(len(states))])
         route, scene = self.route.lanelets, self.scene
         return (*scene.notes, *broken_rules(self.local, self.vehicle, route, states, times))
 
     def warm(self) -> None:
         """Compile the kernels and touch the room, before time counts."""
         first, _ = self.decide(self.start_state, tick=0, tail=None)
-        self.decide(first.states[1], tick=1, tail=first.tail())
+        self.decide(first.states[self.every], tick=self.every, tail=first.tail(self.every))
 
     def plan_of(
         self, state: Array, controls: Array, *, tick: int = 0, max_step: float = 0.05
@@ -292,7 +299,8 @@ class RoadPlanner:
         A vehicle at rest from which no motion is free stands, as long as standing is free.
         """
         library, settings = self.library, self.settings
-        until = min(tick + round(settings.horizon_s / self.tick), self.last_tick)
+        ahead = self.every * math.floor(settings.horizon_s / self.scene.step + 1e-9)
+        until = min(tick + ahead, self.last_tick)
         x, y, heading, speed, steering = state.tolist()
         speed = 0.0 if abs(speed) <= AT_REST else speed  # stops end with what rounding left
         if until <= tick or speed < 0.0:  # the library knows no motion from backward travel
@@ -333,11 +341,24 @@ class RoadPlanner:
             return standing if free else None
         if whole < 0:
             return None
-        return self.of_controls(state, tick, controls[:whole], n, reaches=reaches)
+        found = self.of_controls(state, tick, controls[:whole], n, reaches=reaches)
+        return found if self.every == 1 else self._in_steps(found)
+
+    def _in_steps(self, plan: RoadDecision) -> RoadDecision | None:
+        """A plan whose stop has one control in each step, their mean, as far as that is free."""
+        n, every = plan.lasting, self.every
+        stop = np.pad(plan.controls[n:], [(0, (n - len(plan.controls)) % every), (0, 0)])
+        means = stop.reshape(-1, every, 2).mean(axis=1)
+        controls = np.concatenate([plan.controls[:n], np.repeat(means, every, axis=0)])
+        state, tick, reaches = plan.states[0], plan.tick, plan.reaches
+        held = self.of_controls(state, tick, controls, n, reaches=reaches)
+        if self._free_ticks(held.states, tick) == len(controls):
+            return held
+        return self.of_controls(state, tick, controls[:n], n, reaches=True) if reaches else None
 
     def _standing(self, state: Array, tick: int) -> RoadDecision:
-        """A tick of rest."""
-        return self.of_controls(state, tick, np.zeros((1, 2)), 0, reaches=False)
+        """A step of rest."""
+        return self.of_controls(state, tick, np.zeros((self.every, 2)), 0, reaches=False)
 
     def of_controls(
         self, state: Array, tick: int, controls: Array, lasting: int, *, reaches: bool
@@ -424,11 +445,11 @@ class RoadPlanner:
 
     def _emergency(self, state: Array, tick: int) -> RoadDecision:
         """Full braking straight on, free or not."""
-        braking, speeds = self.vehicle.model.max_acceleration, [float(state[3])]
+        step, speeds = self.scene.step, [float(state[3])]
         while speeds[-1]:
-            left = max(abs(speeds[-1]) - braking * self.tick, 0.0)
+            left = max(abs(speeds[-1]) - self.vehicle.model.max_acceleration * step, 0.0)
             speeds.append(math.copysign(left, speeds[-1]))
-        rates = np.diff(speeds) / self.tick
+        rates = np.repeat(np.diff(speeds) / step, self.every)
         controls = np.stack([rates, np.zeros_like(rates)], axis=-1).reshape(-1, 2)
         if not len(controls):
             return self._standing(state, tick)
@@ -440,15 +461,18 @@ def road_planner(
 ) -> RoadPlanner:
     """Everything for driving on a scene, made once."""
     vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
-    top = min(max(settings.top_speed, math.ceil(scene.start.speed)), vehicle.model.max_speed)
     tick = tick_of(scene.step)
     wanted = [one.speed for one in scene.goals if one.speed is not None]
+    fastest = math.ceil(max(scene.start.speed, *(low for low, _ in wanted), settings.top_speed))
+    top = min(fastest, vehicle.model.max_speed)
     frame = vehicle.rear_of(scene.start.middle)
     local = scene.moved(SE2(frame).inverse(), digits=DIGITS)
     route = route_of(local)
     stated = {one.number: one.speed_limit for one in local.lanelets}
     limits = {limit for k in route.lanelets if (limit := stated[k]) is not None}
-    library = road_library(vehicle, top_speed=top, tick=tick, within=wanted, at=sorted(limits))
+    library = road_library(
+        vehicle, top_speed=top, step=scene.step, within=wanted, at=sorted(limits)
+    )
     goals = goal_arrays(local, route, tick=tick)
     until = local.start.time + _last_tick(goals, settings, tick) * tick
     closed = tuple(

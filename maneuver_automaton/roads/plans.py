@@ -186,13 +186,13 @@ class RoadDecision:
         """Whether it is to stay at rest, as no motion on is free."""
         return not (self.lasting or self.reaches) and abs(float(self.states[0, 3])) <= AT_REST
 
-    def tail(self) -> RoadDecision:
-        """The rest of the plan a tick later."""
+    def tail(self, ticks: int) -> RoadDecision:
+        """The rest of the plan some ticks later."""
         return RoadDecision(
-            tick=self.tick + 1,
-            states=self.states[1:],
-            controls=self.controls[1:],
-            lasting=max(self.lasting - 1, 0),
+            tick=self.tick + ticks,
+            states=self.states[ticks:],
+            controls=self.controls[ticks:],
+            lasting=max(self.lasting - ticks, 0),
             reaches=self.reaches,
         )
 
@@ -212,15 +212,22 @@ def polished_controls(
 ) -> Array | None:
     """Controls (n, 2) of a plan to a goal that cost less; None if no move makes it cheaper.
 
-    It is free, at the goal at the same tick, and followed by the same stop, as it was. Where a
-    pass begins depends on the plan's tick, so that step after step of a drive tries other moves.
+    It is free, at the goal at the same tick, and followed by the same stop, as it was. Controls
+    change at steps of the scene only. Where a pass begins depends on the plan's tick, so that step
+    after step of a drive tries other moves.
     """
     controls, state, moved, turn = np.array(plan.controls), np.array(plan.states[0]), 0, 0
+    every = horizon.goals.every
     for k in range(rounds):
-        first = plan.tick + k * passes
-        made = _kernels_polish.polish(
-            horizon, MOVES[turn], state, controls, plan.lasting, plan.tick, first, passes
-        )
+        first, made, moves = plan.tick // every + k * passes, 0, MOVES[turn]
+        for number in range(first, first + passes):
+            row = number % len(PATTERNS)
+            size = number // len(PATTERNS) % len(SIZES)
+            one = Moves(moves.pattern[[row]], moves.blocks[[row]], moves.size[[size]])
+            begin = every * number
+            made += _kernels_polish.polish(
+                horizon, one, state, controls, plan.lasting, plan.tick, begin, 1
+            )
         moved += made
         if not made:
             turn += 1

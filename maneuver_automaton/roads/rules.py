@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._kept import RECENT
 from maneuver_automaton.audit import Audit, audit_plan, closest_to
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import Disc, Motion, Obstacle, Polygon
+from maneuver_automaton.collision import Motion, Obstacle, Polygon
 from maneuver_automaton.collision.blocked import too_close
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
@@ -33,7 +32,6 @@ from maneuver_automaton.roads.scene import (
     GoalRegion,
     RoadScene,
     RoadStart,
-    geometry_of,
     presence_of,
 )
 from maneuver_automaton.roads.vehicle import RoadVehicle
@@ -184,11 +182,6 @@ def _too_fast(
 
 BESIDE = 30.0  # [m] from the path: the edge of the road is not looked for further away
 PIECE = 1e-11  # [m, rad] of rounding that each piece of a motion adds to its end
-TOUCHES, FAR = 1e-3, 1e5  # [m] what is nearer is not apart, and what is further is not looked at
-WIDER = 1.01  # than a circle: shapely draws it as a polygon inside
-MOST_NAMES = 20  # of road users who are looked at one by one
-SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
-Wall: TypeAlias = tuple[Any, float, float]  # a shapely geometry, from when and until when [s]
 PER_RADIAN, PER_SPEED = 5.0, 1.0  # [m/rad], [s]: what counts as one metre when samples are compared
 
 
@@ -248,121 +241,6 @@ def judged(scene: RoadScene, vehicle: RoadVehicle, plan: Plan) -> RoadVerdict:
         clearance_m=clearance,
         edge_m=closest_to(plan, model, land_beside(scene.lanelets, plan), footprint=body).distance,
     )
-
-
-def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, str] | None:
-    """Status and words of what lets every drive fail, as the start and the goals show; else None.
-
-    `there` is the start, a plan of no duration.
-    """
-    import shapely
-
-    causes = [(one, f"{said} at the start") for one, said in judged(scene, vehicle, there).faults]
-    speed, (low, high) = scene.start.speed, vehicle.model.reduced_limits[0].tolist()
-    if (beyond := max(low - speed, speed - high)) > EXACT:
-        said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
-        causes.append(("undrivable", f"the model cannot drive it: {said}"))
-    if causes:
-        return causes[0][0], "; ".join(said for _, said in causes)
-    road = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), -0.5 * vehicle.width)
-    why = [_never_reached(goal, scene, vehicle, road) for goal in scene.goals]
-    if "" in why:
-        shut = _shut_off(scene, vehicle, road)
-        why = [said or behind for said, behind in zip(why, shut, strict=True)]
-    said = "; ".join(dict.fromkeys(why))
-    return None if "" in why else ("missed", f"no goal can be reached: {said}")
-
-
-def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
-    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen.
-
-    The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
-    """
-    import shapely
-
-    model, start = vehicle.model, scene.start
-    lasts = goal.time[1] - start.time
-    if lasts < -EXACT:
-        return f"its time is over at {goal.time[1]:.6g} s, before the start at {start.time:.6g} s"
-    low, high = goal.speed or (0.0, 0.0)
-    slowest, top = model.reduced_limits[0].tolist()
-    if low > top + EXACT or high < slowest - EXACT:
-        return (
-            f"it asks for {low:.6g} to {high:.6g} m/s, but the vehicle's speeds are"
-            f" {slowest:.6g} to {top:.6g} m/s"
-        )
-    if (off := goal.away_from(road)) > 0.0:
-        return f"it is off the road, {off:.3g} m from where the middle of the vehicle may be"
-    away = goal.away_from(shapely.Point(start.middle[:2]))
-    fastest = min(abs(start.speed) + 0.5 * model.max_acceleration * lasts, max(top, -slowest))
-    if away > (most := fastest * lasts):
-        return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
-    return ""
-
-
-def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
-    """Who keeps the middle of a vehicle from each goal, in words; empty where nobody does."""
-    import shapely
-
-    walls: dict[str, list[Wall]] = {}
-    for one in scene.traffic:
-        if one.motion is None or not np.ptp(one.motion.pose, axis=0).any():
-            begin, end = presence_of(one)
-            place = one.shape if one.motion is None else one.at(begin)
-            radius = place.radius if isinstance(place, Disc) else 0.0
-            grown = shapely.buffer(geometry_of(place), radius + 0.5 * vehicle.width)
-            walls.setdefault(one.name, []).append((grown, begin, end))
-    met, alone = _met(scene, vehicle, road, walls), dict[str, list[bool]]()
-    if all(met):
-        return ["" for _ in met]
-    empty, whole = _met(scene, vehicle, road, {}), [False for _ in met]
-    if not all(empty):
-        grown = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), 0.5 * SEAM)
-        whole = _met(scene, vehicle, shapely.buffer(grown, -0.5 * (SEAM + vehicle.width)), {})
-    if any(empty):
-        alone = {
-            name: _met(scene, vehicle, road, {k: v for k, v in walls.items() if k != name})
-            for name in list(walls)[:MOST_NAMES]
-        }
-    said = []
-    for k, goal in enumerate(scene.goals):
-        names = [name for name, free in alone.items() if free[k]]
-        who = f"{' and '.join(names) or 'road users'} leave{'s' if len(names) == 1 else ''}"
-        closed = f"{who} no way to it as wide as the vehicle until {goal.time[1]:.6g} s"
-        narrow = f"no way to it is as wide as the vehicle, {vehicle.width:.3g} m"
-        if whole[k]:
-            narrow += f"; lanelets that are not stated to be neighbours are up to {SEAM:g} m apart"
-        said.append("" if met[k] else closed if empty[k] else narrow)
-    return said
-
-
-def _met(
-    scene: RoadScene, vehicle: RoadVehicle, road: Any, walls: Mapping[str, Sequence[Wall]]
-) -> list[bool]:
-    """Whether the middle of a vehicle can get to each goal, past walls that are there for a time.
-
-    From one time at which a wall comes or goes to the next, it stays in a connected part of what
-    they leave of the road, and gets no further than the top speed allows.
-    """
-    import shapely
-
-    begin, last = scene.start.time, scene.last_time
-    every = [one for some in walls.values() for one in some]
-    times = sorted({begin, *(t for _, *ends in every for t in ends if begin < t < last)})
-    top = float(np.abs(vehicle.model.reduced_limits[0]).max())
-    places, met = shapely.Point(scene.start.middle[:2]), [False for _ in scene.goals]
-    for low, high in itertools.pairwise([*times, last]):
-        around = shapely.buffer(places, TOUCHES + WIDER * min(top * (high - low), FAR))
-        left = shapely.intersection(road, around)
-        there = [wall for wall, since, until in every if since <= low and high <= until]
-        parts = shapely.get_parts(shapely.difference(left, united(there)) if there else left)
-        places = united(parts[shapely.distance(parts, places) <= TOUCHES])
-        if places.is_empty:
-            break
-        for k, goal in enumerate(scene.goals):
-            in_time = low <= goal.time[1] and goal.time[0] <= high
-            met[k] = met[k] or (in_time and goal.away_from(places) <= TOUCHES)
-    return met
 
 
 def land_beside(lanelets: Sequence[Lanelet], plan: Plan) -> tuple[Obstacle, ...]:

@@ -84,13 +84,15 @@ def closed_lines(
 def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
     """Goals for the kernels; times as ticks [s] from the start of the scene."""
     rings = [outlines_of(goal.places or ()) for goal in scene.goals]
+    step, every = scene.step, round(scene.step / tick)
     flat = [ring for group in rings for ring in group]
     start = scene.start.time
     ticks, headings, speeds = [], [], []
     for goal in scene.goals:
         begin, end = goal.time[0] - start, goal.time[1] - start
         end = end if math.isfinite(end) else max(begin, 0.0) + LONGEST
-        ticks.append((max(math.ceil(begin / tick - 1e-6), 0), math.floor(end / tick + 1e-6)))
+        first, last = max(math.ceil(begin / step - 1e-6), 0), math.floor(end / step + 1e-6)
+        ticks.append((every * first, every * last))
         low, high = goal.heading or (0.0, 2.0 * math.pi)
         headings.append((low - EXACT, min(high - low + 2.0 * EXACT, 2.0 * math.pi)))
         low, high = goal.speed or (-math.inf, math.inf)
@@ -103,7 +105,7 @@ def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
         heading=np.array(headings),
         speed=np.array(speeds),
         tick=np.array(ticks, dtype=np.int64),
-        every=round(scene.step / tick),
+        every=every,
         extent=np.array(route.extents),
         turned=np.array(
             [_turned(goal, at, route) for goal, at in zip(scene.goals, route.extents, strict=True)]
@@ -150,6 +152,8 @@ def _turned(goal: GoalRegion, extent: Array, route: Route) -> tuple[float, float
 def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
     """Weights of the cost per second; without a place to go the drive keeps its speed."""
     placed = any(goal.places is not None for goal in scene.goals)
+    least = min(goal.speed[0] if goal.speed is not None else 0.0 for goal in scene.goals)
+    wanted = least if least > scene.start.speed else 0.0  # where the engine gives less than it can
     return Weights(
         offset=0.05,
         turned=1.0,
@@ -160,7 +164,7 @@ def weights_of(scene: RoadScene, vehicle: RoadVehicle) -> Weights:
         aside=0.05,
         lateral=vehicle.lateral,
         braking=vehicle.model.max_acceleration,
-        gain=vehicle.engine,
+        gain=vehicle.engine * vehicle.power_speed / max(wanted, vehicle.power_speed),
     )
 
 

@@ -341,13 +341,13 @@ def _others(bodies: Mapping[str, Obstacle], name: str) -> list[Obstacle]:
 
 
 def _drive(drivers: Mapping[str, Driver], progress: Callable[[], None] | None) -> None:
-    """Tick by tick, one after another in the order of their names, until all are done."""
-    tick = min(one.planner.tick for one in drivers.values())
+    """Step by step, one after another in the order of their names, until all are done."""
+    step = min(one.planner.scene.step for one in drivers.values())
     now = min(one.planner.time_of(0) for one in drivers.values())
     last = max(_end_of(one) for one in drivers.values())
     number = 0
     while not (all(one.is_done for one in drivers.values()) or stopped()):
-        time = now + number * tick
+        time = now + number * step
         for name, driver in drivers.items():
             waits = driver.planner.time_of(driver.tick) > time + TIME_TOLERANCE
             if driver.is_done or waits:

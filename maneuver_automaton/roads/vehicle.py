@@ -114,13 +114,13 @@ class RoadVehicle:
 
 
 LONGEST_TICK = 0.1  # [s] the proof between two ticks is for motions this short
-DURATION = 0.5  # [s] of a maneuver, or the nearest number of ticks
-SPEED_STEP = 1.0  # [m/s]
+DURATION = 0.5  # [s] of a maneuver, or the nearest number of time steps
+SPEED_STEP = 1.0  # [m/s] between speeds if a maneuver lasts that long; else in proportion
 FASTER = 0.2  # [m/s] than a speed of the grid
 SHARES = (0.0, 0.05, 0.16, 0.36, 0.66, 1.0)  # of the sharpest angle, to either side
 MOST_STEPS = 4  # of speed that a maneuver spans
 SAMPLES = 0.5  # [m] between those of courses: a fine library takes 230 MB
-LEFT_OUT = (2.5, 3.5)  # [m/s] changes of speed that others do as well
+LEFT_OUT = (2.5, 3.5)  # steps of speed: changes that others do as well
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -168,13 +168,14 @@ def road_library(
     vehicle: RoadVehicle,
     *,
     top_speed: float,
-    tick: float = LONGEST_TICK,
+    step: float = LONGEST_TICK,
     within: Sequence[tuple[float, float]] = (),
     at: Sequence[float] = (),
 ) -> RoadLibrary:
     """Trims of speeds up to `top_speed`, and all maneuvers of them.
 
-    Some are `within` each interval, and some `at` each speed of a list [m/s].
+    A maneuver lasts a whole number of a scene's time steps [s], so that controls change at these.
+    Some trims are `within` each interval, and some `at` each speed of a list [m/s].
 
     Examples
     --------
@@ -184,17 +185,24 @@ def road_library(
     >>> float(library.trims.steering.max())
     1.066
     """
-    grid = SPEED_STEP * np.arange(math.floor(top_speed / SPEED_STEP + 1e-9) + 1)
+    tick = tick_of(step)
+    ticks = max(round(DURATION / step), 1) * round(step / tick)
+    apart = SPEED_STEP * tick * ticks / DURATION
+    engine = min(vehicle.engine, vehicle.model.max_acceleration)
+    grid = apart * np.arange(math.floor(top_speed / apart + 1e-9) + 1)
+    # From speeds beyond it, the engine does not lead to the next one of the grid.
+    level = engine * vehicle.power_speed * tick * ticks / apart - apart
     more = [
         (low, high)
         for low, high in within
         if low > 0.0 and high < grid[-1] and not ((grid >= low) & (grid <= high)).any()
     ]
     # What is hardly faster than one of the grid is not worth a trim.
-    exact = [one for one in at if one < grid[-1] and one % SPEED_STEP > FASTER]
+    exact = [one for one in at if one < grid[-1] and one % apart > FASTER]
+    if any(low > level for low, _ in within):
+        exact += (0.5 * (grid[:-1] + grid[1:]))[grid[:-1] > level].tolist()
     speeds = np.union1d(grid, [*np.mean(np.reshape(more, (-1, 2)), axis=1), *exact])
     most_steps = MOST_STEPS + len(speeds) - len(grid)
-    ticks = max(round(DURATION / tick), 1)
     angles = [
         _angles(float(sharpest), most=vehicle.model.max_steering_rate * tick * ticks)
         for sharpest in vehicle.sharpest(speeds)
@@ -209,9 +217,9 @@ def road_library(
         braking=vehicle.model.max_acceleration,
         lateral=vehicle.lateral,
         friction=vehicle.friction,
-        engine=min(vehicle.engine, vehicle.model.max_acceleration),
+        engine=engine,
         power_speed=vehicle.power_speed,
-        left_out=LEFT_OUT,
+        left_out=(LEFT_OUT[0] * apart, LEFT_OUT[1] * apart),
         most_steps=most_steps,
         weight_along=0.05,
         weight_across=0.05,

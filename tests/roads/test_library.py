@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -51,9 +53,18 @@ def test_the_automaton_says_what_the_arrays_do():
 
 
 @pytest.mark.parametrize(
-    ("step", "tick", "ticks"), [(0.1, 0.1, 5), (0.25, 0.25 / 3, 6), (0.04, 0.04, 12)]
+    ("step", "tick", "ticks"),
+    [(0.1, 0.1, 5), (0.25, 0.25 / 3, 6), (0.04, 0.04, 12), (0.2, 0.1, 4), (0.3, 0.1, 6)],
 )
-def test_ticks_divide_the_time_step(step, tick, ticks):
+def test_ticks_divide_the_time_step_and_steps_a_maneuver(step, tick, ticks):
     assert tick_of(step) == pytest.approx(tick)
-    limits = road_library(VEHICLE, top_speed=2.0, tick=tick_of(step)).limits
+    library = road_library(VEHICLE, top_speed=38.0, step=step, within=[(37.0, 37.5)])
+    limits, speed, first = library.limits, library.trims.speed, library.maneuvers.first
     assert (limits.tick, limits.ticks) == (tick_of(step), ticks)
+    # Straight ahead, the engine leads to the next speed, and hard braking is a maneuver.
+    straight = [k for k in range(speed.size) if library.trims.steering[k] == 0.0]
+    for k, after in itertools.pairwise(straight):
+        reached = library.maneuvers.target[first[k] : first[k + 1]]
+        assert after in reached
+        hardest = -library.maneuvers.control[first[k] : first[k + 1], 0].min()
+        assert not 5.0 < speed[k] < 28.0 or hardest == pytest.approx(limits.braking, rel=0.15)

@@ -72,6 +72,7 @@ def test_it_stops_at_a_place_exactly(tmp_path, lanes, begin, where, time):
         (10.0, (0.0, 0.5), (30, 40)),
         (20.0, (3.1, 3.3), (0, 35)),
         (14.0, (7.31, 7.31), (0, 25)),
+        (23.0, (31.2, 31.5), (0, 60)),
     ],
 )
 def test_a_speed_without_a_place_is_reached_on_two_lanes(tmp_path, begin, wanted, time):
@@ -334,3 +335,25 @@ def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
     asked = problem(goal=goal(place(10.0, 2.0, 4.0), time=(0, 0)))
     scene = scene_of(tmp_path, *LANES, phantom(5, (80, 4, 0, 120)), asked)
     assert road_planner(scene).hopeless() is None
+
+
+WIDE = piece(2, 120, 145, y=(-8.0, 12.0))  # room to turn round
+
+
+@pytest.mark.parametrize(
+    ("asked", "more", "said"),
+    [
+        (goal(place(30.0, 2.0, 10.0)), (), "the way to it turns round, and on from the start"),
+        (goal(place(90.0, 2.0, 9.0), interval("orientation", 3.0, 3.3)), (), "the way to it"),
+        (goal(place(30.0, 2.0, 10.0)), (WIDE,), None),
+        (goal(place(90.0, 2.0, 9.0), interval("orientation", 3.0, 3.3)), (WIDE,), None),
+        (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (), "at none of its"),
+        (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.5, 2.2)), (), None),
+        (goal(place(130.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (WIDE,), None),
+    ],
+)
+def test_a_road_without_room_to_turn_is_told(tmp_path, asked, more, said):
+    lanes = (piece(1, 0, 120, '<successor ref="2"/>'), *more)
+    scene = scene_of(tmp_path, *lanes, problem(x=60.0, goal=asked))
+    why = road_planner(scene).hopeless()
+    assert why is None if said is None else why[1].startswith(f"no goal can be reached: {said}")

@@ -1,0 +1,295 @@
+"""What lets every drive from a start fail, told before any search: each answer is a proof.
+
+The start itself, a goal's time, speed and distance, road users who shut a goal off, a place where
+the body fits at no heading of the goal, and a road that is nowhere wide enough to turn round, for
+a goal behind. What is not proven is searched for.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import RECENT
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.collision import Disc, Shape
+from maneuver_automaton.collision.outline import united
+from maneuver_automaton.groups import SE2
+from maneuver_automaton.roads.lanelets import drivable_area
+from maneuver_automaton.roads.route import SPACING, Route
+from maneuver_automaton.roads.rules import judged
+from maneuver_automaton.roads.scene import (
+    EXACT,
+    GoalRegion,
+    RoadScene,
+    geometry_of,
+    outlines_of,
+    presence_of,
+)
+from maneuver_automaton.roads.vehicle import RoadVehicle
+
+TOUCHES, FAR = 1e-3, 1e5  # [m] what is nearer is not apart, and what is further is not looked at
+WIDER = 1.01  # than a circle: shapely draws it as a polygon inside
+MOST_NAMES = 20  # of road users who are looked at one by one
+SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
+MOST_BOXES = 30_000  # of poses: beyond, no proof is looked for
+PROVEN = 1e-6  # [m] by which the road is taken to be larger for a proof
+CELL, MOST_CELLS = 0.2, 400_000  # [m] of a road on which no body turns round, and how many at most
+Wall: TypeAlias = tuple[Any, float, float]  # a shapely geometry, from when and until when [s]
+
+
+def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, str] | None:
+    """Status and words of what lets every drive fail, as the start and the goals show; else None.
+
+    `there` is the start, a plan of no duration.
+    """
+    import shapely
+
+    causes = [(one, f"{said} at the start") for one, said in judged(scene, vehicle, there).faults]
+    speed, (low, high) = scene.start.speed, vehicle.model.reduced_limits[0].tolist()
+    if (beyond := max(low - speed, speed - high)) > EXACT:
+        said = f"speed is {beyond:.3g} beyond its limits [{low:g}, {high:g}] at the start"
+        causes.append(("undrivable", f"the model cannot drive it: {said}"))
+    if causes:
+        return causes[0][0], "; ".join(said for _, said in causes)
+    road = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), -0.5 * vehicle.width)
+    why = [_never_reached(goal, scene, vehicle, road) for goal in scene.goals]
+    if "" in why:
+        shut = _shut_off(scene, vehicle, road)
+        why = [said or behind for said, behind in zip(why, shut, strict=True)]
+    said = "; ".join(dict.fromkeys(why))
+    return None if "" in why else ("missed", f"no goal can be reached: {said}")
+
+
+def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
+    """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen.
+
+    The middle of the body stays on the `road`, where its half width on all sides is on a lanelet.
+    """
+    import shapely
+
+    model, start = vehicle.model, scene.start
+    lasts = goal.time[1] - start.time
+    if lasts < -EXACT:
+        return f"its time is over at {goal.time[1]:.6g} s, before the start at {start.time:.6g} s"
+    low, high = goal.speed or (0.0, 0.0)
+    slowest, top = model.reduced_limits[0].tolist()
+    if low > top + EXACT or high < slowest - EXACT:
+        return (
+            f"it asks for {low:.6g} to {high:.6g} m/s, but the vehicle's speeds are"
+            f" {slowest:.6g} to {top:.6g} m/s"
+        )
+    if (off := goal.away_from(road)) > 0.0:
+        return f"it is off the road, {off:.3g} m from where the middle of the vehicle may be"
+    away = goal.away_from(shapely.Point(start.middle[:2]))
+    fastest = min(abs(start.speed) + 0.5 * model.max_acceleration * lasts, max(top, -slowest))
+    if away > (most := fastest * lasts):
+        return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
+    if goal.places is not None and goal.heading is not None:
+        area = RECENT.once(drivable_area, scene.lanelets)
+        if not _may_fit(goal.places, goal.heading, shapely.buffer(area, PROVEN), vehicle):
+            return "at none of its headings is the road there wide enough for the body"
+    return ""
+
+
+def _may_fit(
+    places: Sequence[Shape], headings: tuple[float, float], road: Any, vehicle: RoadVehicle
+) -> bool:
+    """Whether the body may be on the road with its middle in a place, at one of the headings.
+
+    Boxes of poses are halved until the middle of one is such a pose, or until what all poses of a
+    box have in common of the body is not on the road, in each of them.
+    """
+    import shapely
+
+    shapely.prepare(road)
+    size = 0.5 * np.array([vehicle.length, vehicle.width])
+    corners = np.concatenate(outlines_of(places))
+    low = np.append(corners.min(axis=0), headings[0])
+    high = np.append(corners.max(axis=0), headings[1])
+    poses, half = 0.5 * (low + high)[None], 0.5 * (high - low)
+    while 0 < len(poses) <= MOST_BOXES:
+        away = _away(places, shapely.points(poses[:, :2]))
+        if shapely.covers(road, _bodies(poses[away <= 0.0], size)).any():
+            return True
+        # No point of the body is further from where it is at the middle of the box.
+        moved = float(np.hypot(*half[:2]) + np.hypot(*size) * half[2])
+        if moved < PROVEN:
+            return True
+        kept = away <= moved
+        if moved < size.min():
+            kept &= shapely.covers(road, _bodies(poses, size - moved))
+        axis = int(np.argmax(half * [1.0, 1.0, np.hypot(*size)]))
+        half[axis] *= 0.5
+        step = half * (np.arange(3) == axis)
+        poses = np.concatenate([poses[kept] - step, poses[kept] + step])
+    return len(poses) > 0
+
+
+def _away(places: Sequence[Shape] | None, points: Any) -> Array:
+    """Distances of shapely points (n,) to the nearest of some places; zeros where any will do."""
+    import shapely
+
+    apart = [
+        shapely.distance(geometry_of(one), points) - (one.radius if isinstance(one, Disc) else 0.0)
+        for one in places or ()
+    ]
+    return np.min(apart, axis=0) if apart else np.zeros(len(points))
+
+
+def _bodies(middles: Array, size: Array, ahead: float = 0.0) -> Any:
+    """Rectangles at poses (n, 3) `ahead` of which they are; half their length and width (2,)."""
+    import shapely
+
+    corners = size * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    corners[:, 0] += ahead
+    return shapely.polygons(np.asarray(SE2(middles[:, None]).act(corners)))
+
+
+def turned_back(scene: RoadScene, vehicle: RoadVehicle, route: Route) -> tuple[str, str] | None:
+    """Status and words where goals ask to turn round, and the road has no room for that.
+
+    A drive never goes backwards. Where the body fits nowhere across the road, its heading stays on
+    one side of that, and the rear axle only gets on along the route, with the middle near it. The
+    road on from the start is looked at in cells, each with the route's direction there.
+    """
+    import shapely
+    from scipy import ndimage
+    from scipy.spatial import KDTree
+
+    rear, lasts = vehicle.rear_of(scene.start.middle), scene.last_time - scene.start.time
+    here = SPACING * int(np.argmin(np.hypot(*(route.points - rear[:2]).T)))
+    most = (scene.start.speed + 0.5 * vehicle.model.max_acceleration * lasts) * lasts
+    asks = [
+        last < here or (goal.heading is not None and _against(goal.heading, route.heading).any())
+        for goal, last in zip(scene.goals, route.extents[:, 1], strict=True)
+    ]
+    if not all(asks) or scene.start.speed < 0.0 or not most < FAR:
+        return None
+    road = RECENT.once(drivable_area, scene.lanelets)
+    road = shapely.buffer(road.intersection(shapely.Point(rear[:2]).buffer(WIDER * most)), PROVEN)
+    low, high = np.reshape(road.bounds, (2, 2))
+    counts = np.ceil((high - low) / CELL).astype(int) + 1
+    if counts.prod() > MOST_CELLS:
+        return None
+    axes = [a + CELL * np.arange(n) for a, n in zip(low, counts, strict=True)]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    near = np.asarray(KDTree(route.points).query(places)[1])
+    ahead = np.stack([np.cos(route.heading[near]), np.sin(route.heading[near])], axis=-1)
+    station = SPACING * near + ((places - route.points[near]) * ahead).sum(axis=-1)
+    heading = np.interp(station, SPACING * np.arange(len(route.points)), route.heading)
+    start = tuple(np.round((rear[:2] - low) / CELL).astype(int))
+    half = CELL * math.sqrt(0.5)
+    on = shapely.contains_xy(shapely.buffer(road, half), places[..., 0], places[..., 1])
+    onward = on & (station >= station[start] - CELL)
+    parts = np.asarray(ndimage.label(onward, np.ones((3, 3)))[0])
+    on = (parts == parts[start]) & (parts > 0)
+    bends = np.abs(np.diff(route.heading[np.unique(near[on])])).max(initial=0.0)
+    turned = 2.0 * _steepest(heading, on) + float(bends)
+    size = 0.5 * np.array([vehicle.length, vehicle.width])
+    moved = half + turned * math.hypot(abs(vehicle.ahead) + size[0], size[1])
+    askew = abs(math.remainder(rear[2] - heading[start], 2.0 * math.pi)) + turned
+    if _steepest(station, on) > SPACING or moved >= size.min() or askew >= 0.5 * math.pi:
+        return None
+    shapely.prepare(road)
+    for side in (0.5 * math.pi, -0.5 * math.pi):
+        poses = np.column_stack([places[on], heading[on] + side])
+        if shapely.covers(road, _bodies(poses, size - moved, vehicle.ahead)).any():
+            return None
+    points = shapely.points(places[on])
+    for goal in scene.goals:
+        there = _away(goal.places, points) <= abs(vehicle.ahead) + half
+        if goal.heading is not None:
+            there &= ~_against(goal.heading, heading[on])
+        if there.any():
+            return None
+    return "missed", (
+        "no goal can be reached: the way to it turns round, and on from the start the road is"
+        " nowhere wide enough for that"
+    )
+
+
+def _against(interval: tuple[float, float], headings: Array) -> NDArray[np.bool_]:
+    """Whether all of an interval is more than a quarter turn from headings (n,)."""
+    off = 0.5 * (interval[0] + interval[1]) - headings
+    turn = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
+    return np.asarray(turn - 0.5 * (interval[1] - interval[0]) > 0.5 * math.pi)
+
+
+def _steepest(values: Array, on: NDArray[np.bool_]) -> float:
+    """Greatest difference of neighbours of a grid (n, m) that are both `on`."""
+    along = np.abs(np.diff(values, axis=0))[on[1:] & on[:-1]].max(initial=0.0)
+    return float(
+        max(along, np.abs(np.diff(values, axis=1))[on[:, 1:] & on[:, :-1]].max(initial=0.0))
+    )
+
+
+def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:
+    """Who keeps the middle of a vehicle from each goal, in words; empty where nobody does."""
+    import shapely
+
+    walls: dict[str, list[Wall]] = {}
+    for one in scene.traffic:
+        if one.motion is None or not np.ptp(one.motion.pose, axis=0).any():
+            begin, end = presence_of(one)
+            place = one.shape if one.motion is None else one.at(begin)
+            radius = place.radius if isinstance(place, Disc) else 0.0
+            grown = shapely.buffer(geometry_of(place), radius + 0.5 * vehicle.width)
+            walls.setdefault(one.name, []).append((grown, begin, end))
+    met, alone = _met(scene, vehicle, road, walls), dict[str, list[bool]]()
+    if all(met):
+        return ["" for _ in met]
+    empty, whole = _met(scene, vehicle, road, {}), [False for _ in met]
+    if not all(empty):
+        grown = shapely.buffer(RECENT.once(drivable_area, scene.lanelets), 0.5 * SEAM)
+        whole = _met(scene, vehicle, shapely.buffer(grown, -0.5 * (SEAM + vehicle.width)), {})
+    if any(empty):
+        alone = {
+            name: _met(scene, vehicle, road, {k: v for k, v in walls.items() if k != name})
+            for name in list(walls)[:MOST_NAMES]
+        }
+    said = []
+    for k, goal in enumerate(scene.goals):
+        names = [name for name, free in alone.items() if free[k]]
+        who = f"{' and '.join(names) or 'road users'} leave{'s' if len(names) == 1 else ''}"
+        closed = f"{who} no way to it as wide as the vehicle until {goal.time[1]:.6g} s"
+        narrow = f"no way to it is as wide as the vehicle, {vehicle.width:.3g} m"
+        if whole[k]:
+            narrow += f"; lanelets that are not stated to be neighbours are up to {SEAM:g} m apart"
+        said.append("" if met[k] else closed if empty[k] else narrow)
+    return said
+
+
+def _met(
+    scene: RoadScene, vehicle: RoadVehicle, road: Any, walls: Mapping[str, Sequence[Wall]]
+) -> list[bool]:
+    """Whether the middle of a vehicle can get to each goal, past walls that are there for a time.
+
+    From one time at which a wall comes or goes to the next, it stays in a connected part of what
+    they leave of the road, and gets no further than the top speed allows.
+    """
+    import shapely
+
+    begin, last = scene.start.time, scene.last_time
+    every = [one for some in walls.values() for one in some]
+    times = sorted({begin, *(t for _, *ends in every for t in ends if begin < t < last)})
+    top = float(np.abs(vehicle.model.reduced_limits[0]).max())
+    places, met = shapely.Point(scene.start.middle[:2]), [False for _ in scene.goals]
+    for low, high in itertools.pairwise([*times, last]):
+        around = shapely.buffer(places, TOUCHES + WIDER * min(top * (high - low), FAR))
+        left = shapely.intersection(road, around)
+        there = [wall for wall, since, until in every if since <= low and high <= until]
+        parts = shapely.get_parts(shapely.difference(left, united(there)) if there else left)
+        places = united(parts[shapely.distance(parts, places) <= TOUCHES])
+        if places.is_empty:
+            break
+        for k, goal in enumerate(scene.goals):
+            in_time = low <= goal.time[1] and goal.time[0] <= high
+            met[k] = met[k] or (in_time and goal.away_from(places) <= TOUCHES)
+    return met
