@@ -112,11 +112,9 @@ def word_misses(
     goal: tuple[float, float, float],
     times: Array,
 ) -> float:
-    """How far a word of fewer than three trims ends from the goal [m, rad], both poses folded.
-
-    `facing` is the heading of `start` as a complex number: to compute it here would take its sine
-    for every word, also for those that need none of this.
-    """
+    """How far a word of fewer than three trims ends from the goal [m, rad], both poses folded."""
+    # `facing`, the start's heading as a complex number, is known: LLVM would take its sine here for
+    # every word, also for those of three trims.
     x, y, heading = start
     before = NO_TRIM
     for n in range(3):
@@ -170,8 +168,6 @@ def solve_path(
                 left, right = turn_time(left, abs(turn_rate)), turn_time(left, -abs(turn_rate))
             out[branch, n, 0] = lasting(lib, word[n], left)
             out[branch, n, 1] = lasting(lib, word[n], right)
-        if math.isnan(branches[branch, 1]):
-            out[branch, 0, 0] = out[branch, 0, 1] = math.nan
 
 
 @bare_shared_kernel

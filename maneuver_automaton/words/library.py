@@ -361,14 +361,12 @@ def with_words(
 
     Words are of one path if their trims differ in nothing but the way in which they turn.
     """
-    v_x, v_y, turn = (arrays.twists[np.concatenate([words, free_words]), k] for k in range(3))
-    way = np.where(turn < 0.0, -1.0, 1.0)
-    rows = np.column_stack([way * v_x, way * v_y, np.abs(turn)]) + 0.0  # no zero has a sign
-    _, path = np.unique(rows, axis=0, return_inverse=True)
-    table = np.column_stack([np.concatenate([words, free_words]), path])
-    tried = arrays.tried._replace(
-        words=table[: len(words)], n_few=n_few, free_words=table[len(words) :]
-    )
+    every = np.concatenate([words, free_words])
+    twists = arrays.twists[every, :3]
+    left = twists * np.where(twists[..., 2:] < 0.0, -1.0, 1.0) + 0.0  # no zero has a sign
+    _, path = np.unique(left.reshape(-1, 9), axis=0, return_inverse=True)
+    rows, n = np.column_stack([every, path]), len(words)
+    tried = arrays.tried._replace(words=rows[:n], n_few=n_few, free_words=rows[n:])
     return arrays._replace(tried=tried)
 
 
