@@ -34,6 +34,12 @@ class CompiledLater:
         made: Callable[..., Any] = self._make(self._function)
         return made
 
+    @functools.cached_property
+    def only_entry(self) -> Callable[..., Any]:
+        """What numba made of it for the only types that it was called with so far."""
+        (made,) = self.overloads.values()
+        return cast("Callable[..., Any]", made.entry_point)
+
     def __call__(self, *args: Any) -> Any:
         """Run it, compiled."""
         return self.compiled(*args)
@@ -146,6 +152,16 @@ def bound(function: Callable[..., Any], *args: Any) -> Callable[[], Any]:
     function.compiled.compile(types)  # type: ignore[attr-defined]
     compiled = function.compiled.overloads[types]  # type: ignore[attr-defined]
     return functools.partial(compiled.entry_point, *args)
+
+
+def called_again(function: Kernel) -> Kernel:
+    """What is called in place of a kernel that was called with arguments of the same types.
+
+    It does not look at them again, which takes longer than some calls.
+    """
+    if not isinstance(function, CompiledLater) or len(function.overloads) != 1:
+        return function
+    return cast("Kernel", function.only_entry)
 
 
 NO_COUNTS: dict[str, Any] = {"_nrt": False}

@@ -45,7 +45,7 @@ def candidates(
     )
     found = []
     for k in np.argsort(scratch.costs[:n], kind="stable"):
-        word = arrays.tried.words[scratch.rows[k]]
+        word = arrays.tried.words[scratch.rows[k], :3]
         trims, times = word[word >= 0], scratch.times[k, :3][word >= 0]
         if scratch.climbs[k] >= 0:
             trims = np.append(trims, scratch.climbs[k])

@@ -185,7 +185,7 @@ def _word(one: Pass) -> Word:
     state, links = arrays.state.tolist(), arrays.links
     numbered = library.library
     words = numbered.tried.free_words if state[layout.FREE] else numbered.tried.words
-    row = [*words[state[layout.ROW]].tolist(), state[layout.CLIMB]]
+    row = [*words[state[layout.ROW], :3].tolist(), state[layout.CLIMB]]
     connection = [
         (NO_EDGE, trim, t)
         for trim, t in zip(row, arrays.found[1:5].tolist(), strict=True)

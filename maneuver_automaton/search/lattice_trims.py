@@ -24,6 +24,7 @@ from maneuver_automaton.words.library import (
     library_arrays,
     library_of,
     moving_trims,
+    with_words,
 )
 
 MOST_TRIMS = 10  # moving; of a larger library a few stand for all where the lattice is searched
@@ -97,17 +98,15 @@ def trims_at_will(
             trims=np.asarray(trims, dtype=np.int64),
             transitions=identities(automaton),
             maneuver_costs=np.zeros(0),
-            arrays=_with_prices(arrays, cost)._replace(
-                tried=arrays.tried._replace(
-                    words=words,
-                    n_few=len(words),
-                    free_words=np.array(
-                        [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
-                        or [(int(i), int(i), m) for i in moving],
-                        dtype=np.int64,
-                    ).reshape(-1, 3),
-                ),
-                min_coast=float(min_coast),
+            arrays=with_words(
+                _with_prices(arrays, cost)._replace(min_coast=float(min_coast)),
+                words,
+                len(words),
+                np.array(
+                    [(i, j, m) for i, j in itertools.permutations(moving.tolist(), 2)]
+                    or [(int(i), int(i), m) for i in moving],
+                    dtype=np.int64,
+                ).reshape(-1, 3),
             ),
         ),
         wide=not spins,
@@ -175,15 +174,20 @@ def is_mirrored(twists: Array, rates: Array) -> bool:
 
 
 def _words(moving: IntArray, twists: Array) -> IntArray:
-    """Words of three trims whose neighbours differ; of two where none turns, which are enough."""
+    """Words of three trims whose neighbours differ; of two where none turns, which are enough.
+
+    Two trims along one path are no neighbours: one of them does what both do.
+    """
     every = moving.tolist()
     if len(every) > 1 and not twists[:, 2].any():
         return np.array(
             [(i, j, NO_TRIM) for i, j in itertools.permutations(every, 2)], dtype=np.int64
         )
-    words = [(i, j, k) for i, j, k in itertools.product(every, repeat=3) if i != j and j != k] or [
-        (i, i, i) for i in every
-    ]
+    across = np.linalg.norm(np.cross(twists[:, None], twists), axis=-1)
+    apart = across > STRAIGHT * np.multiply.outer(*[np.linalg.norm(twists, axis=1)] * 2)
+    words = [
+        (i, j, k) for i, j, k in itertools.product(every, repeat=3) if apart[i, j] and apart[j, k]
+    ] or [(i, i, i) for i in every]
     return np.array(words, dtype=np.int64).reshape(-1, 3)
 
 

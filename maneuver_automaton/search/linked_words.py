@@ -222,6 +222,6 @@ def _steered(setup: WordSetup, headings: Array, budget: Budget) -> Iterator[Time
     costs = costs + setup.switch * np.maximum(np.count_nonzero(times > 0.0, axis=1) - 1, 0)
     in_turn = (climbs[:, None] == [NO_TRIM, *arrays.tried.climbs]).argmax(axis=1)
     for k in np.lexsort((rows, in_turn, numbers, costs)):  # the same however it is parted
-        word = np.append(tried.words[rows[k]], climbs[k])
+        word = np.append(tried.words[rows[k], :3], climbs[k])
         used = word >= 0
         yield TimedWord(tuple(word[used].tolist()), times[k, used], cost=float(costs[k]))

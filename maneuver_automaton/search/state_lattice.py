@@ -11,13 +11,14 @@ autonomous vehicles*, IJRR 28(8), for the search from the goal.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray, wrapped
+from maneuver_automaton._compile import called_again
 from maneuver_automaton._kept import Prepared
 from maneuver_automaton.budget import Budget, Pace
 from maneuver_automaton.costs import Cost, terms_of
@@ -310,6 +311,7 @@ class GraphSearch:
     pace: Pace
     alive: bool = True
     is_late: bool = False  # no time is left to make room for more nodes
+    expand: Callable[[GraphQuery, int, float], int] = kernels.expand_lattice
 
     @classmethod
     def of(cls, graph: Graph, *, weight: float, budget: Budget) -> GraphSearch:
@@ -386,7 +388,8 @@ class GraphSearch:
                 return
             tested = graph.coarse, graph.fine
             query = GraphQuery(self.arrays, graph.lattice, graph.aims, *tested, self.weight)
-            self.alive = bool(kernels.expand_lattice(query, step, upper_bound + graph.surcharge))
+            self.alive = bool(self.expand(query, step, upper_bound + graph.surcharge))
+            self.expand = called_again(kernels.expand_lattice)
 
     def _makes_room(self) -> bool:
         """Widen the arrays that are full; whether there is time to do so."""

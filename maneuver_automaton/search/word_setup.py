@@ -31,6 +31,7 @@ from maneuver_automaton.words.library import (
     MovingTrims,
     library_of,
     most_different,
+    with_words,
     words_of,
 )
 from maneuver_automaton.words.word import Word
@@ -344,8 +345,7 @@ def _library(
     chosen |= set(wanted) & set(moving.tolist())
     if steers:
         words, n_few = words_of(sorted(chosen), library.transitions)
-        tried = library.arrays.tried._replace(words=words, n_few=n_few)
-        library = replace(library, arrays=library.arrays._replace(tried=tried))
+        library = replace(library, arrays=with_words(library.arrays, words, n_few))
     upright = library.arrays.tried.climbs[: library.arrays.tried.n_upright].tolist()
     return tuple(sorted(chosen.union(upright))), library
 

@@ -27,10 +27,19 @@ from maneuver_automaton.words._kernels_library import (
     step_of,
     time_between,
 )
-from maneuver_automaton.words._kernels_steering import length, steer, steer_one, steer_two, unit
+from maneuver_automaton.words._kernels_steering import (
+    extents,
+    length,
+    steer,
+    steer_one,
+    steer_two,
+    turn_time,
+    unit,
+)
 from maneuver_automaton.words.library import LibraryArrays, Scratch
 
 WHOLE = 1e-9  # share of a full turn that counts as none
+PATH = 3  # column of a word, after its trims
 
 
 @inner_kernel
@@ -99,10 +108,13 @@ def word_misses(
     lib: LibraryArrays,
     word: IntArray,
     start: tuple[float, float, float],
+    facing: complex,
     goal: tuple[float, float, float],
     times: Array,
 ) -> float:
     """How far a word of fewer than three trims ends from the goal [m, rad], both poses folded."""
+    # `facing`, the start's heading as a complex number, is known: LLVM would take its sine here for
+    # every word, also for those of three trims.
     x, y, heading = start
     before = NO_TRIM
     for n in range(3):
@@ -112,13 +124,50 @@ def word_misses(
         if before != NO_TRIM:
             d_x, d_y, turn = displacement_of(lib, before, trim)
             x, y, heading = compose(x, y, heading, d_x, d_y, turn)
+            facing = unit(heading)
         d_x, d_y, turn = coast(
             lib.twists[trim, 0], lib.twists[trim, 1], lib.twists[trim, 2], times[n]
         )
-        x, y, heading = compose(x, y, heading, d_x, d_y, turn)
+        x, y = x + facing.real * d_x - facing.imag * d_y, y + facing.imag * d_x + facing.real * d_y
+        heading += turn
         before = trim
     g_x, g_y, g_heading = goal
     return max(abs(x - g_x), abs(y - g_y), abs(nearest_turn(heading - g_heading)))
+
+
+@inner_kernel
+def lasting(lib: LibraryArrays, trim: int, t: float) -> float:
+    """Time of a trim that is driven for `t`: a whole turn counts as none; NaN if negative."""
+    if not t >= -lib.rounding.tolerance:
+        return math.nan
+    if t >= lib.periods[trim] * (1.0 - WHOLE) or t < lib.rounding.shortest:
+        return 0.0
+    return t
+
+
+@bare_inner_kernel
+def solve_path(
+    lib: LibraryArrays,
+    word: IntArray,
+    goal: tuple[complex, float, complex],
+    limits: tuple[float, float],
+    branches: Array,
+    out: Array,
+) -> None:
+    """Fill `out` (2, 3, 2) with the times of three trims, were each to turn left or right.
+
+    Nothing lies between them. `branches` (2, 3) is room for their `extents`.
+    """
+    motions = motion_of(lib, word[0]), motion_of(lib, word[1]), motion_of(lib, word[2])
+    extents(motions, ((0j, 0.0), (0j, 0.0)), goal, limits, branches)
+    for branch in range(2):
+        for n in range(3):
+            _, turn_rate = motions[n]
+            left = right = branches[branch, n]
+            if turn_rate != 0.0:
+                left, right = turn_time(left, abs(turn_rate)), turn_time(left, -abs(turn_rate))
+            out[branch, n, 0] = lasting(lib, word[n], left)
+            out[branch, n, 1] = lasting(lib, word[n], right)
 
 
 @bare_shared_kernel
@@ -155,6 +204,11 @@ def candidates(
     # steered.
     for climbing in range(-1, lib.tried.climbs.shape[0]):
         climb = lib.tried.climbs[climbing] if climbing >= 0 else NO_TRIM
+        # As long as all words are steered between the same two poses, those that follow one path
+        # differ only in which way they turn along it, and are solved for once.
+        shared = one_class and climbing < lib.tried.n_upright
+        for path in range(scratch.solved.shape[0]):
+            scratch.solved[path, 0, 0, 0] = -math.inf  # not yet
         first_before, last_before = -2, -2
         cost_in, cost_out = 0.0, 0.0
         # What a word is steered between: from s, the start after the transition into its first
@@ -163,6 +217,7 @@ def candidates(
         s_x, s_y, s_heading = x, y, heading
         e_x, e_y, e_heading = g_x, g_y, g_heading
         h_x, h_y, h_heading = g_x, g_y, g_heading
+        facing = unit(s_heading)
         rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
         distance = length(rel[0])
         for row in range(n_words):
@@ -187,6 +242,7 @@ def candidates(
                 h_x, h_y, h_heading = e_x, e_y, e_heading
                 if climb >= 0:
                     e_x, e_y, e_heading = before_climb(lib, (h_x, h_y, h_heading), last, climb, 0.0)
+                facing = unit(s_heading)
                 rel = seen(s_x, s_y, s_heading, e_x, e_y, e_heading)
                 distance = length(rel[0])
             fixed = cost_in + cost_out
@@ -222,15 +278,24 @@ def candidates(
             branches = scratch.branches
             n_branches = 1
             if n_trims == 3:
-                motions = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
-                nothing = (0j, 0.0)  # displacements known to be none cost no time
-                steps = (nothing, nothing)
-                if not one_class:
-                    steps = (step_of(lib, a, b), step_of(lib, b, c))
                 # No branch with a time below the least is of use.
                 limits = (lib.rounding.tolerance, -lib.rounding.tolerance)
-                steer(motions, steps, rel, limits, branches)
                 n_branches = 2
+                if shared:
+                    solved = scratch.solved[words[row, PATH]]
+                    if solved[0, 0, 0] == -math.inf:
+                        solve_path(lib, words[row], rel, limits, branches, solved)
+                    for branch in range(2):
+                        for n in range(3):
+                            right = 1 if lib.twists[words[row, n], 2] < 0.0 else 0
+                            branches[branch, n] = solved[branch, n, right]
+                else:
+                    motions = motion_of(lib, a), motion_of(lib, b), motion_of(lib, c)
+                    nothing = (0j, 0.0)  # displacements known to be none cost no time
+                    steps = (nothing, nothing)
+                    if not one_class:
+                        steps = (step_of(lib, a, b), step_of(lib, b, c))
+                    steer(motions, steps, rel, limits, branches)
             elif n_trims == 2:
                 steer_two(
                     motion_of(lib, a),
@@ -249,15 +314,18 @@ def candidates(
             # unless the trim before goes on. Switches are priced between trims that last, as a trim
             # without time is not driven.
             for branch in range(n_branches):
+                least = fixed  # without the prices of switches, NaN where a time is
+                for n in range(n_trims):
+                    if not shared or n_trims < 3:
+                        branches[branch, n] = lasting(lib, words[row, n], branches[branch, n])
+                    if branches[branch, n] != 0.0:
+                        least += branches[branch, n] * lib.rates[words[row, n]]
+                if not least < upper_bound:
+                    continue
                 cost, duration, usable = fixed, 0.0, True
                 trim, gear = start_trim, start_gear
                 for n in range(n_trims):
                     t, this = branches[branch, n], words[row, n]
-                    if not t >= -lib.rounding.tolerance:
-                        usable = False
-                        break
-                    if t >= lib.periods[this] * (1.0 - WHOLE) or t < lib.rounding.shortest:
-                        t = 0.0
                     scratch.times[count, n] = t
                     if t > 0.0 and this < lib.n_trims:  # the turn of a free heading is no trim
                         cost += t * lib.rates[this] + price_of_switch(lib, trim, gear, this)
@@ -301,7 +369,9 @@ def candidates(
                         duration += t
                 if n_trims < 3:  # fewer times than the goal has coordinates: does it meet the goal?
                     folded, target = (s_x, s_y, s_heading), (e_x, e_y, e_heading)
-                    missed = word_misses(lib, words[row], folded, target, scratch.times[count])
+                    missed = word_misses(
+                        lib, words[row], folded, facing, target, scratch.times[count]
+                    )
                     if not missed <= lib.rounding.met * size:
                         continue
                 if not one_class:

@@ -164,22 +164,16 @@ def steer_two(
 
 
 @bare_inner_kernel
-def steer(
+def extents(
     word: tuple[tuple[complex, float], tuple[complex, float], tuple[complex, float]],
     steps: tuple[tuple[complex, float], tuple[complex, float]],
     goal: tuple[complex, float, complex],
     limits: tuple[float, float],
     out: Array,
 ) -> None:
-    """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
+    """Fill `out` (2, 3) with the angles of turns and the times of straights, NaN where none.
 
-    `word` are the three trims, `steps` the displacements between them, `goal` the place, the
-    heading, and the heading as a number of length one: many words lead to one goal, and the sine
-    costs as much as the rest of some of them. `limits` are the tolerance and the least time.
-
-    Row 0 and row 1 are two branches, each continuous in all arguments. Turning times lie in
-    [0, one turn); straight times may be negative, which the caller rejects. Between two turns, or
-    beside them, one below the least counts as none at all.
+    As `steer`, but that turns count by their circles, whichever way and how fast they are driven.
     """
     (v_a, w_a), (v_b, w_b), (v_c, w_c) = word
     (d_1, e_1), (d_2, e_2) = steps
@@ -201,17 +195,14 @@ def steer(
         r_b + d_2 - r_c * (unit(e_2) if e_2 != 0.0 else 1.0 + 0j)
     )  # multiplies e^{i heading after b}
     before_c = heading - e_2
+    facing = unit(before_c) if e_2 != 0.0 else turn_3
     # By which trims turn: with three turns both headings are unknown; each straight keeps a heading
     # and brings its time as the unknown instead.
     if w_a != 0.0 and w_b != 0.0 and w_c != 0.0:
         plus_1, plus_2, minus_1, minus_2 = two_circles(at_1, at_2, d, tolerance)
-        if not math.isnan(plus_1):
-            out[0, 0] = turn_time(plus_1, w_a)
-            out[0, 1] = turn_time(plus_2 - plus_1 - e_1, w_b)
-            out[0, 2] = turn_time(before_c - plus_2, w_c)
-            out[1, 0] = turn_time(minus_1, w_a)
-            out[1, 1] = turn_time(minus_2 - minus_1 - e_1, w_b)
-            out[1, 2] = turn_time(before_c - minus_2, w_c)
+        for row in range(2):
+            h_1, h_2 = (plus_1, plus_2) if row == 0 else (minus_1, minus_2)
+            out[row, 0], out[row, 1], out[row, 2] = h_1, h_2 - h_1 - e_1, before_c - h_2
     elif w_a != 0.0 and w_c != 0.0:  # turn, straight, turn
         # Both headings are one and the same but for `e_1`: its rotation keeps lengths, so the
         # length of what it turns has to be that of `d`, and that gives the time of the straight.
@@ -223,9 +214,7 @@ def steer(
                 time = later if row == 0 else earlier
                 if time >= least:
                     angle = phase(d) - phase(still + along * time)
-                    out[row, 0] = turn_time(angle, w_a)
-                    out[row, 1] = time
-                    out[row, 2] = turn_time(before_c - angle - e_1, w_c)
+                    out[row, 0], out[row, 1], out[row, 2] = angle, time, before_c - angle - e_1
     elif w_b != 0.0 and w_c != 0.0:  # straight, turn, turn
         point = d - at_1
         if length(v_a) > 0.0 and length(at_2) > tolerance * (length(point) + length(at_2)):
@@ -234,11 +223,9 @@ def steer(
                 time = later if row == 0 else earlier
                 if time >= least:
                     angle = phase(point - v_a * time) - phase(at_2)
-                    out[row, 0] = time
-                    out[row, 1] = turn_time(angle - e_1, w_b)
-                    out[row, 2] = turn_time(before_c - angle, w_c)
+                    out[row, 0], out[row, 1], out[row, 2] = time, angle - e_1, before_c - angle
     elif w_a != 0.0 and w_b != 0.0:  # turn, turn, straight
-        point = d - at_2 * unit(before_c)
+        point = d - at_2 * facing
         along = v_c * turn_3
         if length(v_c) > 0.0 and length(at_1) > tolerance * (length(point) + length(at_1)):
             later, earlier = line_and_circle(point, along, length(at_1), tolerance)
@@ -246,34 +233,51 @@ def steer(
                 time = later if row == 0 else earlier
                 if time >= least:
                     angle = phase(point - along * time) - phase(at_1)
-                    out[row, 0] = turn_time(angle, w_a)
-                    out[row, 1] = turn_time(before_c - angle - e_1, w_b)
-                    out[row, 2] = time
+                    out[row, 0], out[row, 1], out[row, 2] = angle, before_c - angle - e_1, time
     elif w_b != 0.0:  # straight, turn, straight
-        point = d - at_1 - at_2 * unit(before_c)
+        point = d - at_1 - at_2 * facing
         if length(v_a) > 0.0 and length(v_c) > 0.0:
             first, last = two_lines(point, v_a, v_c * turn_3, tolerance)
-            if not math.isnan(first):
-                out[0, 0] = first
-                out[0, 1] = turn_time(before_c - e_1, w_b)
-                out[0, 2] = last
+            out[0, 0], out[0, 1], out[0, 2] = first, before_c - e_1, last
     elif w_c != 0.0:  # straight, straight, turn
         point = d - at_1 - at_2 * turn_1
         if length(v_a) > 0.0 and length(v_b) > 0.0:
             first, second = two_lines(point, v_a, v_b * turn_1, tolerance)
-            if not math.isnan(first):
-                out[0, 0] = first
-                out[0, 1] = second
-                out[0, 2] = turn_time(before_c - e_1, w_c)
+            out[0, 0], out[0, 1], out[0, 2] = first, second, before_c - e_1
     elif w_a != 0.0:  # turn, straight, straight
         angle = before_c - e_1
-        point = d - at_1 * unit(angle) - at_2 * unit(before_c)
+        point = d - at_1 * unit(angle) - at_2 * facing
         if length(v_b) > 0.0 and length(v_c) > 0.0:
-            second, last = two_lines(point, v_b * unit(before_c), v_c * turn_3, tolerance)
-            if not math.isnan(second):
-                out[0, 0] = turn_time(angle, w_a)
-                out[0, 1] = second
-                out[0, 2] = last
+            second, last = two_lines(point, v_b * facing, v_c * turn_3, tolerance)
+            out[0, 0], out[0, 1], out[0, 2] = angle, second, last
+
+
+@bare_inner_kernel
+def steer(
+    word: tuple[tuple[complex, float], tuple[complex, float], tuple[complex, float]],
+    steps: tuple[tuple[complex, float], tuple[complex, float]],
+    goal: tuple[complex, float, complex],
+    limits: tuple[float, float],
+    out: Array,
+) -> None:
+    """Fill `out` (2, 3) with the coasting times that carry the identity to `goal`, NaN where none.
+
+    `word` are the three trims, `steps` the displacements between them, `goal` the place, the
+    heading, and the heading as a number of length one: many words lead to one goal, and the sine
+    costs as much as the rest of some of them. `limits` are the tolerance and the least time.
+
+    Row 0 and row 1 are two branches, each continuous in all arguments. Turning times lie in
+    [0, one turn); straight times may be negative, which the caller rejects. Between two turns, or
+    beside them, one below the least counts as none at all. A branch has all its times or none.
+    """
+    extents(word, steps, goal, limits, out)
+    for row in range(2):
+        for n in range(3):
+            _, turn_rate = word[n]
+            if math.isnan(out[row, 1]):
+                out[row, n] = math.nan
+            elif turn_rate != 0.0:
+                out[row, n] = turn_time(out[row, n], turn_rate)
 
 
 @kernel

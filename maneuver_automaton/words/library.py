@@ -142,6 +142,7 @@ FEW_TRIMS = 14  # of these, for words that are tried often
 STRAIGHT = 1e-12  # [rad/s] turn rates below it are none
 SHORTEST = 1e-9  # [s] coasting times below it are none
 TOLERANCE = 1e-10  # of the steering function, relative
+NO_WORDS: IntArray = np.zeros((0, 3), dtype=np.int64)
 MET = 1e-9  # [m, rad] by which a word with fewer times than the goal has coordinates may miss it
 
 
@@ -157,9 +158,9 @@ class TransitionArrays(NamedTuple):
 class WordTable(NamedTuple):
     """The words that are tried where two poses are to be connected."""
 
-    words: IntArray  # (K, 3) trims in order, NO_TRIM for none; those of few trims first
+    words: IntArray  # (K, 4) three trims, NO_TRIM for none, and a path; those of few trims first
     n_few: int  # how many these are
-    free_words: IntArray  # (F, 3) that end with the turn of a free heading
+    free_words: IntArray  # (F, 4) that end with the turn of a free heading
     climbs: IntArray  # (c,) trims that only climb or sink, then such that drive straight with it
     n_upright: int  # how many only climb or sink
 
@@ -202,7 +203,8 @@ class Scratch(NamedTuple):
     rows: IntArray  # (n,) which word
     climbs: IntArray  # (n,) the climbing trim at its end, NO_TRIM for none
     times: Array  # (n, 4) [s] of up to three trims and the climb
-    branches: Array  # (2, 3)
+    branches: Array  # (2, 3) [s] of three trims, on both branches
+    solved: Array  # (P, 2, 3, 2) [s] the same of each path, were a trim to turn left or right
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -245,8 +247,8 @@ class Library:
 
 def scratch_of(arrays: LibraryArrays) -> Scratch:
     """Room for the candidates of one steering call: two for each word, with each climb."""
-    tried = arrays.tried
-    n = 2 * max(len(tried.words), len(tried.free_words), 1) * (1 + len(tried.climbs))
+    every = arrays.tried.words, arrays.tried.free_words
+    n = 2 * max(1, *map(len, every)) * (1 + len(arrays.tried.climbs))
     return Scratch(
         costs=np.empty(n),
         durations=np.empty(n),
@@ -254,6 +256,7 @@ def scratch_of(arrays: LibraryArrays) -> Scratch:
         climbs=np.empty(n, dtype=np.int64),
         times=np.empty((n, 4)),
         branches=np.empty((2, 3)),
+        solved=np.empty((1 + max(rows[:, 3].max(initial=0) for rows in every), 2, 3, 2)),
     )
 
 
@@ -292,7 +295,7 @@ def library_of(
         trims=np.arange(m),
         transitions=transitions,
         maneuver_costs=prices,
-        arrays=arrays._replace(tried=arrays.tried._replace(words=words, n_few=n_few)),
+        arrays=with_words(arrays, words, n_few),
     )
 
 
@@ -337,9 +340,9 @@ def library_arrays(
             length=np.hypot(displacement[..., 0], displacement[..., 1]),
         ),
         tried=WordTable(
-            words=np.zeros((0, 3), dtype=np.int64),
+            words=np.zeros((0, 4), dtype=np.int64),
             n_few=0,
-            free_words=np.zeros((0, 3), dtype=np.int64),
+            free_words=np.zeros((0, 4), dtype=np.int64),
             climbs=np.concatenate([upright, sloping]).astype(np.int64),
             n_upright=len(upright),
         ),
@@ -348,6 +351,22 @@ def library_arrays(
         min_coast=0.0,
         rounding=Rounding(SHORTEST, TOLERANCE, MET),
     )
+
+
+def with_words(
+    arrays: LibraryArrays, words: IntArray, n_few: int, free_words: IntArray = NO_WORDS
+) -> LibraryArrays:
+    """The arrays with the words that are tried, (K, 3) and (F, 3), the first `n_few` often.
+
+    Words are of one path if their trims differ in nothing but the way in which they turn.
+    """
+    every = np.concatenate([words, free_words])
+    twists = arrays.twists[every, :3]
+    left = twists * np.where(twists[..., 2:] < 0.0, -1.0, 1.0) + 0.0  # no zero has a sign
+    _, path = np.unique(left.reshape(-1, 9), axis=0, return_inverse=True)
+    rows, n = np.column_stack([every, path]), len(words)
+    tried = arrays.tried._replace(words=rows[:n], n_few=n_few, free_words=rows[n:])
+    return arrays._replace(tried=tried)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
