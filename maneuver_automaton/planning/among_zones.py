@@ -133,13 +133,15 @@ def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
 
 def _questions(problem: Problem) -> Iterator[Problem]:
     """Problems without zones whose plans keep to all of them: through all, around all, mixed."""
-    count = len(problem.zones)
-    mixed = (one for one in product((True, False), repeat=count) if 0 < sum(one) < count)
-    for through in islice(chain(((True,) * count, (False,) * count), mixed), MOST_QUESTIONS):
-        entered = tuple(zone for zone, enter in zip(problem.zones, through, strict=True) if enter)
+    choices = [_choices(problem, zone) for zone in problem.zones]
+    through, around = (tuple(one[k] for one in choices) for k in (0, -1))
+    mixed = (one for one in product(*choices) if one not in (through, around))
+    firsts = dict.fromkeys((through, around))
+    for chosen in islice(chain(firsts, mixed), MOST_QUESTIONS):
+        entered = tuple(zone for zone, enter in zip(problem.zones, chosen, strict=True) if enter)
         avoided = tuple(
             Obstacle(zone.shape, name=zone.words)
-            for zone, enter in zip(problem.zones, through, strict=True)
+            for zone, enter in zip(problem.zones, chosen, strict=True)
             if not enter
         )
         automaton = admitted_automaton(problem.automaton, entered)
@@ -154,6 +156,16 @@ def _questions(problem: Problem) -> Iterator[Problem]:
             zones=(),
             obstacles=(*problem.obstacles, *avoided),
         )
+
+
+def _choices(problem: Problem, zone: Zone) -> tuple[bool, ...]:
+    """Whether a zone may be entered, and gone around: not where it admits nothing, or an end is."""
+    alone = replace(problem, zones=(), obstacles=(Obstacle(zone.shape),))
+    moving = (trim for trim in problem.automaton.trims if not trim.is_rest)
+    has_inertia = bool(problem.automaton.model.reduced_names)
+    entered = has_inertia or any(piece_is_admitted(zone, trim) for trim in moving)
+    around = not entered or blocked_ends(alone) is None
+    return tuple(one for one, may in ((True, entered), (False, around)) if may)
 
 
 def admitted_automaton(automaton: Automaton, zones: tuple[Zone, ...]) -> Automaton | None:
