@@ -133,7 +133,13 @@ def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
 
 def _questions(problem: Problem) -> Iterator[Problem]:
     """Problems without zones whose plans keep to all of them: through all, around all, mixed."""
-    choices = [_choices(problem, zone) for zone in problem.zones]
+    model, choices = problem.automaton.model, list[list[bool]]()
+    for zone in problem.zones:  # what admits no motion is not entered, what an end is in, is
+        moving = (trim for trim in problem.automaton.trims if not trim.is_rest)
+        may = bool(model.reduced_names) or any(piece_is_admitted(zone, one) for one in moving)
+        alone = replace(problem, zones=(), obstacles=(Obstacle(zone.shape),))
+        must = may and blocked_ends(alone) is not None
+        choices.append([True] * may + [False] * (not must))
     through, around = (tuple(one[k] for one in choices) for k in (0, -1))
     mixed = (one for one in product(*choices) if one not in (through, around))
     firsts = dict.fromkeys((through, around))
@@ -156,16 +162,6 @@ def _questions(problem: Problem) -> Iterator[Problem]:
             zones=(),
             obstacles=(*problem.obstacles, *avoided),
         )
-
-
-def _choices(problem: Problem, zone: Zone) -> tuple[bool, ...]:
-    """Whether a zone may be entered, and gone around: not where it admits nothing, or an end is."""
-    alone = replace(problem, zones=(), obstacles=(Obstacle(zone.shape),))
-    moving = (trim for trim in problem.automaton.trims if not trim.is_rest)
-    has_inertia = bool(problem.automaton.model.reduced_names)
-    entered = has_inertia or any(piece_is_admitted(zone, trim) for trim in moving)
-    around = not entered or blocked_ends(alone) is None
-    return tuple(one for one, may in ((True, entered), (False, around)) if may)
 
 
 def admitted_automaton(automaton: Automaton, zones: tuple[Zone, ...]) -> Automaton | None:

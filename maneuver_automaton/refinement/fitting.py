@@ -329,7 +329,7 @@ def _with_times(
     if through:
         least_of = np.where(shares == 1.0, least, 0.0)
         changed, missing = times_through(conditions, lasting, at_least=least_of)
-        changed = np.bincount(whose, weights=changed, minlength=n)
+        changed = np.bincount(whose, weights=changed, minlength=n).astype(np.float64)
     else:
         changed, missing = closest_times(conditions[-1], lasting, at_least=least)
     if missing >= CLOSED:
