@@ -133,13 +133,21 @@ def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:
 
 def _questions(problem: Problem) -> Iterator[Problem]:
     """Problems without zones whose plans keep to all of them: through all, around all, mixed."""
-    count = len(problem.zones)
-    mixed = (one for one in product((True, False), repeat=count) if 0 < sum(one) < count)
-    for through in islice(chain(((True,) * count, (False,) * count), mixed), MOST_QUESTIONS):
-        entered = tuple(zone for zone, enter in zip(problem.zones, through, strict=True) if enter)
+    model, choices = problem.automaton.model, list[list[bool]]()
+    for zone in problem.zones:  # what admits no motion is not entered, what an end is in, is
+        moving = (trim for trim in problem.automaton.trims if not trim.is_rest)
+        may = bool(model.reduced_names) or any(piece_is_admitted(zone, one) for one in moving)
+        alone = replace(problem, zones=(), obstacles=(Obstacle(zone.shape),))
+        must = may and blocked_ends(alone) is not None
+        choices.append([True] * may + [False] * (not must))
+    through, around = (tuple(one[k] for one in choices) for k in (0, -1))
+    mixed = (one for one in product(*choices) if one not in (through, around))
+    firsts = dict.fromkeys((through, around))
+    for chosen in islice(chain(firsts, mixed), MOST_QUESTIONS):
+        entered = tuple(zone for zone, enter in zip(problem.zones, chosen, strict=True) if enter)
         avoided = tuple(
             Obstacle(zone.shape, name=zone.words)
-            for zone, enter in zip(problem.zones, through, strict=True)
+            for zone, enter in zip(problem.zones, chosen, strict=True)
             if not enter
         )
         automaton = admitted_automaton(problem.automaton, entered)

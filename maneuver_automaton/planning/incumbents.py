@@ -14,6 +14,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import CONVERGED, Likeness, is_new, same_motion
 from maneuver_automaton.budget import FIRST_LATE, Budget
 from maneuver_automaton.planning.checking import Condition, TooLate, check_plan, what_is_hit
+from maneuver_automaton.planning.on_the_way import passed_on_the_way
 from maneuver_automaton.planning.result import (
     Alternative,
     Answer,
@@ -295,8 +296,8 @@ class Incumbents:
             late += self.budget.is_over
 
     def _with_lasting_coasts(self, plan: Plan, goal: Goal) -> Plan:
-        """The plan without very short trims, if there is time to check it; its legs are without."""
-        if self.problem.via or self.budget.left_to_check < LONGER * self.longest_check:
+        """The plan without very short trims, if there is time to check it."""
+        if self.budget.left_to_check < LONGER * self.longest_check:
             return plan
 
         def is_free(one: Plan) -> bool:
@@ -305,8 +306,16 @@ class Incumbents:
                 self.problem, one, goal, self.workspace, budget=self.budget
             )
 
+        def passes(one: Plan) -> list[tuple[float, Goal]]:
+            found = list[tuple[float, Goal]]()
+            for at in passed_on_the_way(self.problem, one) if self.problem.via else ():
+                via = self.problem.via[at.number - 1]
+                pose = at.pose if via.radius > 0.0 else via.pose
+                found.append((at.time - one.start_time, Goal(pose, free_heading=via.free_heading)))
+            return found
+
         try:
-            return with_lasting_coasts(self.problem, plan, goal, is_free=is_free)
+            return with_lasting_coasts(self.problem, plan, goal, is_free=is_free, passes=passes)
         except TooLate:
             return plan
 

@@ -159,7 +159,7 @@ class Polish(PlanningStep):
         stage_cost, places = price.stage_cost(first), price.places(first)
         solid = _without_passed(problem, known[0][0]) if known else problem
         work = iterations_within(budget)
-        for goal_index, guesses in _in_groups(problem, known, self.guesses, budget):
+        for goal_index, guesses in _in_groups(found, known, self.guesses, budget):
             if budget.is_over or (work is not None and work <= 0):
                 break
             try:
@@ -196,11 +196,12 @@ def _worth_polishing(found: Incumbents, price: PolishedPrice) -> list[tuple[Plan
 
 
 def _in_groups(
-    problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
+    found: Incumbents, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
 ) -> Iterator[tuple[int, Iterable[Guess]]]:
     """Guesses for one goal each, polished together; along paths it cannot follow they come last."""
+    problem = found.problem
     if known:
-        yield from _by_goal(problem, _guesses(problem, known, paths, budget))
+        yield from _by_goal(problem, _guesses(found, known, paths, budget))
     if problem.moves:
         return  # a path knows nothing of time
     model = problem.automaton.model
@@ -210,14 +211,17 @@ def _in_groups(
 
 
 def _guesses(
-    problem: Problem, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
+    found: Incumbents, known: Sequence[tuple[Plan, int]], paths: Sequence[Aimed], budget: Budget
 ) -> Iterator[Aimed]:
-    """Guesses along kinematic plans; where there are none, the plans that are known."""
+    """Guesses along kinematic plans; where they are none, or gain nothing, the plans known."""
+    problem, cost = found.problem, found.cost
     if problem.rests_at_both_ends and follows_paths(problem.automaton.model) and not problem.moves:
         along = guesses_along_paths(problem, budget)
         if (first := next(along, None)) is not None:
             yield first
             yield from along
+            if found.cost == cost < math.inf:
+                yield Aimed(guess_of_plan(known[0][0]), known[0][1])
             return
         yield from paths
     aimed = [Aimed(guess_of_plan(plan), goal_index) for plan, goal_index in known]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import cmath
 import itertools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,7 +22,12 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Unstated
 from maneuver_automaton.words import TimesStatus, solve_switching_times
-from maneuver_automaton.words.closing import EndConditions, closest_times, conjugated
+from maneuver_automaton.words.closing import (
+    EndConditions,
+    closest_times,
+    conjugated,
+    times_through,
+)
 
 TIME_TOLERANCE = 1e-9  # [s] by which a time may miss a limit, and as a share of the limit
 NO_TIME = 0.0  # [s] a trim that lasts no longer is not one of the word
@@ -69,6 +74,9 @@ COSTLIER = 1e-3  # ... or the plan would become costlier by more than this share
 CLOSED = 1e-12  # [m, rad, s] that an exact end may miss
 MET = 1e-9  # [m, rad] from a goal, beyond its tolerance, where the checks take it to be met
 BESIDE = 1e-6  # [m, rad] from a goal, per metre to it, where exact times are worth a look
+Passage = tuple[float, Goal]
+"""Where in a word, 1 after its first trim, 1.5 in the midst of its second, what is passed."""
+
 NONE = 1e-8  # [s, rad] of a coast that is none, or of one that misses a whole turn
 MOST_TRIMS = 40  # of a library, of which every two are tried
 
@@ -189,20 +197,27 @@ def _short_words(
 
 
 def with_lasting_coasts(
-    problem: Problem, plan: Plan, goal: Goal, *, is_free: Callable[[Plan], bool]
+    problem: Problem,
+    plan: Plan,
+    goal: Goal,
+    *,
+    is_free: Callable[[Plan], bool],
+    passes: Callable[[Plan], Sequence[tuple[float, Goal]]],
 ) -> Plan:
     """The plan without trims of less than 20 ms, as far as that is free and hardly costlier.
 
     Such a trim is left out, or lasts so long; others change as little as they can: all of them,
     those near it, after it, or before it, whatever is free. Where that fails another trim stands
     beside it, which takes back what it turns too far. Where the horizon states a least time, be it
-    zero, the plan stays as it is.
+    zero, the plan stays as it is. A plan `passes` goals on its way, each after some seconds; still
+    does what comes out.
     """
     if not has_short_coasts(problem, plan):
         return plan
     most, failed = problem.cost_of(plan) * (1.0 + COSTLIER), 0
+    through = _within(plan, passes(plan))
     while failed < min(len(short := _short(plan)), LOOKED_AT // max(len(plan.trims), 1)):
-        for other in _without_short(problem, plan, goal, short[failed]):
+        for other in _without_short(problem, plan, goal, short[failed], through):
             if (
                 other is not None
                 and len(_short(other)) < len(short)
@@ -210,31 +225,51 @@ def with_lasting_coasts(
                 and not broken_condition(problem, other)
                 and is_free(other)
             ):
-                plan, failed = other, -1
+                plan, through, failed = other, _within(other, passes(other)), -1
                 break
         failed += 1
     return plan
 
 
-def _without_short(problem: Problem, plan: Plan, goal: Goal, short: int) -> Iterator[Plan | None]:
+def _within(plan: Plan, passes: Sequence[tuple[float, Goal]]) -> list[Passage]:
+    """Where in its word a plan passes each goal; what it passes in a maneuver, it still begins."""
+    lasting = [0.0, *(one.duration if one else 0.0 for one in plan.maneuvers)]
+    begins = np.cumsum([0.0, *plan.durations[:-1]]) + np.cumsum(lasting)[: len(plan.trims)]
+    found = list[Passage]()
+    for time, goal in passes:
+        k = max(int(np.searchsorted(begins, time - TIME_TOLERANCE)) - 1, 0)
+        passed, lasts = time - float(begins[k]), float(plan.durations[k])
+        if passed > lasts + TIME_TOLERANCE:
+            goal = Goal(plan.pose_at(plan.start_time + begins[k] + lasts))
+        share = 1.0 if passed > lasts - TIME_TOLERANCE else passed / lasts
+        if k + share > 0.0:
+            found.append((k + share, goal))
+    return found
+
+
+def _without_short(
+    problem: Problem, plan: Plan, goal: Goal, short: int, through: Sequence[Passage]
+) -> Iterator[Plan | None]:
     """Plans in which a short trim lasts longer or not at all; None where no times are found."""
     away = np.arange(plan.durations.size) - short
     times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))
     changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)
     for some, of_these, least in itertools.product(times, changing, (0.0, SHORT)):
-        yield _with_times(problem, plan, goal, some, of_these, least)
+        yield _with_times(problem, plan, goal, some, of_these, least, through)
     if plan.maneuvers or problem.horizon.time is not None:
         return
     moving = [one for one in problem.automaton.trims if not one.is_rest][:MOST_TRIMS]
-    lasting = plan.durations + SHORT * (away == 0)
     beside = (short - 1 if short else 1) % away.size  # a neighbour gives what both take
-    lasting[beside] = max(lasting[beside] - 2.0 * SHORT, SHORT)
     every = np.ones(away.size + 1, dtype=np.bool_)
-    for at, trim in itertools.product((short, short + 1), moving):
+    ways = itertools.product((SHORT, 2.0 * SHORT), (short, short + 1), moving)
+    for longer, at, trim in ways:
         if trim not in plan.trims[max(at - 1, 0) : at + 1]:
+            lasting = plan.durations + longer * (away == 0)
+            lasting[beside] = max(lasting[beside] - 2.0 * longer, SHORT)
             trims = (*plan.trims[:at], trim, *plan.trims[at:])
-            longer = replace(plan, trims=trims, durations=np.insert(lasting, at, SHORT))
-            yield _with_times(problem, longer, goal, longer.durations, every, SHORT)
+            more = replace(plan, trims=trims, durations=np.insert(lasting, at, longer))
+            later = [(place + (place > at), end) for place, end in through]
+            yield _with_times(problem, more, goal, more.durations, every, SHORT, later)
 
 
 def has_short_coasts(problem: Problem, plan: Plan) -> bool:
@@ -251,30 +286,50 @@ def _short(plan: Plan) -> list[int]:
 
 
 def _with_times(
-    problem: Problem, plan: Plan, goal: Goal, times: Array, free: NDArray[np.bool_], least: float
+    problem: Problem,
+    plan: Plan,
+    goal: Goal,
+    times: Array,
+    free: NDArray[np.bool_],
+    least: float,
+    through: Sequence[Passage] = (),
 ) -> Plan | None:
     """The word of a plan with times near some, those that are free at least so long, as it ends.
 
     Where the heading may be another one at the goal, it is any within its tolerance.
     """
-    group = problem.automaton.model.group
+    group, n = problem.automaton.model.group, len(times)
     turns = goal.free_heading or goal.tolerance_rad > 0.0
     exact = not (turns or goal.tolerance_m)
-    twists = np.array([trim.body_velocity for trim in plan.trims])
-    held = group.exp(np.where(free, 0.0, times)[:, None] * twists)  # as displacements
-    steps = np.vstack([_displacements(plan), np.zeros(plan.start.size)])
-    twists, product = conjugated(twists * free[:, None], (held @ group(steps)).pose)
-    fixed = problem.horizon.time is not None
-    conditions = EndConditions(
-        start=plan.start,
-        twists=twists,
-        goal=goal.pose if exact else plan.end,
-        free_heading=turns,
-        product=product,
-        rows=free[None].astype(float) if fixed else None,
-        targets=np.array([plan.durations.sum() - times[~free].sum()] if fixed else []),
-    )
-    changed, missing = closest_times(conditions, times, at_least=least)
+    places = np.unique([*range(1, n + 1), *(place for place, _ in through)])
+    shares, whose = np.diff(places, prepend=0.0), np.ceil(places).astype(int) - 1
+    lasting, frees = times[whose] * shares, free[whose]
+    twists = np.array([trim.body_velocity for trim in plan.trims])[whose]
+    held = group.exp(np.where(frees, 0.0, lasting)[:, None] * twists)  # as displacements
+    steps = np.vstack([_displacements(plan), np.zeros(plan.start.size)])[whose]
+    steps = (held @ group(steps * (places == whose + 1)[:, None])).pose
+    conditions = []
+    for place, end in (*through, (n, Goal(goal.pose if exact else plan.end, free_heading=turns))):
+        last = int(np.searchsorted(places, place))
+        before = np.vstack([steps[:last], held.pose[last]])
+        seen, product = conjugated((twists * frees[:, None])[: last + 1], before)
+        one = EndConditions(
+            start=plan.start,
+            twists=seen,
+            goal=end.pose,
+            free_heading=end.free_heading,
+            product=product,
+        )
+        conditions.append(one)
+    if problem.horizon.time is not None:
+        total = np.array([plan.durations.sum() - times[~free].sum()])
+        conditions[-1] = replace(one, rows=frees[None].astype(float), targets=total)
+    if through:
+        least_of = np.where(shares == 1.0, least, 0.0)
+        changed, missing = times_through(conditions, lasting, at_least=least_of)
+        changed = np.bincount(whose, weights=changed, minlength=n).astype(np.float64)
+    else:
+        changed, missing = closest_times(conditions[-1], lasting, at_least=least)
     if missing >= CLOSED:
         return None
     plan = without_nothing(replace(plan, durations=np.where(free, changed, times)))

@@ -296,7 +296,8 @@ def _followed(wanted: Array, rate: float, step: float) -> Array:
     return 0.5 * (after + before)
 
 
-TURNS = (1.0, 0.8)  # of the greatest curvature that lasts, with which they turn
+LESS = 0.8  # of the greatest curvature that lasts, with which they turn too
+WIDEST = 0.2  # the same where a lateral acceleration allows no more at full speed
 ALONG = 0.5 * math.pi  # [rad] at the hitch, beyond which a trailer is pulled no more
 
 
@@ -320,12 +321,19 @@ def _turning(
     library: Callable[..., Automaton],
     guess: Callable[[Plan, Array, Array, Step], Guess],
     share: float = 1.0,
+    less: float = LESS,
 ) -> PathGuesses:
-    """Guesses along paths in libraries that turn as tightly as a share of what they may."""
+    """Guesses along paths in libraries that turn as tightly as they may by a share, and less."""
     reverses = pace.reverse_speed > 0.0
     return PathGuesses(
-        [library(share=share * turn, reverses=reverses) for turn in TURNS], pace, guess
+        [library(share=share * turn, reverses=reverses) for turn in (1.0, less)], pace, guess
     )
+
+
+def _less(model: SecondOrderCar | CarWithTrailer, pace: PathLimits) -> float:
+    """The share of the greatest curvature that a lateral acceleration allows at full speed."""
+    share = pace.lateral / pace.speed**2 * model.wheelbase / math.tan(model.max_steering)
+    return min(max(share, WIDEST), LESS)
 
 
 def _library_of_car(model: SecondOrderCar | CarWithTrailer) -> Callable[..., Automaton]:
@@ -338,7 +346,8 @@ def _of_car(model: SecondOrderCar) -> PathGuesses:
     def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
         return car_guess(model, plan, intervals=intervals)
 
-    return _turning(pace_of_car(model), _library_of_car(model), guess)
+    pace = pace_of_car(model)
+    return _turning(pace, _library_of_car(model), guess, less=_less(model, pace))
 
 
 @path_guesses.register
@@ -365,4 +374,5 @@ def _of_trailer(model: CarWithTrailer) -> PathGuesses:
         return trailer_guess(model, plan, hitches, intervals=intervals)
 
     share = min(followed / math.tan(model.max_steering), 1.0)
-    return _turning(pace_of_trailer(model), _library_of_car(model), guess, share)
+    pace = pace_of_trailer(model)
+    return _turning(pace, _library_of_car(model), guess, share, _less(model, pace))

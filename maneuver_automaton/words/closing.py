@@ -9,6 +9,7 @@ the goal is met.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -137,6 +138,27 @@ def closest_times(
         MET,
         EXACT,
     )
+
+
+def times_through(
+    conditions: Sequence[EndConditions], durations: Array, *, at_least: ArrayLike = 0.0
+) -> tuple[Array, float]:
+    """As `closest_times`, for words whose beginnings meet conditions too: each of its twists."""
+    n, now, best, least = len(durations), durations, durations, math.inf
+    for _ in range(STEPS):
+        gaps, columns = zip(
+            *(one.missing(now[: len(one.twists)]) for one in conditions), strict=True
+        )
+        gap = np.concatenate(gaps)
+        worst = float(np.abs(gap).max())
+        if worst < least:
+            best, least = now, worst
+        elif least < MET:
+            break
+        rows = np.vstack([np.pad(one, ((0, 0), (0, n - one.shape[1]))) for one in columns])
+        change = np.linalg.lstsq(rows * (durations > 0.0), gap, rcond=RANK)[0]
+        now = np.where(durations > 0.0, np.maximum(now + change, at_least), 0.0)
+    return best, least
 
 
 def closed_at(

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 import maneuver_automaton as ma
+from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.plan_json import plan_to_dict
+from maneuver_automaton.planning.incumbents import Incumbents
+from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from maneuver_automaton.scenario.writing import to_yaml
 
@@ -98,6 +101,24 @@ def test_a_moved_problem_has_the_moved_plan():
     assert moved.cost == pytest.approx(result.cost, rel=1e-9)
     ends = [by.act(one.pose[:2]).tolist() for one in result.via]
     assert [one.pose[:2].tolist() for one in moved.via] == [pytest.approx(end) for end in ends]
+
+
+@pytest.mark.parametrize("kind", [{}, {"free_heading": True}, {"tolerance_m": 0.1}])
+@pytest.mark.parametrize("lasting", [4e-9, 8e-5, 3e-3])
+def test_no_trim_of_milliseconds_stays_beside_a_pose_on_the_way(kind, lasting):
+    word = [ROBOT.trims[k] for k in (2, 1, 3, 2, 1, 3, 1)]
+    for short in (2, 3):
+        durations = np.array([0.4, 6.0, 0.3, 0.2, 5.0, 0.5, 9.0])
+        durations[short] = lasting
+        given = ma.Plan(START, word, durations=durations)
+        via = ma.Via(given.pose_at(durations[:3].sum()), **kind)
+        problem = ma.Problem(ROBOT, START, given.end, via=via)
+        found = Incumbents(problem, UNLIMITED, Workspace(obstacles=()))
+        assert found.offer(given, 0)
+        best = found.plans[0].plan
+        assert best.durations.min() >= 0.02
+        assert ma.verify(problem, best).passed
+        assert found.cost <= 1.001 * problem.cost_of(given)
 
 
 def test_an_order_that_is_free_is_the_best_of_all():

@@ -65,10 +65,12 @@ def test_what_no_zone_stands_in_the_way_of_is_as_before():
 @pytest.mark.slow
 def test_a_zone_that_admits_nothing_is_gone_around():
     zone = Zone(shape=Box([1.0, 1.0], [3.0, 0.0]), max_speed=0.0)
-    result = plan(posed(ALONG, zone), time_limit=LIMIT)
-    assert result.status is PlanStatus.FOUND, result.reason
-    assert result.audit.passed
-    assert result.cost > 6.0
+    slow = [Zone(shape=Box([1.0, 1.0], at), max_speed=0.5) for at in ([3, 6], [3, -6], ALONG[:2])]
+    for zones in ([zone], [zone, *slow]):  # in the last one it ends
+        result = plan(posed(ALONG, *zones), time_limit=LIMIT)
+        assert result.status is PlanStatus.FOUND, result.reason
+        assert result.audit.passed
+        assert result.cost > 6.0
 
 
 def test_where_reverse_is_not_admitted_the_vehicle_turns_first():

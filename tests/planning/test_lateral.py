@@ -34,8 +34,8 @@ BEYOND = Box([200.0, 400.0], [115.0, 0.0])  # from x = 15 m on
 
 
 def posed(model=CAR, **changes):
-    values = {"search": WORK} | changes
-    return Problem(preset_automaton("parking", model), [0.0, 0.0, 0.0], GOAL, **values)
+    values = {"search": WORK, "goals": GOAL} | changes
+    return Problem(preset_automaton("parking", model), [0.0, 0.0, 0.0], **values)
 
 
 def driven(model, found):
@@ -149,6 +149,32 @@ def test_a_zone_over_the_plane_is_a_limit_of_the_car(limited):
     assert across(CAR, rows).max() <= MOST * (1.0 + 1e-9)
     assert rows[:, 3].min() >= -1e-6
     assert found.cost == pytest.approx(limited.cost, rel=5e-3)
+
+
+@compiled_only
+@pytest.mark.exhaustive
+@pytest.mark.slow
+def test_a_limit_leads_the_same_way_round_as_a_zone():
+    """Backwards in wide turns, past a box: paths that turn as tightly as can be lead elsewhere."""
+    car = SecondOrderCar(
+        wheelbase=2.61,
+        max_steering=0.69,
+        max_speed=5.0,
+        max_acceleration=2.64,
+        max_steering_rate=0.58,
+    )
+    conditions = {
+        "goals": [27.1, -48.4, 2.7],
+        "footprint": Box([4.0, 1.8], [1.4, 0.0]),
+        "obstacles": [Box([5.0, 5.0], [10.5, -20.4])],
+    }
+    zone = Zone(shape=PLANE, max_lateral_acceleration=3.3)
+    limited = plan(
+        posed(replace(car, max_lateral_acceleration=3.3), **conditions), time_limit=200.0
+    )
+    among = plan(posed(car, zones=[zone], **conditions), time_limit=200.0)
+    assert limited.cost == pytest.approx(among.cost, rel=1e-3)
+    assert limited.plan.sample().reduced_state[:, 0].max() <= 1e-6
 
 
 @pytest.mark.exhaustive
