@@ -205,7 +205,8 @@ def _word(one: Pass) -> Word:
         goal = int(np.searchsorted(roots, link[layout.ROOT], side="right"))
         return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)
     end = int(one.search.task.aims.trims[goal])
-    return query.word_of(_with_maneuvers(query, path[::-1] + connection, end), goal)
+    steps = _with_maneuvers(query, path[::-1] + connection, end)
+    return query.word_of(steps, goal, priced=float(arrays.found[0]))
 
 
 def _with_maneuvers(
