@@ -62,7 +62,11 @@ def price_again(
 
     if not lasting.size:
         return 0.0
-    spans = _no_longer(lasting, drive.frames.speed)
+    parts = np.ceil(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
+    parts = np.maximum(parts, 1.0).astype(np.int64)
+    of = np.repeat(np.arange(parts.size), parts)
+    number = np.arange(of.size) - (np.cumsum(parts) - parts)[of]
+    spans = Spans(of, number / parts[of], (number + 1) / parts[of])
     done = 0.0
     for _ in range(MOST_ROUNDS):
         values = rates(spans)
@@ -81,15 +85,6 @@ def price_again(
             np.stack([middle, rest.end], axis=1).ravel(),
         )
     return done + float(fine.sum())
-
-
-def _no_longer(lasting: Array, speeds: Array) -> Spans:
-    """Elements cut to half a second, and to half a metre."""
-    most = np.maximum(lasting, lasting * speeds) / LONGEST
-    parts = np.maximum(np.ceil(most), 1.0).astype(np.int64)
-    of = np.repeat(np.arange(parts.size), parts)
-    number = np.arange(of.size) - (np.cumsum(parts) - parts)[of]
-    return Spans(of, number / parts[of], (number + 1) / parts[of])
 
 
 def _distances(

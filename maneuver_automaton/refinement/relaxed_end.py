@@ -273,7 +273,12 @@ def _admitted(
     against = np.vstack(
         [exact, -exact, rows[room < TIGHT], every[times <= between[0]], -every[times >= between[1]]]
     )
-    return np.asarray(wanted + nnls(against.T, -wanted)[0] @ against) if against.size else wanted
+    if not against.size:
+        return wanted
+    try:
+        return np.asarray(wanted + nnls(against.T, -wanted)[0] @ against)
+    except RuntimeError:  # it found no end: no step is taken
+        return np.zeros(times.size)
 
 
 def _independent(jacobian: Array) -> IntArray:

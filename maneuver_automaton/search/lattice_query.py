@@ -123,12 +123,9 @@ class LatticeQuery:
         """The scene for tests of motions, with a proven clearance [m], by default the usual."""
         return self.around if margin is None else self.around._replace(margin=float(margin))
 
-    def word_of(
-        self, steps: Iterable[tuple[int, int, float]], goal: int, *, priced: float | None = None
-    ) -> Word:
-        """A word of steps in the automaton's numbers, with its cost: `priced` where places cost."""
-        word = word_of_steps(steps, goal=goal, library=self.library.priced)
-        return self.with_places(word, priced=priced)
+    def word_of(self, steps: Iterable[tuple[int, int, float]], goal: int) -> Word:
+        """A word of steps in the automaton's numbers, with its cost."""
+        return self.with_places(word_of_steps(steps, goal=goal, library=self.library.priced))
 
     def least_prices(self, grid: DistanceGrid) -> LeastPrices:
         """What places cost at least in cells of a grid."""
@@ -140,12 +137,10 @@ class LatticeQuery:
             per_metre=float(self.library.per_metre),
         )
 
-    def with_places(self, word: Word, *, priced: float | None = None) -> Word:
-        """The word with what its places cost added to its cost, which is `priced` if known."""
+    def with_places(self, word: Word) -> Word:
+        """The word with what its places cost added to its cost."""
         if not plain(places_cost)(self.around):
             return word
-        if priced is not None:
-            return replace(word, cost=priced)
         trims, edges = self.library.number_of[word.trims], self.edges_along(word)
         lib, durations = self.library.arrays, np.array(word.durations)
         paid = word_place(self.around, lib, np.array(self.start), trims, durations, edges)
