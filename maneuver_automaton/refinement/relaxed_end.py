@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -23,13 +22,8 @@ from maneuver_automaton.words.closing import EndConditions, conjugated
 INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100
 ACCURACY = 1e-12  # of the cost, relative to itself
+PRICED = 250  # prices of places at most: at kinks it goes on to its last iteration for nothing
 ROUGHLY = 1e-8  # the same where places cost something, whose price is not that smooth
-PRICED = 100  # times at which places are priced at most, by either method
-STEADY, GAINING = 10, 1e-6  # steps that have to gain that share of the cost together
-FIRST_STEP = 0.3  # [s] of the time that changes most
-TIGHT = 1e-3  # inequality constraints below this are kept to
-SHORTER, LONGER = 0.25, 4.0  # than the last step
-LEAST_STEP = 1e-5  # [s]
 CLOSING_STEPS = 4
 RANK = 1e-9  # singular values below this, relative, count as none
 
@@ -184,20 +178,17 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
         if budget.is_over:
             raise _Stopped
 
-    costs, tries = task.problem.bound_place_costs, 0
-    places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
+    costs = task.problem.bound_place_costs
+    places, tries = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None, 0
 
     def cost(times: Array) -> tuple[float, Array]:
         nonlocal tries
         tries += 1
-        if places is None:
-            return float(rates @ times) / scale, rates / scale
-        if tries == PRICED:  # of SLSQP alone: the other method counts its steps
+        if places and tries > PRICED:
             raise _Stopped
-        price, slopes = places.at(times)
+        price, slopes = places.at(times) if places else (0.0, 0.0)
         return (float(rates @ times) + price) / scale, (rates + slopes) / scale
 
-    solved = None
     try:
         solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
             cost,
@@ -210,75 +201,11 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
             options={"maxiter": ITERATIONS, "ftol": ROUGHLY if costs else ACCURACY},
         )
     except _Stopped:
-        if not costs:
-            return None
-    if solved is None or (costs and not solved.success):
-        # Where it stopped is chance: a moved problem stops elsewhere.
-        return _descended(task, cost, begin, (least, longest), budget)
+        return None
+    if costs and not solved.success:  # where it stopped is chance: a moved problem stops elsewhere
+        return None
     times = np.clip(np.where(solved.x > NOTHING, solved.x, least), least, longest)
     return _closed(task, times) if np.isfinite(times).all() else None
-
-
-def _descended(
-    task: _Relaxation,
-    cost: Callable[[Array], tuple[float, Array]],
-    times: Array,
-    between: tuple[Array, Array],
-    budget: Budget,
-) -> Array | None:
-    """Times after some steps down the slope of a cost with kinks; None if none made it less.
-
-    Their lengths follow from the last one.
-    Source: Barzilai, Borwein (1988), Two-point step size gradient methods.
-    """
-    value, slopes = cost(times)
-    costs, length = [value], math.inf
-    for _ in range(PRICED):
-        if budget.is_over:
-            return None
-        down = _admitted(task, times, -slopes, between)
-        most = float(np.abs(down).max())
-        length = min(length, FIRST_STEP / most) if len(costs) == 1 and most else length
-        if not most * length > LEAST_STEP:
-            break
-        there = _closed(task, np.clip(times + length * down, *between))
-        length *= SHORTER
-        if there is None:
-            continue
-        other, others = cost(there)
-        if not other < value:
-            continue
-        moved, bent = there - times, float((there - times) @ (others - slopes))
-        suits = float(moved @ moved) / bent if bent > 0.0 else math.inf
-        length = min(max(suits, length), LONGER / SHORTER * length)
-        times, value, slopes = there, other, others
-        costs.append(value)
-        if len(costs) > STEADY and costs[-1 - STEADY] - value < GAINING * abs(value):
-            break
-    return times if len(costs) > 1 else None
-
-
-def _admitted(
-    task: _Relaxation, times: Array, wanted: Array, between: tuple[Array, Array]
-) -> Array:
-    """The change of times nearest to one that is `wanted`, within what the conditions admit.
-
-    It is what is left of that once the gradients of the conditions are taken off, as much of each
-    as it goes against them. Source: Lawson, Hanson (1974), Solving Least Squares Problems, Ch. 23.
-    """
-    from scipy.optimize import nnls
-
-    exact, (room, rows) = task.exact(times)[1], task.room(times)
-    every = np.eye(times.size)
-    against = np.vstack(
-        [exact, -exact, rows[room < TIGHT], every[times <= between[0]], -every[times >= between[1]]]
-    )
-    if not against.size:
-        return wanted
-    try:
-        return np.asarray(wanted + nnls(against.T, -wanted)[0] @ against)
-    except RuntimeError:  # it found no end: no step is taken
-        return np.zeros(times.size)
 
 
 def _independent(jacobian: Array) -> IntArray:
