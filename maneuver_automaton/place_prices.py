@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.groups import group_of
+from maneuver_automaton.groups.se2 import after, displacements
 from maneuver_automaton.models import Model
 from maneuver_automaton.places import (
     PlaceCost,
@@ -73,25 +73,28 @@ def price_along(cost: PlaceCost, plan: Plan, model: Model, *, beside: float) -> 
     """
     motion = _Motion(cost, plan, model)
     todo, done, doubt, refused = _first_stretches(plan, scale_of(cost)), 0.0, 0.0, None
+    rates, new = np.empty((len(todo.piece), len(NODES))), slice(None)
     for _ in range(ROUNDS):
         if not len(todo.piece):
             break
         spans = todo.end - todo.begin
-        rates, good = motion.at(todo.piece[:, None], todo.begin[:, None] + spans[:, None] * NODES)
+        since = todo.begin[:, None] + spans[:, None] * NODES[new]
+        rates[:, new], good = motion.at(todo.piece[:, None], since)
         if refused is None and not good.all():
             row, node = np.argwhere(~good)[0]
-            since = float(todo.begin[row] + spans[row] * NODES[node])
-            refused = float(plan.switching_times[todo.piece[row]]) + since
+            refused = float(plan.switching_times[todo.piece[row]] + since[row, node])
         fine = spans * (rates @ FINE)
         off = np.abs(fine - spans * (rates @ COARSE))
-        whole = beside + done + float(fine.sum())
-        if doubt + off.sum() <= SHARE * whole or len(off) > MOST_INTERVALS:
+        most = SHARE * (beside + done + float(fine.sum()))
+        if doubt + off.sum() <= most or len(off) > MOST_INTERVALS:
             done, doubt = done + float(fine.sum()), doubt + float(off.sum())
             break
-        split = off > 0.25 * SHARE * whole / len(off)
+        split = off > 0.25 * most / len(off)
         done += float(fine[~split].sum())
         doubt += float(off[~split].sum())
-        todo = todo.halved(split)
+        todo, whole = todo.halved(split), rates[split]
+        rates, new = np.empty((len(todo.piece), len(NODES))), slice(1, None, 2)
+        rates[::2, ::2], rates[1::2, ::2] = whole[:, :3], whole[:, 2:]  # every other node is known
     else:
         doubt += float(off[split].sum())
         done += float(fine[split].sum())
@@ -160,7 +163,6 @@ class _Motion:
 
     def __init__(self, cost: PlaceCost, plan: Plan, model: Model) -> None:
         self.cost, self.plan, self.model = cost, plan, model
-        self.group = group_of(plan.start.size)
         self.begins = plan.switching_poses
         self.linked = [k for k, one in enumerate(plan.primitives) if not isinstance(one, Trim)]
         dof, n_z = plan.start.size, len(model.reduced_names)
@@ -194,17 +196,17 @@ class _Motion:
         """Factors (...,) of rates to be rates per second."""
         if self.cost.per == "second":
             return np.ones(twists.shape[:-1])
-        return np.asarray(np.sqrt((np.delete(twists, 2, axis=-1) ** 2).sum(axis=-1)))
+        return _speeds(twists)
 
     def steps(self, piece: IntArray, since: Array) -> tuple[Array, Array, Array]:
         """Poses, twists and reduced states (n, ...) in pieces (n,) at times (n,) [s] in each."""
         twists, states = self.twists[piece], self.states[piece]
-        steps = np.array(self.group.exp(since[:, None] * twists).pose)
+        steps = displacements(twists, since)
         for k in self.linked:
             here = np.flatnonzero(piece == k)
             if here.size:
                 steps[here], twists[here], states[here] = self._along(k, since[here])
-        return (self.group(self.begins[piece]) @ self.group(steps)).pose, twists, states
+        return after(self.begins[piece], steps), twists, states
 
     def _along(self, k: int, since: Array) -> tuple[Array, Array, Array]:
         """Motion since a maneuver began, twists and reduced states, at times (n,) [s]."""
@@ -232,6 +234,12 @@ class _Motion:
         return bool(way > DENSE * scale_of(self.cost) or steps[:, 2].max(initial=0.0) > DENSE)
 
 
+def _speeds(twists: Array) -> Array:
+    """Speeds (...,) of velocities (..., dof), whatever they turn by."""
+    planar = twists[..., 0] ** 2 + twists[..., 1] ** 2
+    return np.asarray(np.sqrt(planar + (twists[..., 3:] ** 2).sum(axis=-1)))
+
+
 def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     """Stretches of a plan that are not longer than a scale [m], and do not turn far."""
     count, lasting = len(plan.primitives), plan.primitive_durations
@@ -247,8 +255,8 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
     begin = np.concatenate([np.zeros(len(coasts)), *(edges[:-1] for _, edges, _ in linked)])
     end = np.concatenate([lasting[coasts], *(edges[1:] for _, edges, _ in linked)])
     ways = np.abs(np.concatenate([steps[coasts], *(ways for _, _, ways in linked)]))
-    way = np.sqrt((np.delete(ways, 2, axis=1) ** 2).sum(axis=1))
-    parts = np.maximum(np.ceil(np.maximum(way / scale, ways[:, 2] / TURN)), 1.0).astype(np.int64)
+    most = np.maximum(_speeds(ways) / scale, ways[:, 2] / TURN)
+    parts = np.maximum(np.ceil(most), 1.0).astype(np.int64)
     row = np.repeat(np.arange(len(parts)), parts)
     number = np.arange(len(row)) - np.repeat(np.cumsum(parts) - parts, parts)
     length = ((end - begin) / parts)[row]

@@ -562,15 +562,13 @@ class Problem:
         >>> [round(one.price, 2) for one in problem.place_prices_of(plan)]
         [6.0]
         """
-        beside = self.invariant_cost_of(plan)
-        return kept_with(
-            plan,
-            self.bound_place_costs,
-            lambda: tuple(
-                price_along(cost, plan, self.automaton.model, beside=beside)
-                for cost in self.bound_place_costs
-            ),
-        )
+
+        def prices() -> tuple[PlacePrice, ...]:
+            model, beside = self.automaton.model, self.invariant_cost_of(plan)
+            costs = self.bound_place_costs
+            return tuple(price_along(cost, plan, model, beside=beside) for cost in costs)
+
+        return kept_with(plan, self.bound_place_costs, prices)
 
     @property
     def bound_place_costs(self) -> tuple[PlaceCost, ...]:

@@ -91,32 +91,52 @@ def turns_about(outline: Outline, edge: int, point: complex) -> int:
     return turns + int(radius > 0.0 and abs(point - a) <= radius)
 
 
+@inner_kernel
+def place_along(series: Array, element: int, share: float) -> tuple[complex, float, float]:
+    """Place, heading and altitude of a frame whose pose is a Legendre series (e, n, dof)."""
+    at = 2.0 * share - 1.0
+    x, y, heading, z = 0.0, 0.0, 0.0, 0.0
+    last, term = 0.0, 1.0
+    for k in range(series.shape[1]):
+        x += term * series[element, k, 0]
+        y += term * series[element, k, 1]
+        heading += term * series[element, k, 2]
+        if series.shape[2] > 3:
+            z += term * series[element, k, 3]
+        last, term = term, ((2 * k + 1) * at * term - k * last) / (k + 1)
+    return complex(x, y), heading, z
+
+
 @kernel
 def distances(
     body: BodyOutline,
-    poses: Array,
-    altitudes: Array,
+    series: Array,
+    elements: IntArray,
+    shares: Array,
+    offset: complex,
+    levels: tuple[float, float],
     edges: Outline,
     heights: Array,
     index: EdgeBoxes,
     within: float,
 ) -> Array:
-    """Distances (m,) [m] of a body at poses (m, 3) to edges, or `within` [m] if they are more.
+    """Distances (m,) [m] of a body to edges, or `within` [m] if they are more.
 
-    Only edges count that are no higher and no lower than the body reaches there, `altitudes` (2,
-    m), as their `heights` (n, 2) say.
+    Its frame is at shares of elements of a `series`, seen from an `offset` to the origin of the
+    edges. Only those count that are no higher and no lower than the body reaches there, `levels`
+    about its altitude, as their `heights` (n, 2) say.
     """
     found = np.empty(index.number.size, dtype=np.int64)
-    apart = np.empty(len(poses))
+    apart = np.empty(len(shares))
     own = body.edges
-    for k in range(len(poses)):
-        place = complex(poses[k, 0], poses[k, 1])
-        turn = complex(math.cos(poses[k, 2]), math.sin(poses[k, 2]))
+    for k in range(len(shares)):
+        place, heading, z = place_along(series, elements[k], shares[k])
+        place, turn = place + offset, complex(math.cos(heading), math.sin(heading))
         middle, least = place + turn * body.middle, within
         x, y, reach = middle.real, middle.imag, body.size + within
         for n in range(meeting(index, x - reach, y - reach, x + reach, y + reach, found)):
             edge = found[n]
-            if heights[edge, 0] > altitudes[1, k] or heights[edge, 1] < altitudes[0, k]:
+            if heights[edge, 0] > z + levels[1] or heights[edge, 1] < z + levels[0]:
                 continue
             a, b, radius = edges.begins[edge], edges.ends[edge], edges.radius[edge]
             if math.sqrt(point_apart(middle, a, b)) - radius - body.size >= least:

@@ -18,6 +18,7 @@ from maneuver_automaton.audit._kernels_edges import (
     crosses,
     meeting,
     path_apart,
+    place_along,
     point_apart,
     turns_about,
 )
@@ -69,15 +70,8 @@ class _Bounds(NamedTuple):
 @inner_kernel
 def _place(ways: Ways, element: int, share: float) -> tuple[complex, complex]:
     """Where the body's frame is, and its direction."""
-    at = 2.0 * share - 1.0
-    x, y, heading = 0.0, 0.0, 0.0
-    last, term = 0.0, 1.0
-    for k in range(ways.series.shape[1]):
-        x += term * ways.series[element, k, 0]
-        y += term * ways.series[element, k, 1]
-        heading += term * ways.series[element, k, 2]
-        last, term = term, ((2 * k + 1) * at * term - k * last) / (k + 1)
-    return complex(x, y) + ways.offset, complex(math.cos(heading), math.sin(heading))
+    place, heading, _ = place_along(ways.series, element, share)
+    return place + ways.offset, complex(math.cos(heading), math.sin(heading))
 
 
 @inner_kernel

@@ -16,7 +16,7 @@ from maneuver_automaton.audit.passages import AuditedBody
 from maneuver_automaton.places import Clearance, PlaceCost
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
-CLOSE = 1e-4  # of that cost: stretches are halved until what is still open is less
+CLOSE = 2e-4  # of that cost: stretches are halved until what is still open is less
 LONGEST = 0.5  # [s], [m] of a stretch, before any is halved
 MOST_ROUNDS = 22
 # Lobatto's rule with four points, and Kronrod's seven that contain them: ends count, so that no
@@ -44,24 +44,29 @@ def price_again(
     lasting = np.diff(drive.frames.times)
 
     def rates(spans: Spans) -> Array:
-        shares = spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES
-        at, shape = (np.repeat(spans.element, SHARES.size), shares.ravel()), shares.shape
-        twists = drive.twists_at(*at).reshape(*shape, offset.size)
+        shares = (spans.begin[:, None] + (spans.end - spans.begin)[:, None] * SHARES).ravel()
+        element = np.repeat(spans.element, SHARES.size)
         if isinstance(cost, Clearance):
-            apart = [_distances(one, around, *at, cost.within) for one in bodies]
-            near = 1.0 - np.minimum.reduce(apart).reshape(shape) / cost.within
-            found = np.asarray(cost.weight * near * near)
+            apart = [_distances(one, around, element, shares, cost.within) for one in bodies]
+            near = 1.0 - np.minimum.reduce(apart) / cost.within
+            found, paid = np.asarray(cost.weight * near * near), np.flatnonzero(near)
         else:
-            poses = (drive.frames.at(*at) + offset).reshape(twists.shape)
-            found = np.array(cost.rates(poses, twists), dtype=np.float64)
+            found, paid = np.empty(shares.size), np.arange(shares.size)
+        twists = drive.twists_at(element[paid], shares[paid])
+        if not isinstance(cost, Clearance):
+            found[:] = cost.rates(drive.frames.at(element, shares) + offset, twists)
         if cost.per == "metre":
-            found *= np.sqrt((np.delete(twists, 2, axis=2) ** 2).sum(axis=2))
-        return found
+            planar = twists[:, 0] ** 2 + twists[:, 1] ** 2
+            found[paid] *= np.sqrt(planar + (twists[:, 3:] ** 2).sum(axis=1))
+        return found.reshape(-1, SHARES.size)
 
-    spans, _ = drive.between_samples()
-    if not len(spans.element):
+    if not lasting.size:
         return 0.0
-    spans = _no_longer(spans, lasting, drive.frames.speed)
+    parts = np.ceil(np.maximum(lasting, lasting * drive.frames.speed) / LONGEST)
+    parts = np.maximum(parts, 1.0).astype(np.int64)
+    of = np.repeat(np.arange(parts.size), parts)
+    number = np.arange(of.size) - (np.cumsum(parts) - parts)[of]
+    spans = Spans(of, number / parts[of], (number + 1) / parts[of])
     done = 0.0
     for _ in range(MOST_ROUNDS):
         values = rates(spans)
@@ -82,28 +87,15 @@ def price_again(
     return done + float(fine.sum())
 
 
-def _no_longer(spans: Spans, lasting: Array, speeds: Array) -> Spans:
-    """The stretches cut to half a second, and to half a metre."""
-    seconds = (spans.end - spans.begin) * lasting[spans.element]
-    most = np.maximum(seconds, seconds * speeds[spans.element]) / LONGEST
-    parts = np.maximum(np.ceil(most), 1.0).astype(np.int64)
-    of = np.repeat(np.arange(parts.size), parts)
-    number = np.arange(of.size) - (np.cumsum(parts) - parts)[of]
-    step = ((spans.end - spans.begin) / parts)[of]
-    begin = spans.begin[of] + number * step
-    return Spans(spans.element[of], begin, begin + step)
-
-
 def _distances(
     body: AuditedBody, around: Surroundings, elements: IntArray, shares: Array, within: float
 ) -> Array:
     """Distances (n,) [m] of a body at shares of elements to what stands still, or `within`."""
-    poses = body.frames.at(elements, shares)
     low, high = body.height
-    reach = np.add.outer([low, high], poses[:, 3:].sum(axis=1) + body.base)
+    levels = low + body.base, high + body.base
     if not body.in_space and low == high == 0.0:
-        reach[0], reach[1] = -math.inf, math.inf
-    seen = poses[:, :3] + [body.offset.real, body.offset.imag, 0.0]
-    return distances(
-        body.outline, seen, reach, around.outline, around.heights, around.index, within
-    )
+        levels = -math.inf, math.inf
+    moves = body.frames.series, elements, shares, body.offset
+    edges = around.outline, around.heights, around.index
+    found: Array = distances(body.outline, *moves, levels, *edges, within)
+    return found

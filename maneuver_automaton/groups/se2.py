@@ -222,7 +222,7 @@ def coasted(start: Array, twists: Array, durations: Array) -> Array:
     few trims, which takes a tenth of the time that arrays take.
     """
     if len(durations) > FEW:
-        return chained(start, _steps(twists, durations))
+        return chained(start, displacements(twists, durations))
     pose: list[float] = start.tolist()
     poses = [pose]
     for twist, duration in zip(twists.tolist(), durations.tolist(), strict=True):
@@ -231,7 +231,7 @@ def coasted(start: Array, twists: Array, durations: Array) -> Array:
     return np.array(poses)
 
 
-def _steps(twists: Array, durations: Array) -> Array:
+def displacements(twists: Array, durations: Array) -> Array:
     """Displacements (n, dof) of trims, ``exp(durations * twists)`` to the last bit."""
     steps = durations[:, None] * twists
     turn = np.pi * (steps[:, 2] / np.pi)
@@ -243,6 +243,13 @@ def _steps(twists: Array, durations: Array) -> Array:
     x, y = ahead * steps[:, 0] - aside * steps[:, 1], aside * steps[:, 0] + ahead * steps[:, 1]
     steps[:, 0], steps[:, 1] = x, y
     return steps
+
+
+def after(poses: Array, steps: Array) -> Array:
+    """Poses (n, dof) after steps (n, dof), each in the frame of one of `poses` (n, dof)."""
+    found = poses + steps
+    found[:, :2] = poses[:, :2] + _turned(poses[:, 2], steps[:, :2])
+    return found
 
 
 def end_of_coasting(start: Array, twists: Iterable[Array], durations: Iterable[float]) -> Array:

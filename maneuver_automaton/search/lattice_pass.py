@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from maneuver_automaton._arrays import wrapped
+from maneuver_automaton._compile import plain
 from maneuver_automaton._kept import Prepared, kept_with
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.search import _kernels_lattice as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
+from maneuver_automaton.search._kernels_place import places_cost
 from maneuver_automaton.search.arrays import (
     CostTable,
     DistanceGrid,
@@ -27,7 +29,7 @@ from maneuver_automaton.search.lattice_library import LatticeLibrary, coasts_of
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import SAMPLED_HEADINGS, Resolution, task_of
 from maneuver_automaton.words.library import NO_TRIM, SWITCH, LibraryArrays, scratch_of
-from maneuver_automaton.words.word import Word, plan_of, with_price
+from maneuver_automaton.words.word import Word, plan_of, with_price, word_of_steps
 
 SMALLEST = 2048  # nodes
 MOST_SPARE = 4  # searches of one library whose arrays are kept
@@ -205,7 +207,10 @@ def _word(one: Pass) -> Word:
         goal = int(np.searchsorted(roots, link[layout.ROOT], side="right"))
         return query.word_of(_with_maneuvers(query, connection + path, NO_TRIM), goal)
     end = int(one.search.task.aims.trims[goal])
-    return query.word_of(_with_maneuvers(query, path[::-1] + connection, end), goal)
+    steps = _with_maneuvers(query, path[::-1] + connection, end)
+    word = word_of_steps(steps, goal=goal, library=query.library.priced)
+    priced = plain(places_cost)(query.around)  # the search has paid for the places of all of it
+    return replace(word, cost=float(arrays.found[0])) if priced else word
 
 
 def _with_maneuvers(

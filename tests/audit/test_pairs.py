@@ -132,9 +132,9 @@ def test_distances_to_edges_are_those_of_shapely(seed):
     obstacles, within = random_scene(rng), float(rng.uniform(0.5, 3.0))
     poses = np.array([random_pose(rng) for _ in range(40)])
     around = outlines.surroundings_around(obstacles, (0.0, 0.0))
-    reach = np.multiply.outer([-math.inf, math.inf], np.ones(len(poses)))
-    edges = around.outline, around.heights, around.index
-    found = distances(outlines.body_outline(body), poses, reach, *edges, within)
+    still = poses[:, None], np.arange(len(poses)), np.zeros(len(poses)), 0j
+    edges = (-math.inf, math.inf), around.outline, around.heights, around.index
+    found = distances(outlines.body_outline(body), *still, *edges, within)
     for pose, one in zip(poses, found, strict=True):
         slow = slow_distance(body, obstacles, pose)
         if slow > 0.0:  # inside an obstacle, edges may be far
