@@ -107,7 +107,11 @@ class KernelCache:
         try:
             notes: dict[str, Any] = {"shares": [], "stated": None}
             notes |= {name: getattr(compiled.library, name, it) for name, it in notes.items()}
-            write_checked(path, dumps((signature, notes, compiled._reduce())))
+            *payload, environments = compiled._reduce()
+            # Only constants are read from the environment of a function that is linked in, and to
+            # load one imports the function's module: of numba's own, some bring all of SciPy.
+            read = tuple(one for one in environments if one.consts)
+            write_checked(path, dumps((signature, notes, (*payload, read))))
         except OSError as error:
             why = error.strerror or error
             say_once("not kept", f"{self.folder}: compiled kernels cannot be kept here: {why}")
