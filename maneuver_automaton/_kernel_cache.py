@@ -108,8 +108,8 @@ class KernelCache:
             notes: dict[str, Any] = {"shares": [], "stated": None}
             notes |= {name: getattr(compiled.library, name, it) for name, it in notes.items()}
             *payload, environments = compiled._reduce()
-            # Only constants are read from the environment of a function that is linked in, and to
-            # load one imports the function's module: of numba's own, some bring all of SciPy.
+            # To load an environment imports its module, of numba's own some with all of SciPy; only
+            # its constants are read.
             read = tuple(one for one in environments if one.consts)
             write_checked(path, dumps((signature, notes, (*payload, read))))
         except OSError as error:

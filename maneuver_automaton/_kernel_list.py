@@ -102,10 +102,8 @@ def later_uses(name: str) -> frozenset[str]:
 def compiled_with(name: str) -> list[str]:
     """The kernels to compile where one is missing: of uses asked for, or all of an installation."""
     uses = later_uses(name)
-    if not uses:
-        return [one for one in _rows() if not later_uses(one)]
     wanted = _asked if uses & _asked else _asked | uses
-    return [one for one in _rows() if later_uses(one) & wanted]
+    return [one for one in _rows() if (later_uses(one) & wanted if uses else not later_uses(one))]
 
 
 @functools.cache
