@@ -82,11 +82,10 @@ class Turns:
         """Plans in an order, past those that are held; who fails goes before those it hits.
 
         Where the time is short, plans are taken as they are found, and who fails is not searched
-        for thoroughly first: the others hardly take longer to be planned again. Who fails once more
-        comes last: such a search takes as long as the plans of twenty others.
+        for thoroughly first: the others hardly take longer to be planned again.
         """
         held, waiting, evicted = dict(held), list(order), 0
-        failed, last = set[int](), set[int]()
+        failed: set[int] = set()
         hurried = False
         while waiting and not self.budget.is_over:
             k = waiting.pop(0)
@@ -95,10 +94,6 @@ class Turns:
             found = self.past(k, held, to_come, hurried=hurried)
             may_evict = evicted < MOST_EVICTED and k not in failed
             hurried = hurried or (found is None and is_short(self.budget, AS_LONG + len(waiting)))
-            if found is None and hurried and not may_evict and waiting and k not in last:
-                last.add(k)
-                waiting.append(k)
-                continue
             if found is None and not (hurried and may_evict):
                 found = self.past(k, held, self.without_plan(held, {k, *waiting}), most=LONG)
             if found is None and may_evict:
@@ -107,7 +102,7 @@ class Turns:
                 for other in out:
                     del held[other]
                 waiting = [*out, *waiting]
-                evicted += 1
+                evicted += len(out)
             if found is not None:
                 held[k] = found
         return held
