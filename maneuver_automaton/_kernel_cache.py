@@ -107,7 +107,11 @@ class KernelCache:
         try:
             notes: dict[str, Any] = {"shares": [], "stated": None}
             notes |= {name: getattr(compiled.library, name, it) for name, it in notes.items()}
-            write_checked(path, dumps((signature, notes, compiled._reduce())))
+            *payload, environments = compiled._reduce()
+            # To load an environment imports its module, of numba's own some with all of SciPy; only
+            # its constants are read.
+            read = tuple(one for one in environments if one.consts)
+            write_checked(path, dumps((signature, notes, (*payload, read))))
         except OSError as error:
             why = error.strerror or error
             say_once("not kept", f"{self.folder}: compiled kernels cannot be kept here: {why}")

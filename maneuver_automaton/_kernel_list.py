@@ -41,6 +41,8 @@ USES = {  # modules of kernels, by what calls them
         "search._kernels_lattice",
         "search._kernels_nodes",
         "search._kernels_waiting",
+        "words._kernels_candidates",
+        "words._kernels_closing",
         "words._kernels_solve",
         "words._kernels_steering",
     ),
@@ -64,14 +66,17 @@ USES = {  # modules of kernels, by what calls them
         "roads._kernels_polish",
     ),
 }
-# What an installation leaves to its first use: the first plan of no scenario here needs any of it.
-LATER = ("state lattice", "timed lattice", "fail-safe", "unconstrained loop", "cells", "roads")
+NOW = ("times", "lattice", "improvement")  # what an installation compiles: plans among obstacles
+LATER = tuple(use for use in USES if use not in NOW)  # what it leaves to its first use
 
 Stated = Any  # a type as the list has it
+
+_asked: set[str] = set()  # uses that kernels were loaded for: those that lack are compiled at once
 
 
 def load_kernels(*uses: str) -> None:
     """Have the kernels for some uses of `USES` loaded, or compiled, before a clock runs."""
+    _asked.update(uses)
     for use in uses:
         for module in USES[use]:
             _load(f"{__package__}.{module}")
@@ -95,9 +100,10 @@ def later_uses(name: str) -> frozenset[str]:
 
 
 def compiled_with(name: str) -> list[str]:
-    """The kernels to compile where one is missing: of the same uses, or all of an installation."""
+    """The kernels to compile where one is missing: of uses asked for, or all of an installation."""
     uses = later_uses(name)
-    return [one for one in _rows() if later_uses(one) == uses or later_uses(one) & uses]
+    wanted = _asked if uses & _asked else _asked | uses
+    return [one for one in _rows() if (later_uses(one) & wanted if uses else not later_uses(one))]
 
 
 @functools.cache

@@ -11,7 +11,7 @@ import numba
 import pytest
 
 import maneuver_automaton
-from maneuver_automaton import _compile_all, _kernel_cache
+from maneuver_automaton import _compile_all, _kernel_cache, _kernel_list
 from maneuver_automaton._kernel_cache import KernelCache
 from maneuver_automaton._kernel_list import (
     LATER,
@@ -43,7 +43,8 @@ def test_every_kernel_is_listed():
         assert kernel_named(name).__name__ == name.rsplit(".", 1)[1]
 
 
-def test_a_missing_kernel_is_compiled_with_those_of_its_uses():
+def test_a_missing_kernel_is_compiled_with_those_of_its_uses(monkeypatch):
+    monkeypatch.setattr(_kernel_list, "_asked", set())
     names = kernel_names()
     assert {one for modules in USES.values() for one in modules} <= set(map(module_of, names))
     assert {use for name in names for use in later_uses(name)} == set(LATER)
@@ -57,6 +58,10 @@ def test_a_missing_kernel_is_compiled_with_those_of_its_uses():
             assert not set(together).intersection(installed)
     (road,) = {tuple(compiled_with(name)) for name in names if module_of(name).startswith("roads.")}
     assert {module_of(name) for name in road} == set(USES["roads"])
+    monkeypatch.setattr(_kernel_list, "_asked", {"lattice", "separation", "insertion"})
+    (boxes,) = (name for name in names if module_of(name) == "bounds._kernels_boxes")
+    together = {module_of(name) for name in compiled_with(boxes)}
+    assert together == {*USES["separation"], *USES["insertion"]}  # and not those of cells
 
 
 def test_the_list_is_written_as_it_was_read(tmp_path, monkeypatch):

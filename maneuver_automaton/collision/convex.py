@@ -54,7 +54,8 @@ def pieces_seen_from(shapes: list[Shape], frame: Array) -> list[tuple[Array, flo
             pieces += convex_pieces(Polygon(seen_from(one.corners, frame), holes))
     pieces += _box_pieces([shape for shape in shapes if isinstance(shape, Box)], frame)
     discs = [shape for shape in shapes if isinstance(shape, Disc)]
-    return pieces + [(seen_from(disc.center[None], frame), disc.radius) for disc in discs]
+    centers = seen_from(np.array([disc.center for disc in discs]).reshape(-1, 1, 2), frame)
+    return pieces + [(one, disc.radius) for one, disc in zip(centers, discs, strict=True)]
 
 
 def seen_from(points: Array, frame: Array) -> Array:

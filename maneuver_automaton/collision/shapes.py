@@ -412,7 +412,7 @@ def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
     """
     if isinstance(value, Obstacle | OccupancyMap):
         return (value,)
-    if type(value) is tuple and all(isinstance(one, Obstacle | OccupancyMap) for one in value):
+    if type(value) is tuple and {Obstacle, OccupancyMap}.issuperset(map(type, value)):
         return value
     is_sequence = isinstance(value, np.ndarray | Sequence) and not isinstance(value, str)
     if is_sequence and not are_points(value):

@@ -112,12 +112,12 @@ def identities(automaton: Automaton) -> Transitions:
 
 def _firsts(n: int, sources: IntArray, targets: IntArray, prices: Array) -> IntArray:
     """First maneuver (n, n) of the cheapest chain from class to class; -1 for none."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import dijkstra
-
     best = np.full((n, n), -1)
     if not prices.size:
         return best
+    from scipy.sparse import csr_array  # takes longer than a plan without maneuvers
+    from scipy.sparse.csgraph import dijkstra
+
     weights = prices + HOP * max(float(prices.max()), 1.0)
     leads = np.flatnonzero(sources != targets)
     # Between two classes the cheapest maneuver, the first of equals.
