@@ -220,6 +220,8 @@ class Situation:
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
+        if pad is not None and not self.settings.at_will:
+            pad = here.last_trim(here.goals[index])  # in the state in which the plan has ended
         total = here.horizon.time
         plan = Plan(here.start, (), durations=[], start_time=here.start_time)
         if self.rest is not None and self.rest.trims and not moves_on(self.rest):

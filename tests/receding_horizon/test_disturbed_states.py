@@ -135,6 +135,14 @@ def test_arrives_though_disturbed_in_every_step() -> None:
     assert loop.reached, loop.reason
 
 
+def test_it_rests_in_the_state_in_which_it_arrives() -> None:
+    library = ma.load_stock_library("car_with_trailer")
+    near = ma.Problem(library, [0.0, 0.0, 0.0], ma.Goal([3.2, 0.0, 0.0], tolerance_m=0.5))
+    first = ma.Plan(near.start, (library["speed 3, hitch 0"],), durations=[1.0])
+    loop = simulate(near, step=1.0, steps=2, first=first, stay=True)
+    assert [one.trims[-1].name for one in loop.driven] == ["speed 3, hitch 0", "speed 0, hitch 0"]
+
+
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_step_takes_the_measured_state() -> None:
