@@ -250,7 +250,8 @@ def _first_stretches(plan: Plan, scale: float) -> _Intervals:
             steps[k] = one.body_velocity * lasting[k]
         elif lasting[k] > 0.0:
             linked.append((k, *_between_controls(one)))
-    coasts = np.flatnonzero([isinstance(one, Trim) for one in plan.primitives] & (lasting > 0.0))
+    is_trim = np.array([isinstance(one, Trim) for one in plan.primitives], dtype=bool)
+    coasts = np.flatnonzero(is_trim & (lasting > 0.0))
     piece = np.concatenate([coasts, *(np.full(len(ways), k) for k, _, ways in linked)])
     begin = np.concatenate([np.zeros(len(coasts)), *(edges[:-1] for _, edges, _ in linked)])
     end = np.concatenate([lasting[coasts], *(edges[1:] for _, edges, _ in linked)])

@@ -99,6 +99,7 @@ def test_a_clearance_is_what_shapely_measures():
     assert found.price > 1.0
     assert found.error <= 1e-3 * whole
     assert whole == pytest.approx(problem().cost_of(one) + found.price)
+    assert problem(cost).cost_of(Plan([0, 0, 0], (), durations=[])) == 0.0
 
 
 def test_ground_costs_the_way_on_it():

@@ -39,6 +39,7 @@ ITERATIONS = 40  # of Picard; an element that needs more is cut
 SWEEPS = 8  # until each element begins where the one before it ends
 SAME = 1e-14  # relative, two states that are the same but for rounding
 FOLLOWED = 1e-9  # relative: a vehicle whose deviations grow is followed to that far from the plan
+EXPLODED = 1e9  # off the guess: no motion is followed there
 NUDGE = 1e-6  # [model's units] for a derivative
 
 
@@ -386,8 +387,9 @@ def _carried_on(
     """Where elements begin once the jumps are carried forward, and where that starts anew."""
     new = begins.copy()
     restarted = np.zeros(len(jumps), dtype=np.bool_)
+    most = np.where(followed > 0.0, followed, EXPLODED)
     for k, jump in enumerate(jumps):
         new[k + 1] += jump + flow[k] @ (new[k] - begins[k])
-        if 0.0 < followed[k + 1] < np.abs(new[k + 1] - guess[k + 1]).max():
+        if not np.abs(new[k + 1] - guess[k + 1]).max() <= most[k + 1]:
             new[k + 1], restarted[k] = guess[k + 1], True
     return new, restarted

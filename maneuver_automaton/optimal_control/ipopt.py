@@ -10,7 +10,7 @@ import contextlib
 import enum
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -83,24 +83,6 @@ def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
     if settings.max_seconds is not None:
         options["ipopt.max_wall_time"] = settings.max_seconds
     return options
-
-
-def fatrop_options(settings: SolverSettings, equality: Sequence[bool]) -> dict[str, Any]:
-    """Options of fatrop, for rows in the order of stages of which some must be zero.
-
-    What must be equal is written as a row that is zero: with bounds other than zero CasADi finds
-    another structure than there is (casadi 3911).
-    """
-    return {
-        "print_time": False,
-        "error_on_fail": False,
-        "structure_detection": "auto",
-        "equality": list(equality),
-        "fatrop.print_level": 0,
-        "fatrop.mu_init": MU_INIT,
-        "fatrop.tol": settings.tolerance,
-        "fatrop.max_iter": settings.max_iterations,
-    }
 
 
 @functools.cache

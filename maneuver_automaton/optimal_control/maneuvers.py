@@ -6,11 +6,9 @@ states of the vehicle alone, and what the ends are is a matter of bounds and par
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +21,6 @@ from maneuver_automaton.optimal_control.ipopt import (
     STATUS,
     SolverSettings,
     SolveStatus,
-    fatrop_options,
     ipopt_options,
     load_casadi,
     numpy_on_symbols,
@@ -37,7 +34,6 @@ from maneuver_automaton.optimal_control.problem import (
 from maneuver_automaton.optimal_control.transcription import transcribe
 
 WITHIN_GRIP = 1e-3  # share of the squared lateral acceleration that is kept between nodes
-RELAXED = 1e-8  # by which fatrop relaxes bounds, as IPOPT does by default
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
 
 
@@ -104,15 +100,14 @@ class TransferProgram:
 
     Each interval is a stage, whose state is the reduced state, the duration and the input before;
     its other variables are the reduced states inside it, then its input. So no row knows more than
-    one stage and the state of the next, as fatrop wants it; IPOPT takes the same program where
-    fatrop does not come to an end.
+    one stage and the state of the next.
     """
 
     model: Model
     objective: ManeuverObjective
     settings: TransferSettings
     equality: tuple[bool, ...]  # of each row
-    solvers: tuple[Callable[[], Any], ...]  # in turn; each is built when it is first asked for
+    solver: Any  # of IPOPT
     build_s: float
 
     @property
@@ -222,24 +217,13 @@ def transfer_program(
     x = casadi.vertcat(*(part for stage in stages for part in stage), begins[-1])
     functions = {"x": x, "f": cost, "g": casadi.vertcat(*g), "p": ends}
 
-    @functools.cache
-    def quick() -> Any:
-        options = fatrop_options(settings.solver, equality)
-        return casadi.nlpsol("transfer", "fatrop", functions, options)
-
-    @functools.cache
-    def sure() -> Any:
-        return casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
-
-    is_quick = settings.solver.max_seconds is None and casadi.has_nlpsol("fatrop")
-    solvers = (quick, sure) if is_quick else (sure,)
-    solvers[0]()
+    solver = casadi.nlpsol("transfer", "ipopt", functions, ipopt_options(settings.solver))
     return TransferProgram(
         model=model,
         objective=objective,
         settings=settings,
         equality=tuple(equality),
-        solvers=solvers,
+        solver=solver,
         build_s=time.perf_counter() - began,
     )
 
@@ -310,27 +294,22 @@ def solve_transfer(
         held = np.tile(controls_within[:, side], (count, 1))
         bounds.append(packed(states, settings.duration[side], sign * free, held))
     began = time.perf_counter()
-    for solver in program.solvers:
-        function = solver()
-        inner = RELAXED if function.class_name() == "FatropInterface" else 0.0
-        low, high = _inside(bounds[0], bounds[1], inner)
-        answer = function(
-            x0=np.clip(guess, low, high),
-            p=np.concatenate([start, end, controls.ravel()]),
-            lbx=low,
-            ubx=high,
-            lbg=np.where(program.equality, 0.0, -np.inf),
-            ubg=np.where(program.equality, 0.0, -inner),
-        )
-        stats = function.stats()
-        if stats["success"]:
-            break
+    low, high = bounds
+    answer = program.solver(
+        x0=np.clip(guess, low, high),
+        p=np.concatenate([start, end, controls.ravel()]),
+        lbx=low,
+        ubx=high,
+        lbg=np.where(program.equality, 0.0, -np.inf),
+        ubg=0.0,
+    )
+    stats = program.solver.stats()
     solve_s = time.perf_counter() - began
     values = np.asarray(answer["x"].full(), dtype=np.float64).ravel()
     stages = values[: count * program.width].reshape(count, -1)
     begins = stages[:, : n_z + 1 + n_u]
     nodes = np.hstack([begins[:, :n_z], stages[:, n_z + 1 + n_u : -n_u]]).reshape(-1, n_z)
-    reason = str(stats["return_status"]) if solver is program.solvers[-1] else "Solve_Succeeded"
+    reason = str(stats["return_status"])
     return Transfer(
         status=STATUS.get(reason, SolveStatus.FAILED),
         reason=reason,
@@ -343,16 +322,6 @@ def solve_transfer(
     )
 
 
-def _inside(low: Array, high: Array, by: float) -> tuple[Array, Array]:
-    """Bounds drawn in by what a solver gives away: `by`, relative where they are above 1."""
-    room = high - low > 1e3 * by
-    size_low, size_high = (
-        np.where(room & np.isfinite(side), np.maximum(1.0, np.abs(side)), 0.0)
-        for side in (low, high)
-    )
-    return low + by * size_low, high - by * size_high
-
-
 def drawn_in(limits: Array, share: float) -> Array:
     """Limits (n, 2), each drawn in by a share of its range; infinite ones stay."""
     width = limits[:, 1] - limits[:, 0]
@@ -361,11 +330,14 @@ def drawn_in(limits: Array, share: float) -> Array:
 
 
 def duration_guess(model: Model, start: Array, end: Array) -> float:
-    """Time [s] for the slowest component at the fastest rates the limits admit, half way."""
+    """Time [s] for the slowest component at its fastest rate, at an end or half way.
+
+    Half way alone a rate may vanish that is great elsewhere.
+    """
     corners = np.where(np.isfinite(model.control_limits), model.control_limits, [[-1.0, 1.0]])
     controls = np.array(list(itertools.product(*corners)))
-    middle = np.broadcast_to((start + end) / 2.0, (len(controls), start.size))
-    fastest = np.abs(model.reduced_dynamics(middle, controls)).max(axis=0)
+    states = np.repeat([start, (start + end) / 2.0, end], len(controls), axis=0)
+    fastest = np.abs(model.reduced_dynamics(states, np.tile(controls, (3, 1)))).max(axis=0)
     change = np.abs(end - start)
     seconds = change / np.where(fastest > 0.0, fastest, np.inf)
     return max(LEAST_GUESS_S, 1.5 * float(seconds.max(initial=0.0)))

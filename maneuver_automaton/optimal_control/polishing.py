@@ -2,13 +2,9 @@
 
 Solver success proves nothing: what comes out is to be simulated and audited by others.
 
-The solver is IPOPT. Fatrop, which solves maneuvers between trims (see `maneuvers`) in a half to a
-third of IPOPT's time, is not tried here. An iteration takes 8 ms of processor time for 527
-variables and 1,362 rows, and 13 ms for 944 and 2,469; a third of it are values and derivatives of
-the program, which any solver needs. Rows that know both nodes of an interval, and the price of
-changes, would need copies of the next state and of the last input in each stage; and the structure
-would be looked for anew whenever lines come or go. A third of the time is not to be had that way
-unless the derivatives become cheaper too.
+The solver is IPOPT. An iteration takes 8 ms of processor time for 527 variables and 1,362 rows, and
+13 ms for 944 and 2,469; a third of it are values and derivatives of the program, which any solver
+needs. Fatrop is not used: it has no limit of time, and was seen never to come back.
 """
 
 from __future__ import annotations

@@ -61,7 +61,9 @@ ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the 
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
 ROUND_SHARE, COUNTED_ROUND = 0.2, 0.7  # of the time left, of expansions: each way round
-STEERED_SHARE = 0.3  # of the time and of the expansions left: as if steering at rest cost nothing
+STEERED_SHARE = (
+    0.3  # of the time and of the expansions left: for a way that heeds the price at once
+)
 PAID = 0.02  # share of a cost that its places have to cost for that
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
@@ -183,13 +185,15 @@ class LatticeWords(PlanningStep):
                     close = replace(query, around=query.scene(LEAST_MARGIN))  # through narrow bends
                     word = with_waits(query, path.word) or with_waits(close, path.word)
         if word is None:
-            aside = along_free_path(query, self.table)
+            freely = _steered_freely(problem)  # finds at once what a price hides for long
+            easy = lattice_query(freely, goals, prepared=prepared, ends=ends) if freely else query
+            aside = along_free_path(easy, self.table)
             proven = functools.partial(proven_apart, problem)
             first = first_plan(
-                query, budget=limit, table=self.table, begun=begun, aside=aside, is_proven=proven
+                easy, budget=limit, table=self.table, begun=begun, aside=aside, is_proven=proven
             )
             self._count(first, searches=1)
-            word = first.word
+            word = first.word and with_cost(first.word, query)
         if word is not None:
             self.gained(word)
         ended.lattice, ended.nodes = first, first.nodes if first else None
@@ -290,10 +294,8 @@ class LatticeWords(PlanningStep):
         if query.problem.place_costs:
             self._go_round()
         own = self.words[-1]  # where others are improved from, too: they lead to other minima
-        if (freely := _steered_freely(query.problem)) is not None:
-            # of all that turn at rest the priced search finds few: it takes them one by one
-            other = lattice_query(freely, _goals(query), prepared=query.prepared)
-            self._by_way_of(other, STEERED_SHARE, counted=STEERED_SHARE)
+        if _steered_freely(query.problem) is not None:  # the first word heeded no price
+            self._by_way_of(query, STEERED_SHARE, counted=STEERED_SHARE)
         better = self.words_of(
             query,
             self._for_the_best(),

@@ -36,7 +36,7 @@ from maneuver_automaton.search.lattice_trims import priced_library
 from maneuver_automaton.search.result import TIE, plan_of
 
 FIRST_SHARE = 0.5  # of a step's time limit, for the words of the first step
-WORDS_SHARE = 0.2  # of it for words where something moves and no plan is kept
+WORDS_SHARE = 0.2  # of it for words where something is in the way and no plan is kept
 PLANNER_SHARE = 0.7  # of the time for plans where something moves, before the lattice has its turn
 HEEDLESS_SHARE = 0.5  # of the time they leave, for a path past what stands still
 OTHERS = 3  # costlier words that are tried where the cheapest ones are not free
@@ -115,9 +115,9 @@ class OverManeuvers(StepSearch):
             upper = kept.cost - self.settings.margin - TIE * (1.0 + abs(kept.cost))
         committed = 0.0 if now.head is None else here.cost_of(now.head)
         share = FIRST_SHARE if now.last is None else 1.0
-        if here.moves and kept is None:
-            share = WORDS_SHARE
         guarded = bool(here.obstacles or here.zones) or bounded(here)
+        if guarded and kept is None and now.last is not None:
+            share = WORDS_SHARE
         found: list[StepPlan] = []
         for index in open_goals(problem):
             if self.for_plans.is_over:

@@ -27,6 +27,7 @@ from maneuver_automaton.planning.on_the_way import (
     what_is_missed,
 )
 from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives.on_the_spot import trim_at
 from maneuver_automaton.problem import Goal, Problem, apart
 from maneuver_automaton.receding_horizon.candidates import (
     StepPlan,
@@ -92,16 +93,30 @@ class Situation:
             self.rounding = off <= ROUNDING * self.size
             self.rest = rest_of(last.plan, passed, start=here.start, pad=settings.pad_of(here))
             self.busy = committed(last.plan, passed)
-            if state is not None and self.rest.trims:
-                self._go_on_from(state)
+            if state is not None:
+                self._go_on_from(state, last)
 
-    def _go_on_from(self, state: Array) -> None:
-        """Put a maneuver from the measured state in place of what was committed, if they differ."""
+    def _go_on_from(self, state: Array, last: Step) -> None:
+        """Put a maneuver from the measured state in place of what was committed, if they differ.
+
+        Where the plan is over, one leads to the trim in which it ended, unless the vehicle stands.
+        """
         assert self.rest is not None
-        off = float(np.abs(begin_state(self.rest) - state).max())
+        here, model = self.here, self.here.automaton.model
+        if self.rest.trims:
+            expected = begin_state(self.rest)
+            after = tail_of(self.rest, self.busy, start=here.start)
+        else:
+            measured = trim_at(model, state, "measured state")
+            if measured.is_rest and not model.reduced_dynamics(state, measured.control).any():
+                return
+            trims = last.plan.trims or (here.last_trim(here.goals[last.goal_index]),)
+            trim = trims[-1]
+            expected = trim.reduced_state
+            after = Plan(here.start, (trim,), durations=[0.0], start_time=here.start_time)
+        off = float(np.abs(expected - state).max())
         if off <= EXACT:
             return
-        here, after = self.here, tail_of(self.rest, self.busy, start=self.here.start)
         self.off_plan, self.off_state = max(self.off_plan or 0.0, off), True
         leg = leg_from(here, state, after.trims[0])
         if leg is None:
@@ -220,6 +235,8 @@ class Situation:
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
+        if pad is not None and not self.settings.at_will:
+            pad = here.last_trim(here.goals[index])  # in the state in which the plan has ended
         total = here.horizon.time
         plan = Plan(here.start, (), durations=[], start_time=here.start_time)
         if self.rest is not None and self.rest.trims and not moves_on(self.rest):

@@ -7,9 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.errors import MissingExtra
 from maneuver_automaton.models import Car, Hovercraft, SecondOrderCar
-from maneuver_automaton.optimal_control.ipopt import SolveStatus
+from maneuver_automaton.optimal_control.ipopt import SolverSettings, SolveStatus
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
     TransferSettings,
@@ -109,6 +110,17 @@ def test_a_coupled_model_slows_down_in_its_own_way():
     )
     exact = 2.0 * np.log(2.0)  # v' = 2 - v / 2
     assert found.duration == pytest.approx(exact, rel=1e-4)
+
+
+def test_brakes_where_a_rate_vanishes_half_way():
+    """Guessed by that rate alone it would take 331 s, and no solver comes back from there."""
+    craft = load_stock_library("hovercraft").model
+    start = np.array([1.4858708905461382, -0.1830846759210547, 0.3718843605171223])
+    few = TransferSettings(intervals=8, solver=SolverSettings(tolerance=1e-7, max_iterations=80))
+    program = transfer_program(craft, settings=few)
+    found = solve_transfer(program, start=start, end=np.zeros(3), controls=NO_INPUT)
+    assert found.status is SolveStatus.SOLVED
+    assert found.duration < 2.0
 
 
 @pytest.mark.parametrize(

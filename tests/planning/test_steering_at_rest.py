@@ -94,6 +94,26 @@ def angles_at_cusps(plan: ma.Plan) -> list[float]:
     return [float(angle) for angle in moving[turns, 1]]
 
 
+def test_in_a_tight_slot_it_costs_what_free_steering_costs_with_its_price() -> None:
+    levels = {"speed": [-1.0, 0.0, 1.0], "steering": [-0.7, -0.35, 0.0, 0.35, 0.7]}
+    street = [
+        *(ma.Box([4.2, 1.8], [x, 2.975]) for x in (-4.701, 7.604)),
+        *(ma.Box([30.0, 0.3], [0.0, y]) for y in (-3.2, 4.475)),
+    ]
+    found = []
+    for price in (0.0, 0.5):
+        car = replace(CAR, wheelbase=2.97, max_steering_rate=0.36, steering_at_rest=price)
+        library = ma.Automaton.of_model(car, levels, strokes=[-2.0, -1.0, -0.5, 0.5, 1.0, 2.0])
+        search = ma.SearchSettings(polish=False, max_expansions=1500)
+        goal, body = [0.05, 2.975, 0.0], ma.Box([4.2, 1.8], [1.4, 0.0])
+        problem = ma.Problem(
+            library, [0, 0, 0], goal, footprint=body, obstacles=street, search=search
+        )
+        found.append(ma.plan(problem, time_limit=60.0))
+    free, priced = found
+    assert priced.cost <= 1.01 * (free.cost + 0.5 * turned(free.plan))
+
+
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_it_changes_how_a_car_parks() -> None:

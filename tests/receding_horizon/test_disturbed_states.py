@@ -30,6 +30,7 @@ CASES = {  # length and width [m], state at the start, deviation per step, way [
 OTHERS = [name for name in CASES if name != "hovercraft"]
 SEEDS = 84  # of each vehicle: 504 loops in all
 SHORT = 4  # steps
+FIRST = ma.SearchSettings(improve=False, polish=False)
 GIVEN_AWAY = {Guarantee.DECREASE, Guarantee.FEASIBILITY}  # what a disturbance may take
 
 
@@ -54,7 +55,7 @@ def problem_of(name: str, seed: int) -> ma.Problem:
         start_state=state,
         footprint=ma.Box(size),
         obstacles=box,
-        search=ma.SearchSettings(improve=False, polish=False),
+        search=FIRST,
     )
 
 
@@ -135,12 +136,33 @@ def test_arrives_though_disturbed_in_every_step() -> None:
     assert loop.reached, loop.reason
 
 
+def test_it_rests_in_the_state_in_which_it_arrives() -> None:
+    library = ma.load_stock_library("car_with_trailer")
+    near = ma.Problem(library, [0.0, 0.0, 0.0], ma.Goal([3.2, 0.0, 0.0], tolerance_m=0.5))
+    first = ma.Plan(near.start, (library["speed 3, hitch 0"],), durations=[1.0])
+    loop = simulate(near, step=1.0, steps=2, first=first, stay=True)
+    assert [one.trims[-1].name for one in loop.driven] == ["speed 3, hitch 0", "speed 0, hitch 0"]
+
+
+@pytest.mark.parametrize(("speed", "arrived"), [(0.2, False), (0.0, True)])
+def test_one_that_still_rolls_at_the_goal_brakes(speed: float, arrived: bool) -> None:
+    library = ma.load_stock_library("second_order_car")
+    goal = ma.Goal([6.0, 0.0, 0.0], tolerance_m=1.0)
+    loop = ma.RecedingHorizon(ma.Problem(library, [0.0, 0.0, 0.0], goal, search=FIRST), step=20.0)
+    there = loop.step([0.0, 0.0, 0.0])[1].piece.end
+    control, step = loop.step(there, [speed, 0.1])
+    assert step.arrived == arrived
+    assert control is not None
+    assert control.tolist() == ([0.0, 0.0] if arrived else [-1.0, -0.5])
+    if not arrived:
+        np.testing.assert_allclose(end_state(step.piece), 0.0, atol=1e-12)
+
+
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_step_takes_the_measured_state() -> None:
     library = ma.load_stock_library("second_order_car")
-    once = ma.SearchSettings(improve=False, polish=False)
-    problem = ma.Problem(library, [0, 0, 0], ma.Goal([20, 2, 0], tolerance_m=1.0), search=once)
+    problem = ma.Problem(library, [0, 0, 0], ma.Goal([20, 2, 0], tolerance_m=1.0), search=FIRST)
     loop = ma.RecedingHorizon(problem, step=1.0, time_limit=2.0)
     _, first = loop.step([0, 0, 0])
     pose, state = first.piece.end, end_state(first.piece)
