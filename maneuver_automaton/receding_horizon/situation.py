@@ -235,7 +235,7 @@ class Situation:
     def resting(self, index: int) -> StepPlan:
         """To rest at a goal."""
         here, pad = self.here, self.settings.pad
-        if pad is not None and not self.settings.at_will:
+        if pad is not None and not switches_at_will(here):
             pad = here.last_trim(here.goals[index])  # in the state in which the plan has ended
         total = here.horizon.time
         plan = Plan(here.start, (), durations=[], start_time=here.start_time)
