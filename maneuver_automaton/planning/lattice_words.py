@@ -61,9 +61,7 @@ ALONE_BEFORE_POLISHING = 0.4  # the same for better words where its own was the 
 FOR_THE_BEST = 0.6  # the same where alternatives are asked for
 TIMES_SHARE = 0.2  # of the time that is left, for the best times of one word
 ROUND_SHARE, COUNTED_ROUND = 0.2, 0.7  # of the time left, of expansions: each way round
-STEERED_SHARE = (
-    0.3  # of the time and of the expansions left: for a way that heeds the price at once
-)
+STEERED_SHARE = 0.3  # of time and expansions left: for a way that heeds the price at once
 PAID = 0.02  # share of a cost that its places have to cost for that
 FREE_WORDS = 4  # words of free space that are looked at for every alternative
 FREE_WORDS_SHARE = 0.3  # of the time that is left for alternatives
