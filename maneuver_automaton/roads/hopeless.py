@@ -1,19 +1,16 @@
 """What lets every drive from a start fail, told before any search: each answer is a proof.
 
-The start itself, a goal's time, speed and distance, road users who shut a goal off, a place where
-the body fits at no heading of the goal, and a road that is nowhere wide enough to turn round, for
-a goal behind. What is not proven is searched for.
+The start itself, a goal's time, speed and distance, road users who shut a goal off, and a place
+where the body fits at no heading of the goal. What is not proven is searched for.
 """
 
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import RECENT
@@ -22,7 +19,6 @@ from maneuver_automaton.collision import Disc, Shape
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.roads.lanelets import drivable_area
-from maneuver_automaton.roads.route import SPACING, Route
 from maneuver_automaton.roads.rules import judged
 from maneuver_automaton.roads.scene import (
     EXACT,
@@ -40,7 +36,6 @@ MOST_NAMES = 20  # of road users who are looked at one by one
 SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
 MOST_BOXES = 30_000  # of poses: beyond, no proof is looked for
 PROVEN = 1e-6  # [m] by which the road is taken to be larger for a proof
-CELL, MOST_CELLS = 0.2, 400_000  # [m] of a road on which no body turns round, and how many at most
 Wall: TypeAlias = tuple[Any, float, float]  # a shapely geometry, from when and until when [s]
 
 
@@ -143,91 +138,12 @@ def _away(places: Sequence[Shape] | None, points: Any) -> Array:
     return np.min(apart, axis=0) if apart else np.zeros(len(points))
 
 
-def _bodies(middles: Array, size: Array, ahead: float = 0.0) -> Any:
-    """Rectangles at poses (n, 3) `ahead` of which they are; half their length and width (2,)."""
+def _bodies(middles: Array, size: Array) -> Any:
+    """Rectangles at poses (n, 3); half their length and width (2,)."""
     import shapely
 
     corners = size * np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
-    corners[:, 0] += ahead
     return shapely.polygons(np.asarray(SE2(middles[:, None]).act(corners)))
-
-
-def turned_back(scene: RoadScene, vehicle: RoadVehicle, route: Route) -> tuple[str, str] | None:
-    """Status and words where goals ask to turn round, and the road has no room for that.
-
-    A drive never goes backwards. Where the body fits nowhere across the road, its heading stays on
-    one side of that, and the rear axle only gets on along the route, with the middle near it. The
-    road on from the start is looked at in cells, each with the route's direction there.
-    """
-    import shapely
-    from scipy import ndimage
-    from scipy.spatial import KDTree
-
-    rear, lasts = vehicle.rear_of(scene.start.middle), scene.last_time - scene.start.time
-    here = SPACING * int(np.argmin(np.hypot(*(route.points - rear[:2]).T)))
-    most = (scene.start.speed + 0.5 * vehicle.model.max_acceleration * lasts) * lasts
-    asks = [
-        last < here or (goal.heading is not None and _against(goal.heading, route.heading).any())
-        for goal, last in zip(scene.goals, route.extents[:, 1], strict=True)
-    ]
-    if not all(asks) or scene.start.speed < 0.0 or not most < FAR:
-        return None
-    road = RECENT.once(drivable_area, scene.lanelets)
-    road = shapely.buffer(road.intersection(shapely.Point(rear[:2]).buffer(WIDER * most)), PROVEN)
-    low, high = np.reshape(road.bounds, (2, 2))
-    counts = np.ceil((high - low) / CELL).astype(int) + 1
-    if counts.prod() > MOST_CELLS:
-        return None
-    axes = [a + CELL * np.arange(n) for a, n in zip(low, counts, strict=True)]
-    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    near = np.asarray(KDTree(route.points).query(places)[1])
-    ahead = np.stack([np.cos(route.heading[near]), np.sin(route.heading[near])], axis=-1)
-    station = SPACING * near + ((places - route.points[near]) * ahead).sum(axis=-1)
-    heading = np.interp(station, SPACING * np.arange(len(route.points)), route.heading)
-    start = tuple(np.round((rear[:2] - low) / CELL).astype(int))
-    half = CELL * math.sqrt(0.5)
-    on = shapely.contains_xy(shapely.buffer(road, half), places[..., 0], places[..., 1])
-    onward = on & (station >= station[start] - CELL)
-    parts = np.asarray(ndimage.label(onward, np.ones((3, 3)))[0])
-    on = (parts == parts[start]) & (parts > 0)
-    bends = np.abs(np.diff(route.heading[np.unique(near[on])])).max(initial=0.0)
-    turned = 2.0 * _steepest(heading, on) + float(bends)
-    size = 0.5 * np.array([vehicle.length, vehicle.width])
-    moved = half + turned * math.hypot(abs(vehicle.ahead) + size[0], size[1])
-    askew = abs(math.remainder(rear[2] - heading[start], 2.0 * math.pi)) + turned
-    if _steepest(station, on) > SPACING or moved >= size.min() or askew >= 0.5 * math.pi:
-        return None
-    shapely.prepare(road)
-    for side in (0.5 * math.pi, -0.5 * math.pi):
-        poses = np.column_stack([places[on], heading[on] + side])
-        if shapely.covers(road, _bodies(poses, size - moved, vehicle.ahead)).any():
-            return None
-    points = shapely.points(places[on])
-    for goal in scene.goals:
-        there = _away(goal.places, points) <= abs(vehicle.ahead) + half
-        if goal.heading is not None:
-            there &= ~_against(goal.heading, heading[on])
-        if there.any():
-            return None
-    return "missed", (
-        "no goal can be reached: the way to it turns round, and on from the start the road is"
-        " nowhere wide enough for that"
-    )
-
-
-def _against(interval: tuple[float, float], headings: Array) -> NDArray[np.bool_]:
-    """Whether all of an interval is more than a quarter turn from headings (n,)."""
-    off = 0.5 * (interval[0] + interval[1]) - headings
-    turn = np.abs((off + math.pi) % (2.0 * math.pi) - math.pi)
-    return np.asarray(turn - 0.5 * (interval[1] - interval[0]) > 0.5 * math.pi)
-
-
-def _steepest(values: Array, on: NDArray[np.bool_]) -> float:
-    """Greatest difference of neighbours of a grid (n, m) that are both `on`."""
-    along = np.abs(np.diff(values, axis=0))[on[1:] & on[:-1]].max(initial=0.0)
-    return float(
-        max(along, np.abs(np.diff(values, axis=1))[on[:, 1:] & on[:, :-1]].max(initial=0.0))
-    )
 
 
 def _shut_off(scene: RoadScene, vehicle: RoadVehicle, road: Any) -> list[str]:

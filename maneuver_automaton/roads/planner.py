@@ -27,7 +27,7 @@ from maneuver_automaton.roads.arrays import (
     HorizonTask,
     RoadArrays,
 )
-from maneuver_automaton.roads.hopeless import hopeless, turned_back
+from maneuver_automaton.roads.hopeless import hopeless
 from maneuver_automaton.roads.plans import (
     AT_REST,
     ROUND,
@@ -132,8 +132,7 @@ class RoadPlanner:
         """
         there = self.plan_of(self.start_state, np.zeros((0, 2)))
         scene = replace(self.scene, traffic=(*self.scene.traffic, *others))
-        why = hopeless(scene, self.vehicle, there)
-        return why or turned_back(self.local, self.vehicle, self.route)
+        return hopeless(scene, self.vehicle, there)
 
     def wider(self, width: int, *, horizon_s: float) -> RoadPlanner:
         """A planner like this one that searches another width, and another time ahead [s]."""

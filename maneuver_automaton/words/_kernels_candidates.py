@@ -164,7 +164,7 @@ def solve_path(
         for n in range(3):
             _, turn_rate = motions[n]
             left = right = branches[branch, n]
-            if turn_rate != 0.0:
+            if turn_rate != 0.0 and not math.isnan(left):
                 left, right = turn_time(left, abs(turn_rate)), turn_time(left, -abs(turn_rate))
             out[branch, n, 0] = lasting(lib, word[n], left)
             out[branch, n, 1] = lasting(lib, word[n], right)

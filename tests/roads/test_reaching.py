@@ -337,22 +337,18 @@ def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
     assert road_planner(scene).hopeless() is None
 
 
-WIDE = piece(2, 120, 145, y=(-8.0, 12.0))  # room to turn round
+WIDE = piece(2, 120, 145, y=(-8.0, 12.0))  # room to stand across
 
 
 @pytest.mark.parametrize(
     ("asked", "more", "said"),
     [
-        (goal(place(30.0, 2.0, 10.0)), (), "the way to it turns round, and on from the start"),
-        (goal(place(90.0, 2.0, 9.0), interval("orientation", 3.0, 3.3)), (), "the way to it"),
-        (goal(place(30.0, 2.0, 10.0)), (WIDE,), None),
-        (goal(place(90.0, 2.0, 9.0), interval("orientation", 3.0, 3.3)), (WIDE,), None),
         (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (), "at none of its"),
         (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.5, 2.2)), (), None),
         (goal(place(130.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (WIDE,), None),
     ],
 )
-def test_a_road_without_room_to_turn_is_told(tmp_path, asked, more, said):
+def test_a_goal_across_a_narrow_road_is_told(tmp_path, asked, more, said):
     lanes = (piece(1, 0, 120, '<successor ref="2"/>'), *more)
     scene = scene_of(tmp_path, *lanes, problem(x=60.0, goal=asked))
     why = road_planner(scene).hopeless()
