@@ -209,8 +209,8 @@ def with_lasting_coasts(
     Such a trim is left out, or lasts so long; others change as little as they can: all of them,
     those near it, after it, or before it, whatever is free. Where that fails another trim stands
     beside it, which takes back what it turns too far. Where the horizon states a least time, be it
-    zero, the plan stays as it is. A plan `passes` goals on its way, each after some seconds; still
-    does what comes out.
+    zero, the plan stays as it is. What a plan `passes` on its way, each after some seconds, the
+    other passes too.
     """
     if not has_short_coasts(problem, plan):
         return plan
@@ -220,6 +220,7 @@ def with_lasting_coasts(
         for other in _without_short(problem, plan, goal, short[failed], through):
             if (
                 other is not None
+                and goal.off(other.end)[1] <= goal.tolerance_rad + MET
                 and len(_short(other)) < len(short)
                 and problem.cost_of(other) <= most
                 and not broken_condition(problem, other)
@@ -250,12 +251,17 @@ def _within(plan: Plan, passes: Sequence[tuple[float, Goal]]) -> list[Passage]:
 def _without_short(
     problem: Problem, plan: Plan, goal: Goal, short: int, through: Sequence[Passage]
 ) -> Iterator[Plan | None]:
-    """Plans in which a short trim lasts longer or not at all; None where no times are found."""
+    """Plans in which a short trim lasts longer or not at all; None where no times are found.
+
+    They end where the plan does; where the heading may be another one at the goal, at any.
+    """
+    turns = goal.free_heading or goal.tolerance_rad > 0.0
+    end = Goal(plan.end if turns or goal.tolerance_m else goal.pose, free_heading=turns)
     away = np.arange(plan.durations.size) - short
     times = (np.where(away == 0, lasting, plan.durations) for lasting in (0.0, SHORT))
     changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)
     for some, of_these, least in itertools.product(times, changing, (0.0, SHORT)):
-        yield _with_times(problem, plan, goal, some, of_these, least, through)
+        yield _with_times(problem, plan, end, some, of_these, least, through)
     if plan.maneuvers or problem.horizon.time is not None:
         return
     moving = [one for one in problem.automaton.trims if not one.is_rest][:MOST_TRIMS]
@@ -268,8 +274,8 @@ def _without_short(
             lasting[beside] = max(lasting[beside] - 2.0 * longer, SHORT)
             trims = (*plan.trims[:at], trim, *plan.trims[at:])
             more = replace(plan, trims=trims, durations=np.insert(lasting, at, longer))
-            later = [(place + (place > at), end) for place, end in through]
-            yield _with_times(problem, more, goal, more.durations, every, SHORT, later)
+            later = [(place + (place > at), one) for place, one in through]
+            yield _with_times(problem, more, end, more.durations, every, SHORT, later)
 
 
 def has_short_coasts(problem: Problem, plan: Plan) -> bool:
@@ -288,19 +294,14 @@ def _short(plan: Plan) -> list[int]:
 def _with_times(
     problem: Problem,
     plan: Plan,
-    goal: Goal,
+    end: Goal,
     times: Array,
     free: NDArray[np.bool_],
     least: float,
     through: Sequence[Passage] = (),
 ) -> Plan | None:
-    """The word of a plan with times near some, those that are free at least so long, as it ends.
-
-    Where the heading may be another one at the goal, it is any within its tolerance.
-    """
+    """The word of a plan with times near some, those that are free at least so long, to an end."""
     group, n = problem.automaton.model.group, len(times)
-    turns = goal.free_heading or goal.tolerance_rad > 0.0
-    exact = not (turns or goal.tolerance_m)
     places = np.unique([*range(1, n + 1), *(place for place, _ in through)])
     shares, whose = np.diff(places, prepend=0.0), np.ceil(places).astype(int) - 1
     lasting, frees = times[whose] * shares, free[whose]
@@ -309,15 +310,15 @@ def _with_times(
     steps = np.vstack([_displacements(plan), np.zeros(plan.start.size)])[whose]
     steps = (held @ group(steps * (places == whose + 1)[:, None])).pose
     conditions = []
-    for place, end in (*through, (n, Goal(goal.pose if exact else plan.end, free_heading=turns))):
+    for place, passed in (*through, (n, end)):
         last = int(np.searchsorted(places, place))
         before = np.vstack([steps[:last], held.pose[last]])
         seen, product = conjugated((twists * frees[:, None])[: last + 1], before)
         one = EndConditions(
             start=plan.start,
             twists=seen,
-            goal=end.pose,
-            free_heading=end.free_heading,
+            goal=passed.pose,
+            free_heading=passed.free_heading,
             product=product,
         )
         conditions.append(one)
@@ -332,8 +333,7 @@ def _with_times(
         changed, missing = closest_times(conditions[-1], lasting, at_least=least)
     if missing >= CLOSED:
         return None
-    plan = without_nothing(replace(plan, durations=np.where(free, changed, times)))
-    return plan if exact or goal.off(plan.end)[1] <= goal.tolerance_rad + CLOSED else None
+    return without_nothing(replace(plan, durations=np.where(free, changed, times)))
 
 
 def _displacements(plan: Plan) -> Array:

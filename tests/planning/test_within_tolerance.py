@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton import Automaton
+from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Unicycle
@@ -143,3 +143,13 @@ def test_unreachable_exactly_but_within_tolerance():
 def test_alternatives_end_within_too():
     result = found(to_goal("car", FAR, TURNED), alternatives=2)
     assert len(result.alternatives) == 2
+
+
+@pytest.mark.parametrize("beyond", [2e-5, 1e-4, 5e-4])
+def test_no_trim_of_milliseconds_keeps_a_heading_within(beyond):
+    car = VEHICLES["car"]
+    x, y, heading = Plan([0, 0, 0], [car["S+"], car["L+"]], durations=[1.2, 1.5]).end
+    goal = Goal(pose=[x, y, heading + TURNED + beyond], tolerance_rad=TURNED)
+    result = found(Problem(car, [0, 0, 0], goal, search=QUICK))
+    assert result.plan.durations.min() >= 0.02
+    assert result.cost == pytest.approx(2.7, rel=1e-3)
