@@ -24,6 +24,9 @@ INSIDE = 1e-7  # share of a tolerance that is left to rounding
 ITERATIONS = 100
 ACCURACY = 1e-12  # of the cost, relative to itself
 ROUGHLY = 1e-6  # the same where places cost something, whose price is not that smooth
+SLOPES = 7  # decimals of a slope by differences, in which a moved problem has the same
+STEADY = 5  # iterations of costs that differ by less are the last
+NEARLY = 1e-3  # [m, rad, s] by which times may miss their conditions, to be closed at last
 CLOSING_STEPS = 4
 RANK = 1e-9  # singular values below this, relative, count as none
 
@@ -179,19 +182,32 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
             }
         )
 
-    def ask(times: Array) -> None:
-        if budget.is_over:
-            raise _OutOfTime
-
     costs = task.problem.bound_place_costs
     places = TimedPrices(costs, plan, task.problem.automaton.model) if costs else None
+    known, best = list[float](), (math.inf, begin)
 
     def cost(times: Array) -> tuple[float, Array]:
         if places is None:
             return float(rates @ times) / scale, rates / scale
         price, slopes = places.at(times)
         value = settled((rates @ times + price) / scale)
-        return float(value), settled((rates + slopes) / scale)
+        return float(value), np.round((rates + slopes) / scale, SLOPES)
+
+    roughly = ROUGHLY * cost(begin)[0] if costs else ACCURACY
+
+    def ask(times: Array) -> None:
+        nonlocal best
+        if budget.is_over:
+            raise _OutOfTime
+        if places:  # at a kink it goes from side to side until its last iteration
+            known.append(cost(times)[0])
+            off = max(
+                np.abs(task.exact(times)[0]).max(initial=0.0), -task.room(times)[0].min(initial=0.0)
+            )
+            if off <= NEARLY and known[-1] < best[0]:
+                best = known[-1], times.copy()
+            if len(known) >= STEADY and np.ptp(known[-STEADY:]) < roughly:
+                raise StopIteration
 
     try:
         solved = minimize(  # type: ignore[call-overload]  # its stubs want one-dimensional types
@@ -202,16 +218,14 @@ def _best_times(task: _Relaxation, budget: Budget) -> Array | None:
             bounds=Bounds(least, longest),
             constraints=conditions,
             callback=ask,
-            options={
-                "maxiter": ITERATIONS,
-                "ftol": ROUGHLY * cost(begin)[0] if costs else ACCURACY,
-            },
+            options={"maxiter": ITERATIONS, "ftol": roughly},
         )
+        found = solved.x if solved.success or not costs else best[1]
+    except StopIteration:
+        found = best[1]
     except _OutOfTime:
         return None
-    if costs and not solved.success:  # where it stopped is chance: a moved problem stops elsewhere
-        return None
-    times = np.clip(np.where(solved.x > NOTHING, solved.x, least), least, longest)
+    times = np.clip(np.where(found > NOTHING, found, least), least, longest)
     return _closed(task, times) if np.isfinite(times).all() else None
 
 
