@@ -194,7 +194,7 @@ class _Near:
                 seen = np.asarray(model.part_poses(states.reshape(len(flat), -1)))[:, part, :3]
                 frames = (SE2(frames) @ SE2(seen)).pose
             rows = self._level_with(height, flat)
-            found = np.maximum(clearances(world, _seen_from(world.frame, frames[rows])), 0.0)
+            found = np.maximum(clearances(world, world.seen(frames[rows])), 0.0)
             best[rows] = np.minimum(best[rows], found)
         return best.reshape(poses.shape[:-1])
 
@@ -634,12 +634,6 @@ def gradient_of(
         )
         slopes += ((ahead - behind) / (2.0 * STEP))[..., None] * axis
     return slopes
-
-
-def _seen_from(frame: Array, poses: Array) -> Array:
-    """Poses (n, 3) seen from one (3,), places first; not rounded, so that there are slopes."""
-    shifted = poses - np.array([*frame[:2], 0.0])
-    return np.asarray((SE2(np.array([0.0, 0.0, -frame[2]])) @ SE2(shifted)).pose)
 
 
 def _between(at: Array, count: int) -> tuple[NDArray[np.int64], Array]:

@@ -64,15 +64,17 @@ class World:
             rows = poses.reshape(-1, 3).tolist()
             seen = [_one_into(x - to_x, y - to_y, heading - turn, c, s) for x, y, heading in rows]
             return np.array(seen).reshape(poses.shape)
-        x, y = poses[..., 0] - self.frame[0], poses[..., 1] - self.frame[1]
-        c, s = np.cos(-self.frame[2]), np.sin(-self.frame[2])
-        turned = np.stack(
-            [c * x - s * y, s * x + c * y, wrapped(poses[..., 2] - self.frame[2])], -1
-        )
-        found: Array = np.round(turned, DIGITS)
+        found: Array = np.round(self.seen(poses), DIGITS)
         half = found[..., 2] <= -HALF_TURN  # half a turn to either side is one pose
         found[..., 2] = np.where(half, -found[..., 2], found[..., 2])
         return found
+
+    def seen(self, poses: Array) -> Array:
+        """The same of poses (..., 3), not rounded: distances there have slopes."""
+        x, y = poses[..., 0] - self.frame[0], poses[..., 1] - self.frame[1]
+        c, s = np.cos(-self.frame[2]), np.sin(-self.frame[2])
+        turned = wrapped(poses[..., 2] - self.frame[2])
+        return np.stack([c * x - s * y, s * x + c * y, turned], -1)
 
 
 def _one_into(x: float, y: float, turn: float, c: float, s: float) -> tuple[float, float, float]:
