@@ -8,6 +8,7 @@ import importlib.util
 import multiprocessing
 import re
 import socket
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Literal, TypeAlias, TypeVar
 
@@ -60,6 +61,9 @@ def _results(
         return
     from joblib import Parallel, delayed
 
+    # Where warnings are errors this one would end the thread that gathers results: a process that
+    # has been idle for minutes ends by itself, and is replaced, also as new pieces come in.
+    warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
     lazily = "generator" if order == "as given" else "generator_unordered"
     work = Parallel(n_jobs=jobs, return_as=lazily)
     if ends_early:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
+import inspect
+import re
 import socket
+import warnings
 
 import pytest
+from joblib.externals.loky import process_executor
 
 from maneuver_automaton._parallel import in_parallel
 
@@ -16,6 +20,13 @@ def test_results_come_in_order_or_as_they_are_done(jobs):
     assert list(in_parallel(abs, pieces, jobs=jobs)) == [abs(piece) for piece in pieces]
     done = in_parallel(abs, pieces, jobs=jobs, order="as done")
     assert sorted(done) == sorted(abs(piece) for piece in pieces)
+
+
+def test_an_idle_process_that_ends_as_pieces_come_in_is_no_error():
+    """Raised in joblib's own thread it left everybody waiting for ever."""
+    (said,) = re.findall(r'"(A worker stopped [^"]*)"', inspect.getsource(process_executor))
+    assert list(in_parallel(abs, [-1, 2], jobs=2)) == [1, 2]
+    warnings.warn(said, UserWarning, stacklevel=1)
 
 
 def test_nothing_to_do():

@@ -6,14 +6,17 @@ has the same least times.
 
 from __future__ import annotations
 
+import functools
+import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, as_array, as_number, freeze
+from maneuver_automaton._parallel import in_parallel
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.problem import Horizon, Problem
 from maneuver_automaton.search.choose import load_search, search_goal
@@ -189,21 +192,11 @@ def _searched(problem: Problem, poses: ArrayLike, jobs: int) -> tuple[Array, boo
     starts = as_array("poses", poses, last=problem.start.size)
     if starts.ndim != 2:
         raise ValueError(f"poses: got shape {starts.shape}, need (n, {problem.start.size})")
-    if jobs < 1:
-        raise ValueError(f"jobs must be at least 1, got {jobs}")
     timed = _in_least_time(problem)
     chunks = [starts[k : k + CHUNK] for k in range(0, len(starts), CHUNK)]
     load_search(timed)
-    rows: list[tuple[float, bool]] = []
-    if jobs == 1:
-        rows = [row for chunk in chunks for row in _rows(timed, chunk)]
-    else:
-        from joblib import Parallel, delayed
-
-        work = Parallel(n_jobs=jobs, return_as="generator")(
-            delayed(_listed)(timed, chunk) for chunk in chunks
-        )
-        rows = [row for part in work for row in part]
+    parts = in_parallel(functools.partial(_rows, timed), chunks, jobs=jobs)
+    rows = list(itertools.chain.from_iterable(parts))
     return np.array([time for time, _ in rows]), all(exhaustive for _, exhaustive in rows)
 
 
@@ -224,12 +217,9 @@ def _in_least_time(problem: Problem) -> Problem:
     return replace(problem, cost=Cost(time=1.0), horizon=free)
 
 
-def _listed(problem: Problem, poses: Array) -> list[tuple[float, bool]]:
-    return list(_rows(problem, poses))
-
-
-def _rows(problem: Problem, poses: Array) -> Iterator[tuple[float, bool]]:
+def _rows(problem: Problem, poses: Array) -> list[tuple[float, bool]]:
     """Least time to any goal, and whether the search of it was exhaustive, for each pose."""
+    rows = []
     for pose in poses:
         here = replace(problem, start=pose)
         least, exhaustive = math.inf, True
@@ -238,4 +228,5 @@ def _rows(problem: Problem, poses: Array) -> Iterator[tuple[float, bool]]:
             exhaustive &= any(result.exhaustive for result in results)
             costs = (solution.cost for result in results for solution in result.solutions[:1])
             least = min(least, *costs, math.inf)
-        yield least, exhaustive
+        rows.append((least, exhaustive))
+    return rows
