@@ -342,9 +342,11 @@ def killed(write: Callable[[], object]) -> bool:
     """Call a function in a process of its own that is killed before its first file is there."""
     child = os.fork()
     if child == 0:
-        Path.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
-        write()
-        os._exit(0)
+        try:
+            Path.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)
+            write()
+        finally:
+            os._exit(0)  # whatever was raised, no other test is for this process
     return os.WIFSIGNALED(os.waitpid(child, 0)[1])
 
 
@@ -382,6 +384,7 @@ def test_killed_at_any_moment_a_file_is_whole(folder):
     for k in range(4):
         process = subprocess.Popen([sys.executable, "-c", code], env=os.environ | root)
         while not Path("out/plan.json").exists():
+            assert process.poll() is None
             time.sleep(0.01)
         time.sleep(0.05 + 0.003 * k)
         process.kill()
