@@ -136,7 +136,7 @@ def test_dear_ground_in_the_open_is_worth_a_detour():
         place_costs=lawn,
         search=ma.SearchSettings(max_expansions=100),
     )
-    result = ma.plan(problem)
+    result = ma.plan(problem, time_limit=120.0)
     straight = ma.plan(ma.Problem(CAR, [0, 0, 0], [20, 0, 0])).plan
     assert problem.cost_of(straight) == pytest.approx(20.0 + 18.0, rel=1e-3)
     assert result.cost < 21.5
