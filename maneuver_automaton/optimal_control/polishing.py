@@ -41,6 +41,7 @@ from maneuver_automaton.optimal_control.polish_program import (
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, TimeGrid, resampled
 from maneuver_automaton.optimal_control.scene import (
     DIGITS,
+    USUAL,
     MotionEnds,
     NodeOnTheWay,
     PartPose,
@@ -437,7 +438,7 @@ def polish(
     guess: Guess,
     *,
     stage_cost: RunningCost | None = None,
-    settings: PolishSettings | None = None,
+    settings: PolishSettings = USUAL,
     fixed_planes: bool = False,
     elastic: bool = False,
     gears: Array | None = None,
@@ -459,7 +460,7 @@ def polish(
         intervals. Defects are allowed.
     stage_cost : callable, optional
         Cost per second ``l(z, u)`` on top of 1 for the time.
-    settings : PolishSettings, optional
+    settings : PolishSettings
     fixed_planes : bool
         Keep the lines as the guess has them: quicker, and harder to fail.
     elastic : bool
@@ -477,7 +478,6 @@ def polish(
     MissingExtra
         If CasADi is not installed.
     """
-    settings = settings or PolishSettings()
     began, ends = budget.elapsed, ends.settled
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
     program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
@@ -580,10 +580,10 @@ def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
     )
 
 
-def intervals_for(duration: float, settings: PolishSettings) -> int:
+def intervals_for(duration: float) -> int:
     """How many intervals a motion of a duration [s] gets."""
-    fewest, most = settings.nodes
-    return min(max(math.ceil(duration / settings.step), fewest), most)
+    fewest, most = USUAL.nodes
+    return min(max(math.ceil(duration / USUAL.step), fewest), most)
 
 
 def _fastest(point: Point) -> float:
