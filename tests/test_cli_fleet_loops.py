@@ -125,12 +125,6 @@ class TestMpc:
         assert "broke a guarantee: " in printed
         assert "east and north touch at " in printed
 
-    @pytest.mark.parametrize("option", [["--seeds", "3"], ["--gap", "0.1"]])
-    def test_options_of_one_vehicle(self, folder, capsys, option):
-        assert run(["mpc", "x.yaml", *option]) == 2
-        said = f"{option[0]}: is for one vehicle, but x.yaml states several; leave it out\n"
-        assert capsys.readouterr().err == said
-
     def test_it_goes_on_from_its_file(self, folder, capsys):
         quietly = ["--quiet", "--no-plot"]
         assert run(["mpc", "x.yaml", *quietly, "--out", "half", "--steps", "4"]) == 1
@@ -147,12 +141,6 @@ class TestMpc:
         capsys.readouterr()
         assert run(["mpc", "x.yaml", "--resume", "nowhere.json"]) == 2
         assert capsys.readouterr().err == "nowhere.json: no such file\n"
-
-    def test_a_file_without_a_loop(self, folder, capsys):
-        Path("x.yaml").write_text(FLEET)
-        assert run(["mpc", "x.yaml"]) == 2
-        said = "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans\n"
-        assert capsys.readouterr().err == said
 
 
 @pytest.mark.parametrize(
