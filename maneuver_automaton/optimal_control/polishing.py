@@ -217,9 +217,9 @@ def _line_blocks(
         if elastic:
             variables.append(inside[interval][None])
         at = first + OF_CORNER * (places.body[number] + corner)
-        told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+        given = _parameters(line, at)
         kind = _corner_kind(pose, program.problem.n_states, program.dof, fixed, elastic)
-        blocks.append(Blocks(kind, np.vstack(variables), np.array(told)))
+        blocks.append(Blocks(kind, np.vstack(variables), np.array(given)))
     if not fixed:
         for moves in (False, True):
             which = (places.shift >= 0) == moves
@@ -228,13 +228,15 @@ def _line_blocks(
                 continue
             line = slot[parting.owner[pair]]
             at = first + OF_CORNER * (places.piece[pair] + corner)
-            told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+            given = [OF_LINE * line + k for k in range(OF_LINE)] + [
+                at + k for k in range(OF_CORNER)
+            ]
             variables = [angle[line], angle[line] + n_lines]
             if moves:
                 at = first + places.shift[pair] + OF_SHIFT * corner
-                told += [at + k for k in range(OF_SHIFT)]
+                given += [at + k for k in range(OF_SHIFT)]
                 variables.append(np.full(len(pair), program.size - 1))
-            blocks.append(Blocks(_piece_kind(moves), np.vstack(variables), np.array(told)))
+            blocks.append(Blocks(_piece_kind(moves), np.vstack(variables), np.array(given)))
     return blocks
 
 
@@ -578,6 +580,11 @@ def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
         build_s=seconds - total.seconds,
         solve_s=total.seconds,
     )
+
+
+def _parameters(line: IntArray, corner: IntArray) -> list[IntArray]:
+    """Where the parameters of lines stand, and those of the corners beside them."""
+    return [OF_LINE * line + k for k in range(OF_LINE)] + [corner + k for k in range(OF_CORNER)]
 
 
 def intervals_for(duration: float) -> int:
