@@ -859,12 +859,10 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
 def _as_parts(
     model: Model, parts: Mapping[str, AnyShape | Sequence[AnyShape]]
 ) -> dict[str, tuple[Shape, ...]]:
-    known: tuple[str, ...] = getattr(model, "part_names", ())
+    known = ", ".join(model.part_names) or "nothing"
     for name in parts:
-        if name not in known:
-            raise ValueError(
-                f"parts: the {model.name} carries no {name!r}, only {', '.join(known) or 'nothing'}"
-            )
+        if name not in model.part_names:
+            raise ValueError(f"parts: the {model.name} carries no {name!r}, only {known}")
     return {name: as_footprint(shapes) for name, shapes in parts.items()}
 
 

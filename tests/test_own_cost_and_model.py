@@ -102,6 +102,29 @@ def test_what_is_no_cost_is_told_where_it_is_given(cost, said):
         problem(cost)
 
 
+class Rover:
+    """No `UserModel`, and little of what one has."""
+
+    name, control_names, velocity = (
+        "rover",
+        ("speed", "turn rate"),
+        lambda self, z, u: [u[0], 0, u[1]],
+    )
+
+
+def test_what_is_no_model_is_told_where_it_is_given():
+    said = "^Rover is no model: it has no group, reduced_names, .*; need a maneuver_automaton.User"
+    doors = (
+        lambda: ma.Automaton.of_controls(Rover(), TRIMS),
+        lambda: ma.Automaton.of_grid(Rover(), [[0, 1], [0]]),
+        lambda: ma.Automaton.of_model(Rover(), {"speed": [0.0]}),
+        lambda: ma.Automaton(Rover(), CART.trims),
+    )
+    for door in doors:
+        with pytest.raises(ValueError, match=said):
+            door()
+
+
 def test_what_asks_for_terms_says_so():
     plan = ma.Plan([0, 0, 0], (CART["ahead"],), durations=[1.0])
     for asks in (retime, least_effort):
