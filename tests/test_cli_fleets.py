@@ -277,27 +277,6 @@ class TestFile:
         )  # fmt: skip
         assert (again.sum_s, again.value, again.gap) == (result.sum_s, result.value, result.gap)
 
-    @pytest.mark.parametrize(
-        ("content", "message"),
-        [
-            ("{}", ": is no plan.json, need an object with schema, status, primitives, trajectory"),
-            ('{"kind": "fleet"}',
-             ": is no plan.json, need an object with schema, status, vehicles"),
-            ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": []}',
-             ": vehicles: got [], need an object"),
-            ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": {"a": 3}}',
-             ": vehicles.a: got 3, need an object"),
-            ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": {"a": {"status": '
-             '"found"}}}', ": vehicles.a.schema: is missing, need a whole number"),
-        ],
-    )  # fmt: skip
-    def test_damaged_files(self, tmp_path, content, message):
-        path = tmp_path / "plan.json"
-        path.write_text(content)
-        with pytest.raises(InvalidScenario) as error:
-            load_plan(path, vehicle="a") if "kind" in content else load_plan(path)
-        assert str(error.value) == f"{path}{message}"
-
     def test_which_vehicle(self, result, tmp_path):
         path = tmp_path / "plan.json"
         save_fleet(result, path)

@@ -174,29 +174,6 @@ class TestResume:
             assert one == other
         assert rest["cost"] == whole["cost"]
 
-    @pytest.mark.parametrize(
-        ("make", "message"),
-        [
-            (lambda path: None, "old.json: no such file"),
-            (lambda path: path.write_text("{"), "old.json:1: not valid JSON: Expecting property"),
-            (lambda path: path.write_text("{}"), "old.json: is no closed_loop.json, need"),
-            (lambda path: path.mkdir(), "old.json: is a folder, need a closed_loop.json"),
-        ],
-    )
-    def test_from_no_log(self, folder, capsys, make, message):
-        make(Path("old.json"))
-        assert run(["mpc", "x.yaml", "--resume", "old.json", *QUICK]) == 2
-        assert capsys.readouterr().err.startswith(message)
-
-    def test_from_a_log_of_another_library(self, folder, capsys):
-        run(["mpc", "x.yaml", *QUICK])
-        Path("x.yaml").write_text(LOOP.replace("control: [1.0, 0.0]", "control: [0.5, 0.0]"))
-        assert run(["mpc", "x.yaml", "--resume", "out/closed_loop.json", *QUICK]) == 2
-        assert capsys.readouterr().err == (
-            f"{Path('out/closed_loop.json')}: automaton_hash: this loop was planned with another "
-            "library\n"
-        )
-
     def test_from_a_log_towards_a_goal_that_is_not_there(self, folder, capsys):
         run(["mpc", "x.yaml", "--steps", "2", *QUICK])
         capsys.readouterr()

@@ -37,6 +37,7 @@ from maneuver_automaton.formats.entries import (
     Known,
     Number,
     Numbers,
+    Positive,
     Whole,
     entry,
     made,
@@ -166,7 +167,7 @@ class LoopDocument(DocumentHead):
     reached: Flag
     cost: NotRequired[Annotated[Number, says("accumulated over the steps applied")]]
     duration_s: NotRequired[Number]
-    step_s: Number
+    step_s: Positive
     steps_bound: NotRequired[Annotated[Whole | None, says("steps are proven to suffice")]]
     audit: NotRequired[PiecesEntry]
     min_clearance_m: NotRequired[Known]

@@ -45,6 +45,7 @@ from maneuver_automaton.formats.entries import (
     Known,
     Number,
     Numbers,
+    Positive,
     Whole,
     entry,
     made,
@@ -145,7 +146,7 @@ class FleetLoopDocument(DocumentHead):
     reached: NotRequired[Flag]
     cost: Annotated[Number, says("of all that was driven")]
     duration_s: NotRequired[Number]
-    step_s: Number
+    step_s: Positive
     sum_s: NotRequired[Number]
     last_s: NotRequired[Number]
     clearance_m: NotRequired[ClearanceEntry]
