@@ -21,19 +21,30 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
 import maneuver_automaton as ma
-from benchmarks.audits import BODY, CAR, beside, scene
 from benchmarks.tables import show
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.automaton import Plan
-from maneuver_automaton.collision import Polygon
+from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.collision import Obstacle, Polygon
+from maneuver_automaton.models import Car
 from maneuver_automaton.planning.checking import load_checks, what_is_hit
 from maneuver_automaton.planning.result import Workspace
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from tests.inertia import car_automaton
 from tests.scenes import moving_scene, room_queries
 
+CAR = Automaton.of_controls(
+    Car(wheelbase=2.8, max_steering=0.6),
+    {
+        f"{way} {side}": (speed, steering)
+        for way, speed in (("ahead", 1.0), ("back", -1.0))
+        for side, steering in (("left", 0.6), ("straight", 0.0), ("right", -0.6))
+    },
+)
+BODY = Polygon([[-0.95, -0.9], [3.75, -0.9], [3.75, 0.9], [-0.95, 0.9]])
+KEPT = 0.15  # [m] at least from every polygon
 SEEDS = 12  # of each kind
 EXPANSIONS = 2000  # of the searches, so that another checkout finds the same plans
 AWAY = (1e-6, 1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0)  # [m]
@@ -59,6 +70,33 @@ class Case:
             plan = replace(self.plan, start=start)
             problem = replace(self.problem, start=start, goals=(Goal(pose=plan.end),))
             yield Case(self.kind, f"{self.name}, {away:g} m away", problem, plan)
+
+
+def scene(seed: int, trims: int, polygons: int) -> tuple[Plan, list[Obstacle]]:
+    """A random word, and polygons beside where it leads, as near as 0.15 m."""
+    rng = np.random.default_rng([7, seed, trims, polygons])
+    word = [CAR.trims[k] for k in rng.integers(len(CAR.trims), size=trims)]
+    plan = Plan(np.zeros(3), word, durations=rng.uniform(0.3, 3.0, trims))
+    return plan, beside(plan, polygons, rng)
+
+
+def beside(plan: Plan, polygons: int, rng: np.random.Generator) -> list[Obstacle]:
+    """Polygons beside where a plan leads the body."""
+    poses = plan.sample(max_step_m=0.1, max_step_rad=0.02).pose
+    corners = np.vstack([BODY.corners, BODY.corners[:1]])
+    cosine, sine = np.cos(poses[:, 2, None]), np.sin(poses[:, 2, None])
+    x = poses[:, 0, None] + cosine * corners[:, 0] - sine * corners[:, 1]
+    y = poses[:, 1, None] + sine * corners[:, 0] + cosine * corners[:, 1]
+    swept = shapely.union_all(shapely.polygons(np.stack([x, y], axis=-1)))
+    low, high = np.array(swept.bounds[:2]) - 8.0, np.array(swept.bounds[2:]) + 8.0
+    obstacles: list[Obstacle] = []
+    while len(obstacles) < polygons:
+        angles = np.sort(rng.uniform(0.0, 2.0 * np.pi, rng.integers(3, 8)))
+        shape = rng.uniform(0.3, 1.5) * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        shape = shape + rng.uniform(low, high)
+        if shapely.Polygon(shape).area > 0.02 and swept.distance(shapely.Polygon(shape)) > KEPT:
+            obstacles.append(Obstacle(Polygon(shape)))
+    return obstacles
 
 
 def words() -> Iterator[Case]:

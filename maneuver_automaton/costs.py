@@ -117,6 +117,19 @@ def terms_of(cost: StageCost) -> Cost | None:
     return None if terms is None else terms()
 
 
+def check_cost(cost: StageCost) -> None:
+    """Refuse what cannot be a cost."""
+    what = type(cost).__name__
+    if type(cost).__hash__ is None:
+        raise ValueError(
+            f"cost: {what} has no hash; need a value that does not change, such as a frozen "
+            "dataclass"
+        )
+    for name in ("rates", "switching"):
+        if not callable(getattr(cost, name, None)):
+            raise ValueError(f"cost: {what} has no method {name}, need rates and switching")
+
+
 def prices_switches(cost: StageCost) -> bool:
     """Whether a switch of trims costs something by itself, or may: a user's own cost may."""
     terms = terms_of(cost)

@@ -26,7 +26,7 @@ from maneuver_automaton.collision import (
     as_footprint,
     as_obstacles,
 )
-from maneuver_automaton.costs import Cost, StageCost, prices_switches
+from maneuver_automaton.costs import Cost, StageCost, check_cost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations, group_of
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
 from maneuver_automaton.models.speeds import standing_price
@@ -311,11 +311,8 @@ class Problem:
         plain_numbers(self)
         dof = self.automaton.model.group.dof
         object.__setattr__(self, "start", _pose_of(self.start))
-        if type(self.cost).__hash__ is None:
-            raise ValueError(
-                f"cost: {type(self.cost).__name__} has no hash; need a value that does not change, "
-                "such as a frozen dataclass"
-            )
+        check_cost(self.cost)
+        _known_rates(self.automaton, self.cost)
         for name, kind in (("bounds", Bounds), ("horizon", Horizon), ("search", SearchSettings)):
             if not isinstance(value := getattr(self, name), kind):
                 raise ValueError(f"{name}: got {value!r:.60}, need {kind.__name__}(...)")
@@ -844,21 +841,28 @@ def moves(obstacle: AnyObstacle) -> bool:
 
 @kept_by_first
 def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim, float]]:
-    rates = cost.rates(automaton.controls, automaton.body_velocities)
-    return {
-        trim.name: (trim, rate) for trim, rate in zip(automaton.trims, rates.tolist(), strict=True)
-    }
+    rates = np.asarray(cost.rates(automaton.controls, automaton.body_velocities))
+    if rates.shape != (len(automaton),):
+        raise ValueError(
+            f"cost: the rates of {len(automaton)} trims have shape {rates.shape}, need "
+            f"({len(automaton)},)"
+        )
+    known = dict(zip(automaton.trim_names, rates.tolist(), strict=True))
+    wrong = next((name for name, rate in known.items() if not 0.0 <= rate < math.inf), None)
+    if wrong is not None:
+        raise ValueError(
+            f"cost: trim {wrong!r} costs {known[wrong]:g} per second, need a number of at least 0"
+        )
+    return {trim.name: (trim, known[trim.name]) for trim in automaton.trims}
 
 
 def _as_parts(
     model: Model, parts: Mapping[str, AnyShape | Sequence[AnyShape]]
 ) -> dict[str, tuple[Shape, ...]]:
-    known: tuple[str, ...] = getattr(model, "part_names", ())
+    known = ", ".join(model.part_names) or "nothing"
     for name in parts:
-        if name not in known:
-            raise ValueError(
-                f"parts: the {model.name} carries no {name!r}, only {', '.join(known) or 'nothing'}"
-            )
+        if name not in model.part_names:
+            raise ValueError(f"parts: the {model.name} carries no {name!r}, only {known}")
     return {name: as_footprint(shapes) for name, shapes in parts.items()}
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -221,29 +221,6 @@ def words_of(n_trims: int, length: int) -> Iterator[tuple[int, ...]]:
     for word in itertools.product(range(n_trims), repeat=length):
         if all(a != b for a, b in itertools.pairwise(word)):
             yield word
-
-
-def brute_force(
-    twists: Array,
-    rates: Array,
-    goal: Array,
-    *,
-    lengths: Sequence[int],
-    total: float | None = None,
-    at_most: float | None = None,
-    starts: int = 30,
-    longest: float = 7.0,
-    rng: np.random.Generator,
-) -> list[tuple[tuple[int, ...], Array, float]]:
-    """(word, times, cost) of every local optimum of every word of the given lengths."""
-    found = []
-    for length in lengths:
-        for word in words_of(len(twists), length):
-            rows = list(word)
-            one = Word(twists[rows], rates[rows], goal, total=total, at_most=at_most)
-            optima = one.local_optima(starts=starts, longest=longest, rng=rng)
-            found.extend((word, times, one.cost(times)) for times in optima)
-    return sorted(found, key=lambda row: row[2])
 
 
 def steering_roots(

@@ -233,71 +233,6 @@ class TestFolder:
         assert result_file("out/c")["status"] == "found"
         assert not Path("out/a").exists()
 
-    def test_nothing_in_it(self, folder, capsys):
-        Path("none").mkdir()
-        assert run(["plan", "none"]) == 2
-        message = (
-            "none: holds no file that states a problem, need a scenario (.yaml, .yml) or another "
-            "format that is read\n"
-        )
-        assert capsys.readouterr().err == message
-
-    def test_two_files_of_one_name(self, folder, capsys):
-        Path("many").mkdir()
-        for name in ("a.yaml", "a.yml"):
-            Path("many", name).write_text(SCENARIO)
-        assert run(["plan", "many"]) == 2
-        message = f"{Path('many/a.yml')}: has the same name as a.yaml, need another one\n"
-        assert capsys.readouterr().err == message
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["plan", "x.yaml", "--time-limit", "0"],
-         "--time-limit: got 0.0, need a positive number of seconds"),
-        (["plan", "x.yaml", "--time-limit", "nan"],
-         "--time-limit: got nan, need a positive number of seconds"),
-        (["plan", "x.yaml", "--with", "x.yaml"],
-         "--with: serves formats that state a part of a problem, but x.yaml is a scenario, which "
-         "states all of it"),
-        (["plan", "x.yaml", "--case", "1"],
-         "--case: got 1, but x.yaml holds one problem, need 0 or no case"),
-        (["plan", "case.csv"], "case.csv: no such file"),
-        (["plan", "road.xml"], "road.xml: no such file"),
-        (["mpc", "x.yaml", "--steps", "3", "--seed", "1"],
-         "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans"),
-        (["plan", "x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
-        (["convert", "x.yaml", "x.csv"],
-         "x.csv: is in no format that this version writes, need a scenario or a Nav2 map (.yaml, "
-         ".yml), a MovingAI map (.map), or primitives (.json, .nav2.json, .mprim, .xml)"),
-        (["convert", "x.yaml", "x.map"],
-         "x.yaml: states no occupancy map, or several; need one"),
-        (["plot", "plan.json"], "plan.json: no such file"),
-        (["check", "nowhere.yaml"], "nowhere.yaml: no such file"),
-        (["automaton", "show", "nowhere.json"], "nowhere.json: no such file"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_done_is_said_in_one_line(folder, capsys, arguments, message):
-    assert run(arguments) == 2
-    printed = capsys.readouterr()
-    assert printed.err == f"{message}\n"
-    assert printed.out == ""
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [[], ["plam"], ["plan"], ["plan", "x.yaml", "--jobs", "0"], ["plan", "x.yaml", "--bad"]],
-)
-def test_wrong_usage_is_exit_code_2(folder, arguments):
-    assert run(arguments) == 2
-
-
-@pytest.mark.parametrize("command", [[], ["plan"], ["mpc"], ["automaton", "build"], ["schema"]])
-def test_help(capsys, command):
-    assert run([*command, "--help"]) == 0
-    assert "Usage" in capsys.readouterr().out
-
 
 class TestAutomaton:
     def test_build_show_draw(self, folder, capsys):
@@ -327,23 +262,6 @@ class TestAutomaton:
 
 
 class TestCheck:
-    def test_all_holds(self, folder, capsys):
-        assert run(["check", "x.yaml"]) == 0
-        printed = capsys.readouterr().out
-        for what in (
-            "symmetry: vector field",
-            "symmetry: flow",
-            "symmetry: stage cost",
-            "symmetry: start and goal",
-            "automaton: trims follow the model",
-            "automaton: connected",
-            "library: turn, move, turn",
-            "start: inside the bounds",
-            "goal: can be reached",
-        ):
-            assert what in printed
-        assert "NO" not in printed
-
     @pytest.mark.slow
     @pytest.mark.parametrize(
         "text", [AHEAD_ONLY, SCENARIO + "bounds_m: {x: [0.5, 5]}\n"], ids=["ahead", "bounds"]

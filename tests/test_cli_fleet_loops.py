@@ -125,12 +125,6 @@ class TestMpc:
         assert "broke a guarantee: " in printed
         assert "east and north touch at " in printed
 
-    @pytest.mark.parametrize("option", [["--seeds", "3"], ["--gap", "0.1"]])
-    def test_options_of_one_vehicle(self, folder, capsys, option):
-        assert run(["mpc", "x.yaml", *option]) == 2
-        said = f"{option[0]}: is for one vehicle, but x.yaml states several; leave it out\n"
-        assert capsys.readouterr().err == said
-
     def test_it_goes_on_from_its_file(self, folder, capsys):
         quietly = ["--quiet", "--no-plot"]
         assert run(["mpc", "x.yaml", *quietly, "--out", "half", "--steps", "4"]) == 1
@@ -147,12 +141,6 @@ class TestMpc:
         capsys.readouterr()
         assert run(["mpc", "x.yaml", "--resume", "nowhere.json"]) == 2
         assert capsys.readouterr().err == "nowhere.json: no such file\n"
-
-    def test_a_file_without_a_loop(self, folder, capsys):
-        Path("x.yaml").write_text(FLEET)
-        assert run(["mpc", "x.yaml"]) == 2
-        said = "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans\n"
-        assert capsys.readouterr().err == said
 
 
 @pytest.mark.parametrize(
@@ -219,33 +207,3 @@ class TestCheck:
         said = "out/closed_loop.json: source: there is no x.yaml, need --with and that file\n"
         assert capsys.readouterr().err == said
         assert run(["check", "out/closed_loop.json", "--with", "y.yaml"]) == 0
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda d: d["clearance_m"].update(between={}),
-        lambda d: d["vehicles"]["east"]["steps"][0].update(vehicle_pose=[1e300, 0, 0]),
-        lambda d: d["vehicles"]["east"]["steps"][-1].pop("vehicle_pose"),
-        lambda d: d.update(step_s=-1.0),
-        lambda d: d["vehicles"]["east"].update(steps=[]),
-        lambda d: d.update(vehicles=3),
-    ],
-)
-def test_a_damaged_file_is_told_in_one_line(driven, capsys, change):
-    change(driven)
-    Path("out/closed_loop.json").write_text(json.dumps(driven))
-    assert run(["check", "out/closed_loop.json"]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("out/closed_loop.json: ")
-    assert said.count("\n") == 1
-    assert "internal error" not in said
-
-
-class TestPlot:
-    def test_a_damaged_file(self, driven, capsys):
-        driven["vehicles"]["east"]["steps"][0].pop("plan")
-        Path("out/closed_loop.json").write_text(json.dumps(driven))
-        assert run(["plot", "out/closed_loop.json"]) == 2
-        said = "out/closed_loop.json: vehicles.east.steps[0].plan: is missing, need a list\n"
-        assert capsys.readouterr().err == said

@@ -108,22 +108,6 @@ class TestPlan:
         assert found["gap"] is None
         assert list(load_plans("out/plan.json")) == ["east"]
 
-    @pytest.mark.parametrize(
-        ("options", "message"),
-        [
-            (["--alternatives", "2"], "--alternatives: is for one vehicle, but x.yaml states "
-             "several; leave it out"),
-            (["--gap", "0.1"], "--gap: is for one vehicle, but x.yaml states several; leave it "
-             "out"),
-            (["--case", "1"], "--case: got 1, but x.yaml holds one problem, need 0 or no case"),
-            (["--with", "x.yaml"], "--with: serves formats that state a part of a problem, but "
-             "x.yaml is a scenario, which states all of it"),
-        ],
-    )  # fmt: skip
-    def test_options_that_do_not_go_with_it(self, folder, capsys, options, message):
-        assert run(["plan", "x.yaml", *options]) == 2
-        assert capsys.readouterr().err == message + "\n"
-
     def test_interrupted_before_there_was_a_plan(self, folder, capsys, monkeypatch):
         from maneuver_automaton import _interrupts
         from maneuver_automaton.cli import fleets
@@ -260,11 +244,6 @@ class TestConvert:
             assert a.start.tolist() == b.start.tolist()
             assert a.automaton.controls.tolist() == b.automaton.controls.tolist()
 
-    def test_other_commands_need_one_vehicle(self, folder, capsys):
-        assert run(["automaton", "show", "x.yaml"]) == 2
-        said = "x.yaml: states several vehicles, which only plan, mpc, check and convert know\n"
-        assert capsys.readouterr().err == said
-
 
 @pytest.fixture(scope="module")
 def result():
@@ -297,27 +276,6 @@ class TestFile:
             result.status, result.closest, result.order
         )  # fmt: skip
         assert (again.sum_s, again.value, again.gap) == (result.sum_s, result.value, result.gap)
-
-    @pytest.mark.parametrize(
-        ("content", "message"),
-        [
-            ("{}", ": is no plan.json, need an object with schema, status, primitives, trajectory"),
-            ('{"kind": "fleet"}',
-             ": is no plan.json, need an object with schema, status, vehicles"),
-            ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": []}',
-             ": vehicles: got [], need an object"),
-            ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": {"a": 3}}',
-             ": vehicles.a: got 3, need an object"),
-            ('{"kind": "fleet", "schema": 1, "status": "found", "vehicles": {"a": {"status": '
-             '"found"}}}', ": vehicles.a.schema: is missing, need a whole number"),
-        ],
-    )  # fmt: skip
-    def test_damaged_files(self, tmp_path, content, message):
-        path = tmp_path / "plan.json"
-        path.write_text(content)
-        with pytest.raises(InvalidScenario) as error:
-            load_plan(path, vehicle="a") if "kind" in content else load_plan(path)
-        assert str(error.value) == f"{path}{message}"
 
     def test_which_vehicle(self, result, tmp_path):
         path = tmp_path / "plan.json"

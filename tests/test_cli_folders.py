@@ -117,17 +117,3 @@ def test_a_wrong_address_is_told(folder, monkeypatch, capsys, command):
     assert capsys.readouterr().err == (
         "--dask: got 'nowhere', need an address such as tcp://host:8786, or local\n"
     )
-
-
-@pytest.mark.parametrize(
-    ("argv", "said"),
-    [
-        (["plan", "many/a.yaml", "--dask", "local"],
-         "--dask: many/a.yaml is planned in one process, need a folder, or several vehicles"),
-        (["mpc", "many", "--resume", "log.json"],
-         "--resume: goes on with one loop, and a folder has many; need a file"),
-    ],
-)  # fmt: skip
-def test_options_of_files_and_folders(folder, capsys, argv, said):
-    assert run(argv) == 2
-    assert capsys.readouterr().err == f"{said}\n"

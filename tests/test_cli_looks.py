@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
 from PIL import Image
 
 from maneuver_automaton.cli.app import run
@@ -37,17 +36,3 @@ def test_a_picture_carries_the_name_of_its_scenario_unless_told_otherwise(tmp_pa
     for more in ([], ["--title", "A loop"], ["--style", "paper"]):
         assert run([*loop, *more]) == 0
     assert [look.title for look in looks] == ["Parallel parking in closed loop", "A loop", ""]
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--size", "wide"], "--size: got 'wide', need WIDTH or WIDTHxHEIGHT in inches"),
-        (["--size", "0x3"], "--size: got 0.0 in, need from 2.5 to 40 in"),
-        (["--style", "poster"], "--style: got 'poster', need one of screen, paper"),
-    ],
-)
-@pytest.mark.parametrize("command", [["plan"], ["mpc"], ["plot"], ["automaton", "draw"]])
-def test_a_look_that_cannot_be_is_bad_input(command, options, said, capsys):
-    assert run([*command, str(SCENARIOS / "parking_loop.yaml"), *options]) == 2
-    assert said in capsys.readouterr().err

@@ -188,8 +188,7 @@ def test_a_folder_is_planned_with_it(folder):
         ("test_lacking:BOAT", "--model: the module 'test_lacking' cannot be imported: "
          "ModuleNotFoundError: No module named 'test_nowhere'"),
         ("test_boats:BOTA", "--model: the module 'test_boats' has no 'BOTA'; did you mean 'BOAT'?"),
-        ("test_boats:NUMBER", "--model: test_boats:NUMBER is no model, it is of the type int and "
-         "has no name, group, "),
+        ("test_boats:NUMBER", "--model: test_boats:NUMBER: int is no model: it has no name, "),
         ("test_boats:needs", "--model: test_boats:needs does not fit: it cannot be called without "
          "parameters (missing a required argument: 'mass')"),
         ("test_boats:fails", "--model: test_boats:fails raises OSError: no water"),

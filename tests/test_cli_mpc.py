@@ -174,29 +174,6 @@ class TestResume:
             assert one == other
         assert rest["cost"] == whole["cost"]
 
-    @pytest.mark.parametrize(
-        ("make", "message"),
-        [
-            (lambda path: None, "old.json: no such file"),
-            (lambda path: path.write_text("{"), "old.json:1: not valid JSON: Expecting property"),
-            (lambda path: path.write_text("{}"), "old.json: is no closed_loop.json, need"),
-            (lambda path: path.mkdir(), "old.json: is a folder, need a closed_loop.json"),
-        ],
-    )
-    def test_from_no_log(self, folder, capsys, make, message):
-        make(Path("old.json"))
-        assert run(["mpc", "x.yaml", "--resume", "old.json", *QUICK]) == 2
-        assert capsys.readouterr().err.startswith(message)
-
-    def test_from_a_log_of_another_library(self, folder, capsys):
-        run(["mpc", "x.yaml", *QUICK])
-        Path("x.yaml").write_text(LOOP.replace("control: [1.0, 0.0]", "control: [0.5, 0.0]"))
-        assert run(["mpc", "x.yaml", "--resume", "out/closed_loop.json", *QUICK]) == 2
-        assert capsys.readouterr().err == (
-            f"{Path('out/closed_loop.json')}: automaton_hash: this loop was planned with another "
-            "library\n"
-        )
-
     def test_from_a_log_towards_a_goal_that_is_not_there(self, folder, capsys):
         run(["mpc", "x.yaml", "--steps", "2", *QUICK])
         capsys.readouterr()
@@ -222,68 +199,7 @@ class TestFolder:
         assert "no_plan" in lines[1]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (
-            SCENARIO,
-            "x.yaml: receding_horizon: missing, need {step_s: ...}, the time between two plans",
-        ),
-        (
-            LOOP.replace("time_s: free", "time_s: 8.0").replace("step_s: 0.5", "step_s: 9"),
-            "x.yaml: receding_horizon: step is 9 s, need at most the horizon, 8 s",
-        ),
-        (
-            LOOP.replace("step_s: 0.5", "step_s: 0.5, retimed: true"),
-            "x.yaml: receding_horizon: retimed plans need a fixed horizon and a cost with effort",
-        ),
-        (
-            LOOP.replace("step_s: 0.5", "step_s: 0.5, disturbance: {twist_scale: [1, 1, 1, 1]}"),
-            "x.yaml: receding_horizon: disturbance: twist_scale: got shape (4,), need 3 "
-            "components last",
-        ),
-    ],
-)
-def test_what_does_not_fit_is_said_in_one_line(folder, capsys, text, message):
-    Path("x.yaml").write_text(text)
-    assert run(["mpc", "x.yaml", *QUICK]) == 2
-    printed = capsys.readouterr()
-    assert printed.err == f"{message}\n"
-    assert printed.out == ""
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (["nowhere.yaml"], "nowhere.yaml: no such file"),
-        (["x.yaml", "--out", "x.yaml"], "x.yaml: cannot be written: File exists"),
-        (["x.yaml", "--time-limit", "0"], "--time-limit: got 0.0, need a positive number of "
-         "seconds"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_done_is_said_in_one_line(folder, capsys, options, message):
-    assert run(["mpc", *options]) == 2
-    assert capsys.readouterr().err == f"{message}\n"
-
-
-@pytest.mark.parametrize(
-    "options",
-    [[], ["--steps", "0"], ["--seed", "-1"], ["--seeds", "0"], ["--jobs", "0"], ["--stpes", "3"]],
-)
-def test_wrong_usage_is_exit_code_2(folder, options):
-    assert run(["mpc", *(["x.yaml"] if options else []), *options]) == 2
-
-
 def test_a_tiny_budget_still_arrives(folder):
     assert run(["mpc", "x.yaml", "--time-limit", "1e-9", *QUICK]) == 0
     kinds = {one["guarantee"] for one in log()["broken_guarantees"]}
     assert kinds <= {"time budget"}
-
-
-def test_a_closed_loop_has_no_alternatives(folder, capsys):
-    assert run(["mpc", "x.yaml", "--alternatives", "2"]) == 2
-    assert capsys.readouterr().err == (
-        "--alternatives: got 2, but a closed loop keeps one plan a step; leave it out, or ask plan "
-        "for them\n"
-    )
-    assert not Path("out").exists()

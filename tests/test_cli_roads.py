@@ -89,23 +89,3 @@ def test_folders_hold_scenarios_and_other_xml(folder):
     Path("many/primitives.xml").write_text("<Trajectories></Trajectories>")
     assert run(["plan", "many", *QUICK]) == 0
     assert Path("out/road/plan.json").is_file()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["mpc", "road.xml", "--seeds", "2"], "--seeds: drives on roads have no such option"),
-        (["plan", "nowhere.xml"], "nowhere.xml: no such file"),
-        (["check", "road.xml"], "road.xml: is a drive on roads, which only plan and mpc know"),
-        (["mpc", "road.xml", "--case", "3"], "--case: got 3, but road.xml holds one problem"),
-        (["plan", "road.xml", "--with", "unicycle.yaml"],
-         "--with: unicycle.yaml: vehicle: got the model unicycle, need second_order_car on roads"),
-    ],
-)  # fmt: skip
-def test_bad_input_is_told_in_one_line(folder, capsys, arguments, said):
-    Path("unicycle.yaml").write_text(
-        "schema: 1\nvehicle: {model: unicycle}\nautomaton: {preset: table2}\n"
-        "start: {pose: [0, 1, 0]}\ngoal: {pose: [0, 0, 0]}\n"
-    )
-    assert run(arguments) == 2
-    assert capsys.readouterr().err.startswith(said)

@@ -11,7 +11,7 @@ from maneuver_automaton.collision import Box, Disc, Motion, OccupancyMap, Polygo
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.primitives import Trim
-from maneuver_automaton.primitives.closed_form import strokes
+from maneuver_automaton.primitives.closed_form import from_rest
 from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.problem import Goal, Horizon
 from maneuver_automaton.receding_horizon import simulate
@@ -148,4 +148,4 @@ def test_a_stroke_that_is_sampled_without_end_is_refused():
     )
     rest = Trim(name="rest", body_velocity=np.zeros(3), control=np.zeros(2), reduced_state=[0, 0])
     with pytest.raises(ValueError, match=r"stroke: got 1e[+]15, need at most 10000 in size"):
-        strokes(car, [rest], [1e15])
+        from_rest(car, [rest], [1e15], "speed")

@@ -6,6 +6,7 @@ told in one line, with the method that would say it.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,8 @@ import pytest
 import maneuver_automaton as ma
 from maneuver_automaton.planning.polished_price import polished_price
 from maneuver_automaton.planning.polishing import NO_TERMS
+from maneuver_automaton.refinement.retiming import retime
+from maneuver_automaton.refinement.shooting import least_effort
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -69,6 +72,66 @@ def test_words_do():
     asked = {name: ma.plan(problem(cost, **free)) for name, cost in COSTS.items()}
     assert len({round(one.cost, 9) for one in asked.values()}) == 1
     assert asked["stated"].bound.kind == asked["built in"].bound.kind == "exhaustive"
+
+
+class Scalar(Plain):
+    def rates(self, controls, body_velocities):
+        return 1.0
+
+
+class Negative(Plain):
+    def rates(self, controls, body_velocities):
+        return -body_velocities[:, 0]
+
+
+class Unhashed(Plain):
+    __hash__ = None
+
+
+@pytest.mark.parametrize(
+    ("cost", "said"),
+    [
+        (5.0, "cost: float has no method rates, need rates and switching"),
+        (Unhashed(), "cost: Unhashed has no hash; need a value that does not change"),
+        (Scalar(), "cost: the rates of 5 trims have shape (), need (5,)"),
+        (Negative(), "cost: trim 'ahead' costs -1 per second, need a number of at least 0"),
+    ],
+)
+def test_what_is_no_cost_is_told_where_it_is_given(cost, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        problem(cost)
+
+
+class Rover:
+    """No `UserModel`, and little of what one has."""
+
+    name, control_names, velocity = (
+        "rover",
+        ("speed", "turn rate"),
+        lambda self, z, u: [u[0], 0, u[1]],
+    )
+
+
+def test_what_is_no_model_is_told_where_it_is_given():
+    said = "^Rover is no model: it has no group, reduced_names, .*; need a maneuver_automaton.User"
+    doors = (
+        lambda: ma.Automaton.of_controls(Rover(), TRIMS),
+        lambda: ma.Automaton.of_grid(Rover(), [[0, 1], [0]]),
+        lambda: ma.Automaton.of_model(Rover(), {"speed": [0.0]}),
+        lambda: ma.Automaton(Rover(), CART.trims),
+    )
+    for door in doors:
+        with pytest.raises(ValueError, match=said):
+            door()
+
+
+def test_what_asks_for_terms_says_so():
+    plan = ma.Plan([0, 0, 0], (CART["ahead"],), durations=[1.0])
+    for asks in (retime, least_effort):
+        with pytest.raises(ValueError, match=r"terms\(\)"):
+            asks(plan, ma.Unicycle(), cost=Plain())
+    with pytest.raises(ValueError, match="prices of switch"):
+        ma.design_library(CART, cost=Plain())
 
 
 @pytest.mark.slow

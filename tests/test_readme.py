@@ -254,6 +254,17 @@ def test_every_link_leads_somewhere(page):
         assert not anchor or anchor in anchors(there), target
 
 
+def test_what_inside_names_is_where_it_says():
+    """Every file, and every function or class named behind one."""
+    text = re.sub(r"^```.*?^```", "", TEXTS[DOCS / "inside.md"], flags=re.DOTALL | re.MULTILINE)
+    files = {path: f"/{path.relative_to(ROOT).as_posix()}" for path in ROOT.glob("*/**/*.*")}
+    for name, what in re.findall(r"`([\w/]+\.(?:py|json))`(?:, `(?:\w+\.)?(\w+)`)?", text):
+        named = [path for path, full in files.items() if full.endswith(f"/{name}")]
+        assert named, name
+        kind = rf"\b(?:def|class) {what}\b"
+        assert not what or any(re.search(kind, path.read_text()) for path in named), (name, what)
+
+
 def in_navigation(part: Any) -> set[str]:
     """The pages that the navigation of the site lists."""
     if isinstance(part, str):

@@ -18,7 +18,6 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import LatticeBody
 from maneuver_automaton.problem import Problem
-from maneuver_automaton.search.lattice_library import path_length
 
 REFERENCE_S = 0.2  # for the plan of a reference to a pose
 
@@ -67,19 +66,19 @@ class StretchFactor:
     pairs: int  # poses that were compared
 
 
-def settings_for(automaton: Automaton, *, measure: str = "time") -> CoverageSettings:
+def settings_for(automaton: Automaton) -> CoverageSettings:
     """Settings to the size of a library: a disc of twice its longest maneuver.
 
-    Words may cost four of the costliest maneuvers, or eight edges of half a second or metre.
+    Words may take as long as four of the longest maneuvers, or eight edges of half a second.
     """
-    spans = [m.duration if measure == "time" else path_length(m) for m in automaton.maneuvers]
+    spans = [one.duration for one in automaton.maneuvers]
     distances = [float(np.linalg.norm(m.displacement[:2])) for m in automaton.maneuvers]
     edge_cost = 0.5
     most = max(4.0 * max(spans, default=0.0), 8.0 * edge_cost)
     radius = 2.0 * max(distances, default=0.0) or 2.0
     body = automaton.model
     cell = body.resolution / 4.0 if isinstance(body, LatticeBody) else radius / 100.0
-    reach = ReachSettings(measure=measure, most=most, edge_cost=edge_cost, same_m=cell)
+    reach = ReachSettings(most=most, edge_cost=edge_cost, same_m=cell)
     return CoverageSettings(radius=radius, reach=reach)
 
 

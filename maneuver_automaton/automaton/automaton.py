@@ -18,6 +18,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Drawn
 from maneuver_automaton.errors import InvalidAutomaton, UnknownTrim
 from maneuver_automaton.models import Model, OnLattice, OnlyTranslated, in_world
+from maneuver_automaton.models.model import check_model
 from maneuver_automaton.models.speeds import (
     is_too_sharp,
     lateral_acceleration,
@@ -65,6 +66,7 @@ class Automaton(Drawn):
         if not self.trims:
             raise InvalidAutomaton("automaton: got no trim, need at least one")
         _check_names(self.trim_names)
+        check_model(self.model)
         object.__setattr__(self, "model", in_world(self.model))
         if self.translated is not None:  # what is along the world's axes gets headings
             trims = tuple(trim_in_world(self.translated, trim) for trim in self.trims)
@@ -130,6 +132,7 @@ class Automaton(Drawn):
         ValueError
             If a control has the wrong length, is not finite, or exceeds the model's limits.
         """
+        check_model(model)
         n_controls = len(model.control_names)
         if model.reduced_names:
             raise InvalidAutomaton(
@@ -239,6 +242,7 @@ class Automaton(Drawn):
         >>> Automaton.of_grid(Unicycle(), [[0, 1], [-1, 0, 1]]).trim_names[:2]
         ('speed 0, turn_rate -1', 'speed 0, turn_rate 0')
         """
+        check_model(model)
         if len(axes) != len(model.control_names):
             raise ValueError(
                 f"grid: got {len(axes)} axes, need {len(model.control_names)} for the controls "

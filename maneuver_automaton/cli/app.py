@@ -123,14 +123,14 @@ class OptionEntry(NamedTuple):
     def parameter(self, name: str) -> inspect.Parameter:
         """What Typer makes an argument or an option of."""
         make: Callable[..., Any] = typer.Option if self.flags else typer.Argument
-        told = {"metavar": self.stands or None, "help": self.said or None, **self.more}
+        keywords = {"metavar": self.stands or None, "help": self.said or None, **self.more}
         kind = KINDS.get(self.stands, str)
         return inspect.Parameter(
             name,
             inspect.Parameter.POSITIONAL_OR_KEYWORD,
             default=self.default,
             annotation=Annotated[
-                kind | None if self.default is None else kind, make(*self.flags.split(), **told)
+                kind | None if self.default is None else kind, make(*self.flags.split(), **keywords)
             ],
         )
 

@@ -98,7 +98,7 @@ def _symmetry(problem: Problem) -> Iterator[Finding]:
         )
     if constraint := _constraint(problem.bounds, model):
         report = analysis.check_constraint(constraint, region=region)
-        yield _told("bounds", report, hint="they do not move with the problem")
+        yield _of_given("bounds", report, hint="they do not move with the problem")
     stated = np.isin(problem.automaton.model.group.coordinates, model.group.coordinates)
     start, goal = problem.start[stated], problem.goals[0].pose[stated]
 
@@ -106,7 +106,7 @@ def _symmetry(problem: Problem) -> Iterator[Finding]:
         return np.concatenate([first[: start.size] - start, last[: goal.size] - goal])
 
     report = analysis.check_boundary_condition(ends, region=region)
-    yield _told(
+    yield _of_given(
         "start and goal",
         report,
         hint="fixed ends never are; moving both gives an equivalent problem",
@@ -122,7 +122,7 @@ def _found(what: str, report: SymmetryReport) -> Finding:
     )
 
 
-def _told(what: str, report: SymmetryReport, *, hint: str) -> Finding:
+def _of_given(what: str, report: SymmetryReport, *, hint: str) -> Finding:
     if report.holds:
         return _found(what, report)
     return Finding(

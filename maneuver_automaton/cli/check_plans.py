@@ -23,7 +23,7 @@ from maneuver_automaton.fleet import (
     verify_fleet,
 )
 from maneuver_automaton.fleet.driven import FINE
-from maneuver_automaton.formats.documents import kind_of, parsed, told_of
+from maneuver_automaton.formats.documents import errors_at, kind_of, parsed
 from maneuver_automaton.formats.plan_json import load_plan, load_plans
 from maneuver_automaton.planning.on_the_way import Passed, going_on, still_ahead
 from maneuver_automaton.planning.verdict import Verdict, verify
@@ -200,18 +200,18 @@ def _on_the_way(loop: ClosedLoop) -> Iterator[Finding]:
     for piece in loop.driven:
         passed = going_on(problem, passed, piece)
     left = still_ahead(problem, passed)
-    told = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed if not one.stay_left)
+    named = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed if not one.stay_left)
     yield Finding(
         what="vehicle: on the way",
         holds=None if any(step.off_plan for step in loop.steps) else not (left and loop.reached),
-        words=f"passed {told or 'nothing'}" + (f", {len(left)} left" if left else ""),
+        words=f"passed {named or 'nothing'}" + (f", {len(left)} left" if left else ""),
     )
 
 
 def _loop(path: Path, document: Mapping[str, Any], log: FleetLog) -> list[Finding]:
     """What holds of what was driven: each vehicle alone, and every pair."""
     several = "vehicles" in document
-    with told_of(path):
+    with errors_at(path):
         with announced():
             verdict = verify_driven(log)
         rows = [

@@ -24,6 +24,7 @@ from maneuver_automaton.formats.commonroad import n_problems
 from maneuver_automaton.formats.libraries import read_primitives
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.kinds import KINDS
+from maneuver_automaton.models.model import check_model
 from maneuver_automaton.plotting.look import Look, size_of
 from maneuver_automaton.scenario import (
     FleetScenario,
@@ -158,12 +159,6 @@ def opened(path: Path, parts: Parts) -> exports.ResultFile:
     return file
 
 
-NEEDED = (  # of a model
-    *("name", "group", "control_names", "reduced_names", "control_limits", "reduced_limits"),
-    *("part_names", "velocity", "dynamics", "body_velocity", "reduced_dynamics", "part_poses"),
-)
-
-
 @functools.lru_cache(maxsize=8)
 def user_model(text: str) -> Model:
     """The model OBJECT, or what it makes, of MODULE, looked for in the current folder first."""
@@ -173,12 +168,10 @@ def user_model(text: str) -> Model:
     found = _object(_module(module_name), module_name, name)
     if inspect.isclass(found) or inspect.isroutine(found):
         found = _made(found, text)
-    missing = [key for key in NEEDED if not hasattr(found, key)]
-    if missing:
-        raise _wrong(
-            f"{text} is no model, it is of the type {type(found).__name__} and has no "
-            f"{', '.join(missing)}; need a maneuver_automaton.UserModel, or all that one has"
-        )
+    try:
+        check_model(found)
+    except ValueError as error:
+        raise _wrong(f"{text}: {error}") from error
     if found.name in KINDS:
         raise _wrong(
             f"{text} is called {found.name!r}, as a model of the package is; need another name"

@@ -60,7 +60,7 @@ class JobResult:
     file: str = ""  # the name of its document; empty: that of the command
 
     @functools.cached_property
-    def told(self) -> tuple[Fact, ...]:
+    def all_facts(self) -> tuple[Fact, ...]:
         """All that is said of it."""
         known = () if self.result is None else recording_of(self.result).facts
         return tuple({one.label: one for one in (*known, *self.facts)}.values())
@@ -71,13 +71,13 @@ class JobResult:
         if len(movers) == 1 and not movers[0].has_plan:
             return
         tables = [] if self.result is None else tables_of(self.result, *self.measured)
-        print_result(self.name, tables, (*self.told, Fact(label="written to", value=folder)))
+        print_result(self.name, tables, (*self.all_facts, Fact(label="written to", value=folder)))
         for line in self.remarks:
             console().print(f"  {line}", soft_wrap=True)
 
     def row(self, path: Path, *, known: bool) -> Row:
         """For the table of a folder; with its numbers, if they are `known`."""
-        found = {one.label: one.value for one in self.told if not isinstance(one.value, str)}
+        found = {one.label: one.value for one in self.all_facts if not isinstance(one.value, str)}
         numbers = found if known else {}
         near = [numbers[one] for one in NEAR if one in numbers]
         return Row(

@@ -24,7 +24,7 @@ from maneuver_automaton.cli.terminal import print_written
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.exports.earth import degrees_of
 from maneuver_automaton.formats.closed_loop_json import driven_document
-from maneuver_automaton.formats.documents import told_of
+from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.plan_json import plan_of_document
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
@@ -139,10 +139,10 @@ def plot(
         raise InvalidScenario("--html: writes a page, and --animate an animation; need one of them")
     what = "animation" if animate else "page" if html else "picture"
     path = _picture_target(file, out, what)
-    with told_of(file):
+    with errors_at(file):
         result, name = _result_of(file, beside)
     make_folder(path.parent)
-    with writing(path), told_of(file):
+    with writing(path), errors_at(file):
         if isinstance(result, dict):
             _draw_motion(result, path, what, look)
         elif what == "page":

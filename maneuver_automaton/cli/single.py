@@ -32,7 +32,7 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
     """Plan the problem of a file."""
     budgets, quiet = job.options.budgets, job.options.quiet
     limit, shown = budgets.time_limit or scenario.time_limit_s, SoFar.of_gap(budgets.gap)
-    told = not quiet and has_terminal()
+    live = not quiet and has_terminal()
     try:
         with waiting(f"planning, at most {limit:g} s", quiet=quiet, more=lambda: shown.text):
             result = planning.plan(
@@ -40,8 +40,8 @@ def planned(job: Job, scenario: Scenario) -> JobResult:
                 time_limit=limit,
                 alternatives=budgets.alternatives,
                 gap=budgets.gap,
-                watch=shown.watch if told else None,
-                on_better=shown.better if told else None,
+                watch=shown.watch if live else None,
+                on_better=shown.better if live else None,
                 leave=job.options.leave,
             )
     except KeyboardInterrupt:

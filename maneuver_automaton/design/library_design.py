@@ -14,7 +14,7 @@ from maneuver_automaton._arrays import Array, as_array, as_number, as_whole
 from maneuver_automaton._brief import brief
 from maneuver_automaton.analysis.coverage import poses_in_ball
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, StageCost, check_cost
 from maneuver_automaton.design.choice import Choice, best_choices, mixing_factors
 from maneuver_automaton.design.proof import SEED, WordsProof, proven_factor
 from maneuver_automaton.design.reeds_shepp import MOST_TRIMS
@@ -60,7 +60,7 @@ class DesignedLibrary:
 def design_library(
     candidates: Automaton,
     *,
-    cost: Cost | None = None,
+    cost: StageCost | None = None,
     within: float = 1.05,
     most: int = 24,
     max_trims: int | None = None,
@@ -95,7 +95,7 @@ def design_library(
     ----------
     candidates : Automaton
         All trims that the vehicle might be given: a grid of controls, say. Rest is left out.
-    cost : Cost
+    cost : StageCost
         What a plan costs; its length if left out. Prices per switch cannot be designed for.
     within : float
         The factor that is asked for, at least 1.
@@ -298,7 +298,7 @@ def _task_goals(tasks: ArrayLike | None) -> Array:
 
 
 def _check(
-    candidates: Automaton, cost: Cost, within: float, most: int, max_trims: int | None
+    candidates: Automaton, cost: StageCost, within: float, most: int, max_trims: int | None
 ) -> None:
     """Refuse what no design can take."""
     if not candidates.is_kinematic:
@@ -310,7 +310,8 @@ def _check(
         raise ValueError(
             f"design: got {len(candidates)} candidates, need at most {MOST_CANDIDATES}"
         )
-    if cost.switch or cost.direction_change:
+    check_cost(cost)
+    if cost.switching(candidates.body_velocities) > 0.0:
         raise ValueError(
             "design: prices of switch and direction_change belong to the scenario: the best of all "
             "words, which a design compares with, is known for prices per second and metre only"

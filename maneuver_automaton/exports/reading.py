@@ -15,7 +15,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.formats.closed_loop_json import load_closed_loop
 from maneuver_automaton.formats.commonroad import is_road
-from maneuver_automaton.formats.documents import checked, kind_of, parsed, told_of
+from maneuver_automaton.formats.documents import checked, errors_at, kind_of, parsed
 from maneuver_automaton.formats.fleet_json import load_fleet
 from maneuver_automaton.formats.fleet_loop_json import load_fleet_loop
 from maneuver_automaton.formats.plan_json import (
@@ -248,7 +248,7 @@ def _driven_on_roads(file: ResultFile) -> RoadFleetResult:
 def _plan_on_road(path: Path, document: Mapping[str, Any], road: RoadScenario) -> Plan | None:
     """The plan of one vehicle, or what it drove; None if it has none."""
     plan: Plan | None = None
-    with told_of(path):
+    with errors_at(path):
         if "steps" in document:
             plan = _road_drive(document, road)
         elif document["status"] == "found":

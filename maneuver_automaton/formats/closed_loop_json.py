@@ -26,10 +26,10 @@ from maneuver_automaton.formats.documents import (
     DocumentHead,
     ModelEntry,
     document_of,
+    errors_at,
     library_entries,
     misstated,
     read_document,
-    told_of,
     write_document,
 )
 from maneuver_automaton.formats.entries import (
@@ -37,6 +37,7 @@ from maneuver_automaton.formats.entries import (
     Known,
     Number,
     Numbers,
+    Positive,
     Whole,
     entry,
     made,
@@ -166,7 +167,7 @@ class LoopDocument(DocumentHead):
     reached: Flag
     cost: NotRequired[Annotated[Number, says("accumulated over the steps applied")]]
     duration_s: NotRequired[Number]
-    step_s: Number
+    step_s: Positive
     steps_bound: NotRequired[Annotated[Whole | None, says("steps are proven to suffice")]]
     audit: NotRequired[PiecesEntry]
     min_clearance_m: NotRequired[Known]
@@ -247,7 +248,7 @@ def load_steps(path: Path | str, automaton: Automaton) -> tuple[tuple[Step, ...]
     if document.get("automaton_hash") != automaton_hash(automaton):
         raise InvalidScenario(f"{path}: automaton_hash: this loop was planned with another library")
     _check_rows(document["steps"], automaton, path)
-    with told_of(path):
+    with errors_at(path):
         steps = tuple(_step_of(row, automaton) for row in document["steps"][:-1])
     return steps, np.array([row["vehicle_pose"] for row in document["steps"]], dtype=np.float64)
 
@@ -289,7 +290,7 @@ def load_closed_loop(path: Path | str, problem: Problem) -> ClosedLoop:
         any(within(pose, goal) for goal in problem.goals) and not still_ahead(problem, before)
         for pose, before in zip(poses, passed, strict=True)
     ]
-    with told_of(path):
+    with errors_at(path):
         return made(
             ClosedLoop,
             document,
@@ -435,7 +436,7 @@ def statistics_to_dict(statistics: Statistics) -> StatisticsDocument:
 def load_statistics(path: Path | str) -> Statistics:
     """The statistics of a statistics.json; raises InvalidScenario."""
     document = read_document(path, "statistics")
-    with told_of(path):
+    with errors_at(path):
         return Statistics(outcomes=tuple(map(_outcome_of, document["loops"])))
 
 

@@ -218,7 +218,7 @@ def misstated(path: Path | str, where: tuple[str | int, ...], said: str) -> Inva
 
 
 @contextlib.contextmanager
-def told_of(place: object) -> Iterator[None]:
+def errors_at(place: object) -> Iterator[None]:
     """Name the file, or a place in it, where its values make no plan."""
     try:
         yield

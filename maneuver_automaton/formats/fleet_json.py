@@ -14,8 +14,8 @@ from maneuver_automaton.formats.documents import (
     ClosestEntry,
     DocumentHead,
     document_of,
+    errors_at,
     read_document,
-    told_of,
     write_document,
 )
 from maneuver_automaton.formats.entries import (
@@ -138,7 +138,7 @@ def load_fleet(path: Path | str, fleet: FleetProblem) -> FleetResult:
         name: result_of(stated[name], problem, place=f"{path}: vehicles.{name}")
         for name, problem in zip(fleet.names, fleet.problems, strict=True)
     }
-    with told_of(path):
+    with errors_at(path):
         return made(
             FleetResult,
             document,

@@ -37,7 +37,7 @@ from maneuver_automaton.formats.documents import (
     DocumentHead,
     ModelEntry,
     document_of,
-    told_of,
+    errors_at,
     vehicle_entry,
 )
 from maneuver_automaton.formats.entries import (
@@ -45,6 +45,7 @@ from maneuver_automaton.formats.entries import (
     Known,
     Number,
     Numbers,
+    Positive,
     Whole,
     entry,
     made,
@@ -145,7 +146,7 @@ class FleetLoopDocument(DocumentHead):
     reached: NotRequired[Flag]
     cost: Annotated[Number, says("of all that was driven")]
     duration_s: NotRequired[Number]
-    step_s: Number
+    step_s: Positive
     sum_s: NotRequired[Number]
     last_s: NotRequired[Number]
     clearance_m: NotRequired[ClearanceEntry]
@@ -304,9 +305,9 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
             )
     step_s, did, pieces = float(document["step_s"]), {}, {}
     for name, problem in problems.items():
-        with told_of(f"{path}: vehicles.{name}"):
+        with errors_at(f"{path}: vehicles.{name}"):
             did[name] = _did(stated[name]["steps"][:-1], problem.automaton)
-    with told_of(path):
+    with errors_at(path):
         steps = [_step_of(k, row, did) for k, row in enumerate(document["steps"][:-1])]
         for before, after in pairwise(steps):
             if not after.time > before.time:
@@ -315,12 +316,12 @@ def load_fleet_loop(path: Path | str, fleet: FleetProblem) -> FleetLog:
                     f"{before.time:g} s"
                 )
     for name, problem in problems.items():
-        with told_of(f"{path}: vehicles.{name}"):
+        with errors_at(f"{path}: vehicles.{name}"):
             pieces[name] = tuple(
                 _piece(steps[number], name, row, step_s, problem.automaton)
                 for number, (row, _, _) in did[name].items()
             )
-    with told_of(path):
+    with errors_at(path):
         closest = [made(Closest, one, ClosestEntry) for one in document["closest"]]
         return made(
             FleetLog,

@@ -25,11 +25,11 @@ from maneuver_automaton.formats.documents import (
     ModelEntry,
     checked,
     document_of,
+    errors_at,
     kind_of,
     library_entries,
     parsed,
     read_document,
-    told_of,
     write_document,
 )
 from maneuver_automaton.formats.entries import (
@@ -375,7 +375,7 @@ def load_plans(path: Path | str) -> dict[str, Plan]:
 
 def _plan_of_file(document: Any, place: str, model: Model | None = None) -> Plan:
     """The plan of a document at a place of a file; or InvalidScenario."""
-    with told_of(place):
+    with errors_at(place):
         if document["status"] != "found":
             raise InvalidScenario(f"{place}: holds no plan, its status is {document['status']!r}")
         return plan_of_document(document, model)
@@ -392,7 +392,7 @@ def result_of(document: Mapping[str, Any], problem: Problem, *, place: str) -> P
         raise InvalidScenario(f"{place}: automaton_hash: this was planned with another library")
     passage, bound = document.get("narrowest"), document.get("bound")
     same = ("cost", "lower_bound", "gap", "certificate", "clearance_m")
-    with told_of(place):
+    with errors_at(place):
         status = PlanStatus(document["status"])
         found = status is PlanStatus.FOUND
         others = (_alternative(one, problem) for one in document.get("alternatives") or ())

@@ -13,7 +13,7 @@ from pathlib import Path
 from maneuver_automaton._files import open_input
 from maneuver_automaton.collision import Box, Motion, Obstacle
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.documents import told_of
+from maneuver_automaton.formats.documents import errors_at
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import MAX_MAP_BYTES, finite, table_of
 
@@ -47,7 +47,7 @@ def read_poses(path: Path) -> tuple[Statement, ...]:
                 raise InvalidScenario(f"{at}: time_s: got {now[0]:g}, need more than {before[0]:g}")
             if now[4:] != before[4:]:
                 raise InvalidScenario(f"{at}: length_m, width_m: changed, need those before")
-    with told_of(path):
+    with errors_at(path):
         moving = tuple(
             Obstacle(
                 Box(own[0][0][4:]),

@@ -127,6 +127,22 @@ class OnlyTranslated(Model, Protocol):
         ...
 
 
+NEEDED = (  # of a model
+    *("name", "group", "control_names", "reduced_names", "control_limits", "reduced_limits"),
+    *("part_names", "velocity", "dynamics", "body_velocity", "reduced_dynamics", "part_poses"),
+)
+
+
+def check_model(model: object) -> None:
+    """Refuse what has not all that a `Model` has."""
+    missing = [name for name in NEEDED if not hasattr(model, name)]
+    if missing:
+        raise ValueError(
+            f"{type(model).__name__} is no model: it has no {', '.join(missing)}; need a "
+            "maneuver_automaton.UserModel, or all that one has"
+        )
+
+
 def as_stated(model: Model) -> Model:
     """The model as its author stated it, on the group that is its symmetry."""
     return model.stated if isinstance(model, OnlyTranslated) else model

@@ -104,13 +104,13 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
     for one in blocks:
         kind, count = one.kind, one.number
         taken = casadi.reshape(x[one.variables.ravel("F").tolist()], kind.size, count)
-        told = _told(casadi, p, one)
+        given = _given(casadi, p, one)
         if kind.is_priced:
-            price += casadi.sum2(kind.price.map(count)(taken, told))
+            price += casadi.sum2(kind.price.map(count)(taken, given))
         weights = casadi.reshape(of_g[first : first + kind.rows * count], kind.rows, count)
-        curve = kind.curve.map(count)(taken, told, casadi.repmat(of_f, 1, count), weights)
-        rows.append(casadi.vec(kind.value.map(count)(taken, told)))
-        entries.append(casadi.vec(kind.slope.map(count)(taken, told)))
+        curve = kind.curve.map(count)(taken, given, casadi.repmat(of_f, 1, count), weights)
+        rows.append(casadi.vec(kind.value.map(count)(taken, given)))
+        entries.append(casadi.vec(kind.slope.map(count)(taken, given)))
         curves.append(casadi.vec(curve))
         first += kind.rows * count
     g = casadi.vertcat(*rows)
@@ -127,7 +127,7 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
     return BlockProgram({"x": x, "p": p, "f": price, "g": g}, derivatives, _limits(blocks))
 
 
-def _told(casadi: Any, p: Any, one: Blocks) -> Any:
+def _given(casadi: Any, p: Any, one: Blocks) -> Any:
     """What is given to each block: numbers, or places among the parameters."""
     if one.given.dtype.kind == "i":
         return casadi.reshape(p[one.given.ravel("F").tolist()], one.kind.given, one.number)

@@ -47,8 +47,6 @@ STATUS = {
     "Solved_To_Acceptable_Level": SolveStatus.SOLVED,
     "Infeasible_Problem_Detected": SolveStatus.INFEASIBLE,
     "Maximum_Iterations_Exceeded": SolveStatus.OUT_OF_BUDGET,
-    "Maximum_CpuTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
-    "Maximum_WallTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
     "User_Requested_Stop": SolveStatus.OUT_OF_BUDGET,  # by what is asked between iterations
 }
 
@@ -59,20 +57,17 @@ class SolverSettings:
 
     tolerance: float = 1e-9  # of the scaled optimality conditions [-]
     max_iterations: int = 300
-    max_seconds: float | None = None  # [s]
     admitted_defect: float = 1e-7  # of defects and violations, computed again, in their units
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "max_iterations", "admitted_defect"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"solver: {name} must be positive, got {getattr(self, name)}")
-        if self.max_seconds is not None and not self.max_seconds > 0.0:
-            raise ValueError(f"solver: max_seconds must be positive, got {self.max_seconds} s")
 
 
 def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
     """Options of IPOPT."""
-    options = QUIET | {
+    return QUIET | {
         "ipopt.mu_init": MU_INIT,
         "ipopt.tol": settings.tolerance,
         "ipopt.constr_viol_tol": settings.tolerance,
@@ -80,9 +75,6 @@ def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
         "ipopt.max_iter": settings.max_iterations,
         "ipopt.bound_relax_factor": 0.0,  # limits are limits
     }
-    if settings.max_seconds is not None:
-        options["ipopt.max_wall_time"] = settings.max_seconds
-    return options
 
 
 @functools.cache

@@ -41,6 +41,7 @@ from maneuver_automaton.optimal_control.polish_program import (
 from maneuver_automaton.optimal_control.problem import Guess, RunningCost, TimeGrid, resampled
 from maneuver_automaton.optimal_control.scene import (
     DIGITS,
+    USUAL,
     MotionEnds,
     NodeOnTheWay,
     PartPose,
@@ -216,9 +217,9 @@ def _line_blocks(
         if elastic:
             variables.append(inside[interval][None])
         at = first + OF_CORNER * (places.body[number] + corner)
-        told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+        given = _parameters(line, at)
         kind = _corner_kind(pose, program.problem.n_states, program.dof, fixed, elastic)
-        blocks.append(Blocks(kind, np.vstack(variables), np.array(told)))
+        blocks.append(Blocks(kind, np.vstack(variables), np.array(given)))
     if not fixed:
         for moves in (False, True):
             which = (places.shift >= 0) == moves
@@ -227,13 +228,15 @@ def _line_blocks(
                 continue
             line = slot[parting.owner[pair]]
             at = first + OF_CORNER * (places.piece[pair] + corner)
-            told = [OF_LINE * line + k for k in range(OF_LINE)] + [at + k for k in range(OF_CORNER)]
+            given = [OF_LINE * line + k for k in range(OF_LINE)] + [
+                at + k for k in range(OF_CORNER)
+            ]
             variables = [angle[line], angle[line] + n_lines]
             if moves:
                 at = first + places.shift[pair] + OF_SHIFT * corner
-                told += [at + k for k in range(OF_SHIFT)]
+                given += [at + k for k in range(OF_SHIFT)]
                 variables.append(np.full(len(pair), program.size - 1))
-            blocks.append(Blocks(_piece_kind(moves), np.vstack(variables), np.array(told)))
+            blocks.append(Blocks(_piece_kind(moves), np.vstack(variables), np.array(given)))
     return blocks
 
 
@@ -437,7 +440,7 @@ def polish(
     guess: Guess,
     *,
     stage_cost: RunningCost | None = None,
-    settings: PolishSettings | None = None,
+    settings: PolishSettings = USUAL,
     fixed_planes: bool = False,
     elastic: bool = False,
     gears: Array | None = None,
@@ -459,7 +462,7 @@ def polish(
         intervals. Defects are allowed.
     stage_cost : callable, optional
         Cost per second ``l(z, u)`` on top of 1 for the time.
-    settings : PolishSettings, optional
+    settings : PolishSettings
     fixed_planes : bool
         Keep the lines as the guess has them: quicker, and harder to fail.
     elastic : bool
@@ -477,7 +480,6 @@ def polish(
     MissingExtra
         If CasADi is not installed.
     """
-    settings = settings or PolishSettings()
     began, ends = budget.elapsed, ends.settled
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
     program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
@@ -580,10 +582,15 @@ def _polished(point: Point, total: SolverAnswer, seconds: float) -> Polished:
     )
 
 
-def intervals_for(duration: float, settings: PolishSettings) -> int:
+def _parameters(line: IntArray, corner: IntArray) -> list[IntArray]:
+    """Where the parameters of lines stand, and those of the corners beside them."""
+    return [OF_LINE * line + k for k in range(OF_LINE)] + [corner + k for k in range(OF_CORNER)]
+
+
+def intervals_for(duration: float) -> int:
     """How many intervals a motion of a duration [s] gets."""
-    fewest, most = settings.nodes
-    return min(max(math.ceil(duration / settings.step), fewest), most)
+    fewest, most = USUAL.nodes
+    return min(max(math.ceil(duration / USUAL.step), fewest), most)
 
 
 def _fastest(point: Point) -> float:

@@ -171,6 +171,9 @@ class PolishSettings:
     rounds: int = 8  # solves at most, with lines or margins added after each
 
 
+USUAL = PolishSettings()
+
+
 class Guard(NamedTuple):
     """Limits of the twist, where any part of the body is in some solids, or everywhere."""
 

@@ -93,7 +93,7 @@ def _why_blocked_all_round(problem: Problem, goal: Goal) -> str:
         if said := where_touched(disc, goal.pose, math.inf):
             return f"at the goal {said}"
     said = where_touched(problem, goal.pose, math.inf)
-    still = tuple(one for one in _beside(problem, goal.pose) if not moves(one))
+    still = tuple(one for one in _at_altitude(problem, goal.pose) if not moves(one))
     if said and touched_all_round(problem.footprint, still, goal.pose[:2], margin=problem.margin):
         return f"at the goal no heading is free; at that given {said}"
     return ""
@@ -133,7 +133,7 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
 
     The kernels prove most poses free; where they do not, shapely decides.
     """
-    beside = _beside(problem, pose)
+    beside = _at_altitude(problem, pose)
     static = tuple(obstacle for obstacle in beside if not moves(obstacle))
     obstacles = beside if math.isfinite(time) else static
     if not obstacles:
@@ -155,7 +155,7 @@ def where_touched(problem: Problem, pose: Array, time: float) -> str:
     )
 
 
-def _beside(problem: Problem, pose: Array) -> tuple[AnyObstacle, ...]:
+def _at_altitude(problem: Problem, pose: Array) -> tuple[AnyObstacle, ...]:
     """Obstacles that stand at the altitude of a pose, within the margin; all of them in a plane."""
     if pose.size == 3:
         return problem.obstacles

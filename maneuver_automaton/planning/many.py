@@ -200,7 +200,7 @@ def _answers(
     size = max(1, min(CHUNK, math.ceil(len(wanted) / (CHUNKS * max(jobs, 1)))))
     parts = [asked.part(wanted[k : k + size]) for k in range(0, len(wanted), size)]
     if jobs == 1 and scheduler is None:
-        return _told(kept, in_parallel(asked.answers, parts), len(asked), keeps, progress)
+        return _handed_out(kept, in_parallel(asked.answers, parts), len(asked), keeps, progress)
     common = _dumped(asked.planner)
     rest = (asked.time_limit, asked.take)
     pieces = [(common, _dumped(part), *rest) for part in parts]
@@ -209,10 +209,10 @@ def _answers(
         _Receiver(io.BytesIO(one), asked.shared(part)).load()
         for one, part in zip(sent, parts, strict=True)
     )
-    return _told(kept, chunks, len(asked), keeps, progress)
+    return _handed_out(kept, chunks, len(asked), keeps, progress)
 
 
-def _told(
+def _handed_out(
     kept: list[Any],
     chunks: Iterator[list[Any]],
     n: int,

@@ -22,10 +22,16 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Model
 from maneuver_automaton.models.speeds import Interval
 from maneuver_automaton.models.vehicle import Components
-from maneuver_automaton.optimal_control import Guess, PolishSettings, load_casadi, why_no_casadi
+from maneuver_automaton.optimal_control import Guess, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import BodyPart, Guard, NodeOnTheWay, PlacesAt
+from maneuver_automaton.optimal_control.scene import (
+    USUAL,
+    BodyPart,
+    Guard,
+    NodeOnTheWay,
+    PlacesAt,
+)
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.on_the_way import passed_on_the_way
 from maneuver_automaton.planning.polished_price import (
@@ -329,14 +335,14 @@ def guess_along(problem: Problem, along: PathGuesses, path: Plan) -> Aimed:
     seen = replace(path, start=np.zeros(problem.start.size), start_time=0.0)
     goal_index = int(np.argmin([sum(goal.off(path.end)) for goal in problem.goals]))
     first, last = problem.first_trim, problem.last_trim(problem.goals[goal_index])
-    guess = along.guess(seen, first.reduced_state, last.reduced_state, _intervals())
+    guess = along.guess(seen, first.reduced_state, last.reduced_state)
     return Aimed(guess, goal_index)
 
 
 def guess_of_plan(plan: Plan) -> Guess:
     """States and controls of a plan of any vehicle, seen from its start."""
     course = replace(plan, start=np.zeros(plan.start.size), start_time=0.0).sample()
-    return course_guess(course, intervals=_intervals())
+    return course_guess(course)
 
 
 def polish_plans(
@@ -456,7 +462,7 @@ def _polished_through(
     price = polished_price(problem)
     task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
-    passed, count = passed_on_the_way(problem, known), _intervals()(known.duration)
+    passed, count = passed_on_the_way(problem, known), intervals_for(known.duration)
     times = np.array([0.0, *(one.time - known.start_time for one in passed), known.duration])
     nodes = np.round(count * times / known.duration).astype(int)
     if np.diff(nodes).min() < 1:
@@ -470,9 +476,9 @@ def _polished_through(
         free = (None,) * (len(state) - dof)
         seen = replace(task, goal=tuple(pose), goal_state=free).ends(float(state[2])).end
         via.append((node, (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
-    settings, work = PolishSettings(), iterations_within(budget)
+    settings, work = USUAL, iterations_within(budget)
     if work is not None:
-        settings = replace(settings, max_iterations=min(work, settings.max_iterations))
+        settings = replace(USUAL, max_iterations=min(work, USUAL.max_iterations))
     stage_cost = price.stage_cost(known)
     motion = polish_through(
         task, guess, via, stage_cost=stage_cost, settings=settings, budget=budget
@@ -506,7 +512,3 @@ def _body_parts(problem: Problem) -> tuple[BodyPart, ...]:
 def _frame_of(model: Model, which: int) -> Callable[[Components], Sequence[Any]]:
     frames = model.part_frames  # type: ignore[attr-defined]
     return lambda z: tuple(frames(z)[which])
-
-
-def _intervals() -> Callable[[float], int]:
-    return functools.partial(intervals_for, settings=PolishSettings())

@@ -49,11 +49,11 @@ class Tracked:
     enclosed: bool = False  # proven: obstacles enclose the start or every goal
 
 
-def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float:
+def free_until(problem: Problem, plan: Plan) -> float:
     """Time since its start [s] up to which a plan is proven free of the problem's obstacles.
 
     The plan's own duration if all of it is; the obstacles are where they are at the plan's times.
-    What comes nearer than ``problem.margin + margin`` [m] counts as hit.
+    What comes nearer than ``problem.margin + PROVEN`` [m] counts as hit.
     """
     if not plan.trims:
         return plan.duration
@@ -64,7 +64,7 @@ def free_until(problem: Problem, plan: Plan, *, margin: float = PROVEN) -> float
         world.into(plan.switching_poses[:-1]),
         twists=np.array([trim.body_velocity[:3] for trim in plan.trims]),
         durations=plan.durations,
-        margin=min(margin, PROVEN_SHARE * query.margin),
+        margin=min(PROVEN, PROVEN_SHARE * query.margin),
         keep=problem.margin,
         times=plan.switching_times[:-1],
     )

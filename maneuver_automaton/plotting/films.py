@@ -326,11 +326,11 @@ def _said(cast: Cast, time: float) -> list[str]:
         parts.append(f"V = {values.value[k]:.4g}")
     now = [event for event in recording.events if event.time == values.time[k]]
     return parts + list(
-        chain(_told(now, "replanned"), _told(now, "exchanged"), _told(now, "broken"))
+        chain(_texts_of(now, "replanned"), _texts_of(now, "exchanged"), _texts_of(now, "broken"))
     )
 
 
-def _told(events: Sequence[Event], kind: str) -> list[str]:
+def _texts_of(events: Sequence[Event], kind: str) -> list[str]:
     some = [event for event in events if event.kind == kind]
     if not some:
         return []

@@ -307,46 +307,6 @@ def ramp_of(
     )
 
 
-def strokes(
-    model: Model, rests: Sequence[Trim], lengths: Sequence[float], *, max_speed: float | None = None
-) -> tuple[Maneuver, ...]:
-    """The quickest motions of every length [m] from rest to the same rest, as maneuvers.
-
-    What else the reduced state holds, such as the steering angle, stays: an arc of a circle.
-    Negative lengths are driven backwards.
-
-    Raises
-    ------
-    ValueError
-        If the vehicle cannot go that way, or is none whose rates are limited.
-    NotATrim
-        If it does not rest there.
-
-    Examples
-    --------
-    >>> from maneuver_automaton.models import SecondOrderCar
-    >>> from maneuver_automaton.primitives.equilibrium import trims_of
-    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
-    ...                      max_steering_rate=0.5)
-    >>> (rest,) = trims_of(car, {"speed": [0.0], "steering": [0.0]}).trims
-    >>> (back,) = strokes(car, [rest], [-10.0])
-    >>> back.displacement.round(12).tolist(), back.duration
-    ([-10.0, 0.0, 0.0], 6.5)
-    """
-    return _from_rest(model, rests, lengths, "speed", max_speed)
-
-
-def turns(
-    model: Model,
-    rests: Sequence[Trim],
-    angles: Sequence[float],
-    *,
-    max_turn_rate: float | None = None,
-) -> tuple[Maneuver, ...]:
-    """Turns on the spot by every angle at every rest, each as one maneuver to the same rest."""
-    return _from_rest(model, rests, angles, "turn_rate", max_turn_rate)
-
-
 class _Swing(NamedTuple):
     """A rest, and how one component of its reduced state goes up and back to zero."""
 
@@ -356,7 +316,7 @@ class _Swing(NamedTuple):
     ramp: Ramp
 
 
-def _swing(model: Model, rest: Trim, length: float, component: str, limit: float | None) -> _Swing:
+def _swing(model: Model, rest: Trim, length: float, component: str) -> _Swing:
     """The one whose integral is `length` [m, or rad]."""
     check_limited_rates(model)
     if not rest.is_rest:
@@ -378,22 +338,41 @@ def _swing(model: Model, rest: Trim, length: float, component: str, limit: float
     pace = min(1.0, pace_within(model, model.body_velocity(moving, rest.control)))
     ramp = ramp_of(
         length,
-        max_speed=float(most) * pace if limit is None else min(float(most) * pace, limit),
+        max_speed=float(most) * pace,
         acceleration=float(up),
         deceleration=float(down),
     )
     return _Swing(f"{rest.name}, {component} over {length:.6g}", rest, k, ramp)
 
 
-def _from_rest(
-    model: Model,
-    rests: Sequence[Trim],
-    lengths: Sequence[float],
-    component: str,
-    limit: float | None = None,
+def from_rest(
+    model: Model, rests: Sequence[Trim], lengths: Sequence[float], component: str
 ) -> tuple[Maneuver, ...]:
-    """Maneuvers in which a component of the reduced state covers each length, at each rest."""
-    swings = [_swing(model, rest, length, component, limit) for rest in rests for length in lengths]
+    """The quickest motions of every length [m, or rad] from rest to the same rest, as maneuvers.
+
+    Speed, or turn rate, is the `component` of the reduced state that rises and falls. What else
+    the state holds, such as the steering angle, stays: an arc of a circle. Negative lengths are
+    driven backwards.
+
+    Raises
+    ------
+    ValueError
+        If the vehicle cannot go that way, or is none whose rates are limited.
+    NotATrim
+        If it does not rest there.
+
+    Examples
+    --------
+    >>> from maneuver_automaton.models import SecondOrderCar
+    >>> from maneuver_automaton.primitives.equilibrium import trims_of
+    >>> car = SecondOrderCar(wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0,
+    ...                      max_steering_rate=0.5)
+    >>> (rest,) = trims_of(car, {"speed": [0.0], "steering": [0.0]}).trims
+    >>> (back,) = from_rest(car, [rest], [-10.0], "speed")
+    >>> back.displacement.round(12).tolist(), back.duration
+    ([-10.0, 0.0, 0.0], 6.5)
+    """
+    swings = [_swing(model, rest, length, component) for rest in rests for length in lengths]
     if not swings:
         return ()
     ramps = [swing.ramp for swing in swings]
@@ -440,8 +419,8 @@ def quickest_maneuvers(
     every = (
         *early,
         *differing(early, others),
-        *_from_rest(model, rests, strokes, "speed"),
-        *_from_rest(model, rests, turns, "turn_rate"),
+        *from_rest(model, rests, strokes, "speed"),
+        *from_rest(model, rests, turns, "turn_rate"),
     )
     return tuple(one for one in every if may_drive(model, one))
 

@@ -25,9 +25,7 @@ from maneuver_automaton.primitives.primitive import Maneuver, Trajectory, Trim
 RTOL, ATOL = 1e-10, 1e-12
 
 
-def maneuver_defect(
-    model: Model, maneuver: Maneuver, *, source: Trim, target: Trim, rtol: float = RTOL
-) -> float:
+def maneuver_defect(model: Model, maneuver: Maneuver, *, source: Trim, target: Trim) -> float:
     """Greatest error of the end that a maneuver claims: of its pose and of its reduced state.
 
     Raises
@@ -42,7 +40,7 @@ def maneuver_defect(
     rates = _rates(model)
     for begin, end, control in pieces(course.time, course.control):
         times = [begin, end]
-        state = rollout(rates, state, control=control, times=times, rtol=rtol, atol=ATOL)[-1]
+        state = rollout(rates, state, control=control, times=times, rtol=RTOL, atol=ATOL)[-1]
     claimed = np.concatenate([maneuver.displacement, target.reduced_state])
     return float(np.abs(state - claimed).max())
 

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from maneuver_automaton._arrays import Array, as_array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.models import Model
+from maneuver_automaton.models.model import check_model
 from maneuver_automaton.models.speeds import is_too_sharp, lateral_limit
 from maneuver_automaton.primitives.primitive import Trim
 
@@ -94,6 +95,7 @@ def trims_of(
     >>> found.missing[0].reason
     'steering would be 0.7854, 0.0854 beyond its limit 0.7000'
     """
+    check_model(model)
     axes = {name: as_array(f"grid: {name}", values).ravel() + 0.0 for name, values in grid.items()}
     for name, values in axes.items():
         if not values.size:

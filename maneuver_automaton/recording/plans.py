@@ -31,7 +31,7 @@ from maneuver_automaton.recording.values import (
 STRAIGHT = 0.01  # [1/m, rad/s] of curvature, or turning on the spot, that is called straight
 AT_REST = 1e-3  # [m/s]
 SIDES = (", left", ", right")
-BRIEF_S = 0.2  # straight between two bends, or at rest: what is shorter is told with a neighbour
+BRIEF_S = 0.2  # straight between two bends, or at rest: what is shorter is joined to a neighbour
 
 
 def recorded(result: Plan | PlanResult) -> Recording | None:
@@ -151,8 +151,8 @@ def _facts(result: PlanResult) -> list[Fact]:
 
 def passed_on_the_way(passed: Sequence[Passed]) -> list[Fact]:
     """When each pose on the way is passed."""
-    told = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed)
-    return [Fact(label="on the way", value=told, heads=False)] if told else []
+    listed = ", ".join(f"{one.number} at {one.time:.4g} s" for one in passed)
+    return [Fact(label="on the way", value=listed, heads=False)] if listed else []
 
 
 def tables(result: PlanResult) -> list[Table]:
@@ -207,15 +207,15 @@ def stretches(maneuver: Maneuver, model: Model) -> list[tuple[str, float]]:
     clear = [one for one in lasting if one[1] >= BRIEF_S or one[0].endswith(SIDES)]
     if not clear:
         return lasting
-    told: list[tuple[str, float]] = []
+    listed: list[tuple[str, float]] = []
     early = 0.0  # what is brief goes with what came before, or else with the first
     for what, seconds in lasting:
-        if told or (what, seconds) == clear[0]:
-            told.append((what if (what, seconds) in clear else told[-1][0], seconds))
+        if listed or (what, seconds) == clear[0]:
+            listed.append((what if (what, seconds) in clear else listed[-1][0], seconds))
         else:
             early += seconds
-    told[0] = (told[0][0], told[0][1] + early)
-    return _runs(told)
+    listed[0] = (listed[0][0], listed[0][1] + early)
+    return _runs(listed)
 
 
 def _runs(parts: Iterable[tuple[str, float]]) -> list[tuple[str, float]]:

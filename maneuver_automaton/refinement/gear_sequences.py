@@ -38,6 +38,7 @@ MOST = 20_000  # expansions of one search, unless the problem asks for fewer
 STROKE_TOLERANCE = 0.15  # share of a stroke by which like sequences may differ
 SMALL = 0.02  # share of the whole path by which a stroke counts as longer
 OTHERS = 8  # further words of each search that are looked at
+KEPT = 6  # plans of all, at most
 
 
 Estimate = Callable[[Plan], float]
@@ -94,7 +95,6 @@ def gear_sequences(
     estimate: Estimate,
     *,
     budget: Budget,
-    keep: int = 6,
 ) -> Iterator[TimedDrive]:
     """Kinematic plans that differ: a promising one soon, then those that take the least time.
 
@@ -102,7 +102,7 @@ def gear_sequences(
     automaton is replaced, and the prices of changes of direction. `libraries`: kinematic ones, from
     `car_library` or `unicycle_library`. `estimate`: duration of a plan. `budget`: its
     time is for all searches together; they are counted in expansions and attempts, so it only cuts
-    them short. `keep`: how many plans there are at most. Yields the best of the first prices before
+    them short. Yields the best of the first prices before
     the others are tried; then the others, by estimate.
     """
     terms = terms_of(problem.cost)
@@ -126,7 +126,7 @@ def gear_sequences(
             first = min(found, key=lambda one: one.estimate)
             yield first
     if first is not None:
-        others = sorted(found, key=lambda one: one.estimate)[:keep]
+        others = sorted(found, key=lambda one: one.estimate)[:KEPT]
         yield from (one for one in others if not one.resembles(first))
 
 

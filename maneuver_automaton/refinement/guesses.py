@@ -19,15 +19,13 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.models import CarWithTrailer, SecondOrderCar, SecondOrderUnicycle
 from maneuver_automaton.models.speeds import lateral_limit
 from maneuver_automaton.optimal_control import Guess
+from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.primitives import Trajectory
 from maneuver_automaton.refinement.gear_sequences import car_library, unicycle_library
 
 SHARE = 0.9  # of the limits that a guess uses
 SAMPLES = 24  # at least, of every trim that is driven
 FINE = 0.02  # [rad, share of the plan] between samples
-
-Step = Callable[[float], int]
-"""How many intervals a duration [s] gets."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -167,40 +165,6 @@ def _assembled(
     )
 
 
-def car_guess(model: SecondOrderCar, plan: Plan, *, intervals: Step) -> Guess:
-    """Guess for a car whose speed and steering angle take time to change."""
-    run = timed(plan, pace_of_car(model))
-    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
-    steering = _followed(np.interp(at, run.time, run.steering), model.max_steering_rate, at[1])
-    steering[[0, -1]] = 0.0
-    return _second_order(run, at, steering, model.control_limits)
-
-
-def unicycle_guess(model: SecondOrderUnicycle, plan: Plan, *, intervals: Step) -> Guess:
-    """Guess for a unicycle whose speed and turn rate take time to change."""
-    run = timed(plan, pace_of_unicycle(model))
-    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
-    wanted = np.interp(at, run.time, run.twist[:, 2])
-    turn = _followed(wanted, model.max_angular_acceleration, at[1])
-    turn[[0, -1]] = 0.0
-    return _second_order(run, at, turn, model.control_limits)
-
-
-def trailer_guess(
-    model: CarWithTrailer, plan: Plan, hitches: tuple[float, float], *, intervals: Step
-) -> Guess:
-    """Guess for a car that pulls a trailer, between two angles at its hitch [rad]."""
-    run = timed(plan, pace_of_trailer(model))
-    at = np.linspace(0.0, run.duration, intervals(run.duration) + 1)
-    middle = 0.5 * (at[1:] + at[:-1])
-    driven = [np.interp(middle, run.time, column) for column in (run.twist[:, 0], run.steering)]
-    control = np.clip(np.column_stack(driven), *model.control_limits.T)
-    hitch = _hitched(model, control, at[1], hitches)
-    return Guess(
-        state=np.column_stack([_at(run, at), hitch]), control=control, duration=run.duration
-    )
-
-
 def _hitched(
     model: CarWithTrailer, control: Array, step: float, hitches: tuple[float, float]
 ) -> Array:
@@ -222,10 +186,10 @@ def _hitched(
     return angle
 
 
-def course_guess(course: Trajectory, *, intervals: Step) -> Guess:
+def course_guess(course: Trajectory) -> Guess:
     """Guess from a motion that any model can make: an automaton's plan."""
     lasting = float(course.time[-1] - course.time[0])
-    return guess_at(course, np.linspace(0.0, lasting, intervals(lasting) + 1))
+    return guess_at(course, np.linspace(0.0, lasting, intervals_for(lasting) + 1))
 
 
 def guess_at(course: Trajectory, at: Array) -> Guess:
@@ -237,45 +201,19 @@ def guess_at(course: Trajectory, at: Array) -> Guess:
     return Guess(state=state, control=course.control[which], duration=float(time[-1]))
 
 
-def pace_of_car(model: SecondOrderCar) -> PathLimits:
-    """Limits of a second-order car along a path."""
-    low, high = model.reduced_limits[0]
-    return PathLimits(
-        speed=high,
-        reverse_speed=-low,
-        acceleration=model.max_acceleration,
-        wheelbase=model.wheelbase,
-        steering_rate=model.max_steering_rate,
-        lateral=lateral_limit(model),
-    )
+def _nodes(run: Timed) -> Array:
+    """Times (n + 1,) [s] of the nodes of a guess."""
+    return np.linspace(0.0, run.duration, intervals_for(run.duration) + 1)
 
 
-def pace_of_unicycle(model: SecondOrderUnicycle) -> PathLimits:
-    """Limits of a second-order unicycle along a path."""
-    low, high = model.reduced_limits[0]
-    return PathLimits(
-        speed=high,
-        reverse_speed=-low,
-        acceleration=model.max_acceleration,
-        turn_rate=model.max_turn_rate,
-        angular_acceleration=model.max_angular_acceleration,
-    )
+def _second_order(run: Timed, wanted: Array, rate: float, limits: Array) -> Guess:
+    """Poses, speed and a second reduced state at equal steps; controls are their differences.
 
-
-def pace_of_trailer(model: CarWithTrailer) -> PathLimits:
-    """Limits of a car with a trailer along a path."""
-    low, high = model.control_limits[0]
-    return PathLimits(
-        speed=high,
-        reverse_speed=-low,
-        acceleration=math.inf,
-        wheelbase=model.wheelbase,
-        lateral=lateral_limit(model),
-    )
-
-
-def _second_order(run: Timed, at: Array, second: Array, limits: Array) -> Guess:
-    """Poses, speed and a second reduced state at equal steps; controls are their differences."""
+    The second one follows what is `wanted` along the run at a limited rate, from zero to zero.
+    """
+    at = _nodes(run)
+    second = _followed(np.interp(at, run.time, wanted), rate, at[1])
+    second[[0, -1]] = 0.0
     reduced = np.column_stack([np.interp(at, run.time, run.twist[:, 0]), second])
     control = np.clip(np.diff(reduced, axis=0) / at[1], *limits.T)
     return Guess(state=np.hstack([_at(run, at), reduced]), control=control, duration=run.duration)
@@ -306,8 +244,7 @@ class PathGuesses(NamedTuple):
 
     libraries: Sequence[Automaton]  # of vehicles that turn as tightly as can be, and less
     pace: PathLimits  # along their paths
-    guess: Callable[[Plan, Array, Array, Step], Guess]
-    """From a plan, the first and last reduced state (n_z,), and how many intervals it gets."""
+    guess: Callable[[Plan, Array, Array], Guess]  # of a plan, first and last reduced state (n_z,)
 
 
 @functools.singledispatch
@@ -316,48 +253,72 @@ def path_guesses(model: object) -> PathGuesses | None:
     return None
 
 
-def _turning(
-    pace: PathLimits,
-    library: Callable[..., Automaton],
-    guess: Callable[[Plan, Array, Array, Step], Guess],
-    share: float = 1.0,
-    less: float = LESS,
-) -> PathGuesses:
-    """Guesses along paths in libraries that turn as tightly as they may by a share, and less."""
-    reverses = pace.reverse_speed > 0.0
-    return PathGuesses(
-        [library(share=share * turn, reverses=reverses) for turn in (1.0, less)], pace, guess
-    )
-
-
 def _less(model: SecondOrderCar | CarWithTrailer, pace: PathLimits) -> float:
     """The share of the greatest curvature that a lateral acceleration allows at full speed."""
     share = pace.lateral / pace.speed**2 * model.wheelbase / math.tan(model.max_steering)
     return min(max(share, WIDEST), LESS)
 
 
-def _library_of_car(model: SecondOrderCar | CarWithTrailer) -> Callable[..., Automaton]:
-    sizes = {"wheelbase": model.wheelbase, "max_steering": model.max_steering}
-    return functools.partial(car_library, **sizes)
+def _libraries_of_car(
+    model: SecondOrderCar | CarWithTrailer, pace: PathLimits, share: float = 1.0
+) -> list[Automaton]:
+    """Libraries that turn as tightly as the car may, by a share, and less."""
+    return [
+        car_library(
+            wheelbase=model.wheelbase,
+            max_steering=model.max_steering,
+            share=share * turn,
+            reverses=pace.reverse_speed > 0.0,
+        )
+        for turn in (1.0, _less(model, pace))
+    ]
 
 
 @path_guesses.register
 def _of_car(model: SecondOrderCar) -> PathGuesses:
-    def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
-        return car_guess(model, plan, intervals=intervals)
+    low, high = model.reduced_limits[0]
+    pace = PathLimits(
+        speed=high,
+        reverse_speed=-low,
+        acceleration=model.max_acceleration,
+        wheelbase=model.wheelbase,
+        steering_rate=model.max_steering_rate,
+        lateral=lateral_limit(model),
+    )
 
-    pace = pace_of_car(model)
-    return _turning(pace, _library_of_car(model), guess, less=_less(model, pace))
+    def guess(plan: Plan, first: Array, last: Array) -> Guess:
+        run = timed(plan, pace)
+        return _second_order(run, run.steering, model.max_steering_rate, model.control_limits)
+
+    return PathGuesses(_libraries_of_car(model, pace), pace, guess)
 
 
 @path_guesses.register
 def _of_unicycle(model: SecondOrderUnicycle) -> PathGuesses:
-    def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
-        return unicycle_guess(model, plan, intervals=intervals)
+    low, high = model.reduced_limits[0]
+    most = model.max_angular_acceleration
+    pace = PathLimits(
+        speed=high,
+        reverse_speed=-low,
+        acceleration=model.max_acceleration,
+        turn_rate=model.max_turn_rate,
+        angular_acceleration=most,
+    )
 
-    limits = {"max_speed": model.max_speed, "max_turn_rate": model.max_turn_rate}
-    library = functools.partial(unicycle_library, **limits)
-    return _turning(pace_of_unicycle(model), library, guess)
+    def guess(plan: Plan, first: Array, last: Array) -> Guess:
+        run = timed(plan, pace)
+        return _second_order(run, run.twist[:, 2], most, model.control_limits)
+
+    libraries = [
+        unicycle_library(
+            max_speed=model.max_speed,
+            max_turn_rate=model.max_turn_rate,
+            share=turn,
+            reverses=pace.reverse_speed > 0.0,
+        )
+        for turn in (1.0, LESS)
+    ]
+    return PathGuesses(libraries, pace, guess)
 
 
 @path_guesses.register
@@ -368,11 +329,25 @@ def _of_trailer(model: CarWithTrailer) -> PathGuesses:
     """
     hitch = min(float(model.reduced_limits[0, 1]), ALONG)
     followed = math.sin(hitch) / model.hitch_length * model.wheelbase
+    low, high = model.control_limits[0]
+    pace = PathLimits(
+        speed=high,
+        reverse_speed=-low,
+        acceleration=math.inf,
+        wheelbase=model.wheelbase,
+        lateral=lateral_limit(model),
+    )
 
-    def guess(plan: Plan, first: Array, last: Array, intervals: Step) -> Guess:
-        hitches = float(first[0]), float(last[0])
-        return trailer_guess(model, plan, hitches, intervals=intervals)
+    def guess(plan: Plan, first: Array, last: Array) -> Guess:
+        run = timed(plan, pace)
+        at = _nodes(run)
+        middle = 0.5 * (at[1:] + at[:-1])
+        driven = [np.interp(middle, run.time, column) for column in (run.twist[:, 0], run.steering)]
+        control = np.clip(np.column_stack(driven), *model.control_limits.T)
+        hitch = _hitched(model, control, at[1], (float(first[0]), float(last[0])))
+        return Guess(
+            state=np.column_stack([_at(run, at), hitch]), control=control, duration=run.duration
+        )
 
     share = min(followed / math.tan(model.max_steering), 1.0)
-    pace = pace_of_trailer(model)
-    return _turning(pace, _library_of_car(model), guess, share, _less(model, pace))
+    return PathGuesses(_libraries_of_car(model, pace, share), pace, guess)

@@ -26,6 +26,7 @@ from maneuver_automaton.optimal_control.problem import RunningCost, resampled
 from maneuver_automaton.optimal_control.scene import (
     LEAST_DURATION,
     MOST_DURATION,
+    USUAL,
     BodyPart,
     Guard,
     MotionEnds,
@@ -218,7 +219,6 @@ def polish_guesses(
     guesses: Iterable[Guess],
     *,
     stage_cost: RunningCost | None = None,
-    settings: PolishSettings | None = None,
     budget: Budget = UNLIMITED,
     most_iterations: int | None = None,
     accepts: Accepts = lambda motion: True,
@@ -232,7 +232,6 @@ def polish_guesses(
         Seen from the start, the most promising first; see `guesses`. Asked for one by one.
     stage_cost : callable, optional
         Cost per second ``l(z, u)`` on top of 1 for the time.
-    settings : PolishSettings, optional
     budget : Budget
         Its time; every iteration of the solver asks it.
     most_iterations : int, optional
@@ -246,10 +245,7 @@ def polish_guesses(
     MissingExtra
         If CasADi is not installed.
     """
-    settings = settings or PolishSettings()
-    return _Polishing(
-        task, task.scene, guesses, stage_cost, settings, budget, most_iterations, accepts
-    ).run()
+    return _Polishing(task, task.scene, guesses, stage_cost, budget, most_iterations, accepts).run()
 
 
 def polish_through(
@@ -258,7 +254,7 @@ def polish_through(
     via: Sequence[NodeOnTheWay],
     *,
     stage_cost: RunningCost | None = None,
-    settings: PolishSettings | None = None,
+    settings: PolishSettings = USUAL,
     budget: Budget = UNLIMITED,
 ) -> PolishedMotion | str:
     """The exact motion through poses on the way that a guess leads to; why there is none, if so.
@@ -266,7 +262,6 @@ def polish_through(
     Nothing may move. `guess`: seen from the start, with nodes at the poses on the way; `via`: these
     in order, with pose and reduced state seen from the start; None is free.
     """
-    settings = settings or PolishSettings()
     ends, why = task.ends(float(guess.state[-1, 2])), ""
     for room in (1.0, ROOM):  # more of it where closing broke a limit
         some = replace(settings, tightening=room * settings.tightening)
@@ -325,7 +320,6 @@ class _Polishing:
     scene: PolishScene
     guesses: Iterable[Guess]
     stage_cost: RunningCost | None
-    settings: PolishSettings
     budget: Budget
     most_iterations: int | None  # None: the clock alone says when to stop
     accepts: Accepts
@@ -426,7 +420,7 @@ class _Polishing:
     def _lines(self, number: int, rough: Polished) -> None:
         """Solve with free lines from the result of fixed planes, which is kept if that fails."""
         if not self._is_over():
-            patient = replace(self.settings, max_iterations=LONGER * self.settings.max_iterations)
+            patient = replace(USUAL, max_iterations=LONGER * USUAL.max_iterations)
             found = self._solve("lines", number, rough.as_guess, settings=patient)
             # What was not solved to the end may be sound all the same: it is closed and audited.
             ended = found.is_feasible or found.status is SolveStatus.OUT_OF_BUDGET
@@ -445,8 +439,8 @@ class _Polishing:
             return
         count = math.ceil(len(raw.durations) / FINER)
         if self.task.movers:
-            count = max(min(count, self.settings.nodes[1]), len(raw.durations) + 1)
-        if count > self.settings.nodes[1]:
+            count = max(min(count, USUAL.nodes[1]), len(raw.durations) + 1)
+        if count > USUAL.nodes[1]:
             return
         guess = Guess(
             state=resampled(raw.state, count + 1),
@@ -467,10 +461,9 @@ class _Polishing:
         elastic: bool = False,
         gears: Array | None = None,
         most: int | None = None,
-        settings: PolishSettings | None = None,
+        settings: PolishSettings = USUAL,
     ) -> Polished:
         began = self.budget.elapsed
-        settings = settings or self.settings
         work = self._work_left()
         if work is not None:
             most = max(min(work, settings.max_iterations if most is None else most), 1)
@@ -520,7 +513,7 @@ class _Polishing:
             even = np.ptp(found.durations) <= EVEN
             if not (again and even and found.status is SolveStatus.SOLVED) or self._is_over():
                 return False
-            roomier = replace(self.settings, tightening=ROOM * self.settings.tightening)
+            roomier = replace(USUAL, tightening=ROOM * USUAL.tightening)
             roomy = self._solve("room", number, found.as_guess, settings=roomier)
             if roomy.status is not SolveStatus.SOLVED:
                 return False

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array, vector_text
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, StageCost, terms_of
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim
 
@@ -118,7 +118,7 @@ def moving_trims(plan: Plan) -> np.ndarray[tuple[int, ...], np.dtype[np.bool]]:
     return np.asarray(~still & (plan.durations > 0.0))
 
 
-def cost_rates(plan: Plan, cost: Cost) -> Array:
+def cost_rates(plan: Plan, cost: StageCost) -> Array:
     """Cost per second (n,) of each trim of a plan."""
     if not plan.trims:
         return np.zeros(0)
@@ -156,7 +156,7 @@ class Retiming:
 
 
 def retime(
-    plan: Plan, model: Model, *, cost: Cost | None = None, limits: ArrayLike | None = None
+    plan: Plan, model: Model, *, cost: StageCost | None = None, limits: ArrayLike | None = None
 ) -> Retiming:
     """A plan retimed along its path: the same total time, at the pace that costs least.
 
@@ -178,8 +178,9 @@ def retime(
         The path; its total time is kept.
     model : Model
         The vehicle that drives it, asked whether its body velocity scales with its control.
-    cost : Cost, optional
-        The cost to lower; the effort has to count. The squared norm of the control if left out.
+    cost : StageCost, optional
+        The cost to lower; its `terms` have to count the effort. The squared norm of the control if
+        left out.
     limits : (n_u, 2) array, optional
         Least and greatest control; the model's own if left out.
 
@@ -207,14 +208,15 @@ def retime(
     ('ahead x0.5', 'spin x0.5')
     """
     cost = Cost(effort=1.0) if cost is None else cost
-    if not cost.effort > 0.0:
-        raise ValueError("retime: the cost has no effort, need one with effort > 0")
+    terms = terms_of(cost)
+    if terms is None or not terms.effort > 0.0:
+        raise ValueError("retime: the cost has no effort, need one whose terms() have effort > 0")
     box = control_box(model, limits)
     moving = np.flatnonzero(moving_trims(plan))
     trims, durations = [plan.trims[k] for k in moving], plan.durations[moving]
     driftless(trims, model)
     _check_scaling(trims, model, paces=np.full(len(trims), HALF))
-    quadratic = Cost(effort=1.0, effort_matrix=cost.effort_matrix)
+    quadratic = Cost(effort=1.0, effort_matrix=terms.effort_matrix)
     lengths = np.sqrt(cost_rates(plan, quadratic)[moving]) * durations
     fastest = np.array([_fastest(trim, box, model) for trim in trims])
     least = durations / fastest
@@ -234,9 +236,9 @@ def retime(
         after=after,
         paces=paces,
         at_limit=tuple(at_limit.tolist()),
-        effort_before=effort_report(plan, cost.effort_matrix),
-        effort_after=effort_report(after, cost.effort_matrix),
-        threshold=effort_threshold(box, cost.effort_matrix),
+        effort_before=effort_report(plan, terms.effort_matrix),
+        effort_after=effort_report(after, terms.effort_matrix),
+        threshold=effort_threshold(box, terms.effort_matrix),
         cost_before=_cost(plan, cost),
         cost_after=_cost(after, cost),
     )
@@ -346,6 +348,6 @@ def _scaled(trim: Trim, pace: float, box: Array) -> Trim:
     )
 
 
-def _cost(plan: Plan, cost: Cost) -> float:
+def _cost(plan: Plan, cost: StageCost) -> float:
     twists = np.array([trim.body_velocity for trim in plan.trims])
     return float(cost_rates(plan, cost) @ plan.durations) + cost.switching(twists)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.costs import Cost
+from maneuver_automaton.costs import Cost, StageCost, prices_switches, terms_of
 from maneuver_automaton.groups.se2 import chained
 from maneuver_automaton.models import Model
 from maneuver_automaton.primitives import Trim
@@ -125,7 +125,7 @@ def least_effort(
     plan: Plan,
     model: Model,
     *,
-    cost: Cost | None = None,
+    cost: StageCost | None = None,
     limits: ArrayLike | None = None,
     pieces: int = PIECES,
 ) -> Plan:
@@ -144,7 +144,7 @@ def least_effort(
         Of a driftless vehicle whose body velocity is linear in its control.
     model : Model
         That vehicle.
-    cost : Cost, optional
+    cost : StageCost, optional
         Effort, and time if you like; the squared norm of the control if left out.
     limits : (n_u, 2) array, optional
         Least and greatest control; the model's own if left out.
@@ -177,15 +177,23 @@ def least_effort(
     """
     if pieces < 2:
         raise ValueError(f"least effort: pieces must be at least 2, got {pieces}")
-    cost = Cost(effort=1.0) if cost is None else cost
-    if not cost.effort > 0.0 or cost.norm or cost.length or cost.switch or cost.direction_change:
-        raise ValueError("least effort: the cost has to count effort, and nothing else but time")
+    terms = terms_of(Cost(effort=1.0) if cost is None else cost)
+    if (
+        terms is None
+        or not terms.effort > 0.0
+        or terms.norm
+        or terms.length
+        or prices_switches(terms)
+    ):
+        raise ValueError(
+            "least effort: the terms() of the cost have to be effort, and at most time beside it"
+        )
     box = control_box(model, limits, asks="least effort")
     driftless(plan.trims, model, asks="least effort")
     columns = _columns(plan, model)
     if not plan.duration > 0.0:
         return plan
-    weight = np.eye(len(box)) if cost.effort_matrix is None else cost.effort_matrix
+    weight = np.eye(len(box)) if terms.effort_matrix is None else terms.effort_matrix
     shooting = _Shooting(plan.start, plan.end, columns, weight, plan.duration / pieces)
     first = np.clip(_averages(plan, pieces), box[:, 0], box[:, 1])
     controls = shooting.nearest_to_none(first)

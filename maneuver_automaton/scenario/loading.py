@@ -103,7 +103,7 @@ def load_scenario(
     if beside is not None:
         stated = statement.fleet[0] if statement.fleet else statement
         document = _beside(Path(beside), start=stated.start, goal=stated.goal)
-        with _told_of_beside():
+        with _errors_of_with():
             if statement.fleet:
                 document, settings, loop = without_fleet(document)
             rest = scenario_of_document(document, path=Path(beside), begin=begin, own=model)
@@ -145,7 +145,7 @@ def _road_vehicle(beside: Path) -> RoadVehicle:
     """The vehicle of a scenario beside a drive on roads."""
     anywhere, begin = np.zeros(3), time.perf_counter()  # the scene states its own
     document = _beside(beside, start=anywhere, goal=anywhere)
-    with _told_of_beside():
+    with _errors_of_with():
         rest = scenario_of_document(document, path=beside, begin=begin).problem
     model, footprint = rest.automaton.model, rest.footprint
     if not isinstance(model, SecondOrderCar):
@@ -176,7 +176,7 @@ def statements_of(path: Path) -> tuple[Statement, ...] | None:
 
 def _beside(path: Path, *, start: Array | None, goal: Array | None) -> Document:
     """The scenario of --with; it needs no start and goal where the problem states them."""
-    with _told_of_beside():
+    with _errors_of_with():
         document = parse(read_text(path), name=str(path))
     if not isinstance(document.value, dict):
         return document
@@ -186,7 +186,7 @@ def _beside(path: Path, *, start: Array | None, goal: Array | None) -> Document:
 
 
 @contextlib.contextmanager
-def _told_of_beside() -> Iterator[None]:
+def _errors_of_with() -> Iterator[None]:
     try:
         yield
     except InvalidScenario as error:

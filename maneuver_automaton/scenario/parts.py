@@ -46,9 +46,9 @@ def need(text: str) -> PydanticCustomError:
     return PydanticCustomError("need", "need {need}", {"need": text})
 
 
-def told(text: str, *, key: str | None = None) -> PydanticCustomError:
+def refusal(text: str, *, key: str | None = None) -> PydanticCustomError:
     """The error of a mapping, or of what stands at a key of it, in full: raise it."""
-    return PydanticCustomError("told", "{text}", {"text": text, "key": key})
+    return PydanticCustomError("refusal", "{text}", {"text": text, "key": key})
 
 
 class Need:
@@ -149,24 +149,24 @@ class FilePart(BaseModel):
             raise need(f"a mapping with the keys {', '.join(keys)}")
         for key in value:
             if key in cls.instead:
-                raise told(f"got {shown(value[key])}, need {cls.instead[key]}", key=key)
+                raise refusal(f"got {shown(value[key])}, need {cls.instead[key]}", key=key)
             if key not in keys:
                 near = difflib.get_close_matches(key, keys, n=1, cutoff=0.0)[0]
                 known = ", ".join(keys)
-                raise told(f"unknown key; did you mean {near!r}? Known keys: {known}", key=key)
+                raise refusal(f"unknown key; did you mean {near!r}? Known keys: {known}", key=key)
         for key, field in keys.items():
             if key in value and value[key] is None:
                 what = field.description if field.is_required() else "a value, or no such key"
-                raise told(f"got nothing, need {what or 'a value'}", key=key)
+                raise refusal(f"got nothing, need {what or 'a value'}", key=key)
             if field.is_required() and key not in value:
                 raise missing(key, field.description or "")
         given = [key for key in cls.one_of if key in value]
         if cls.one_of and len(given) != 1:
             known = ", ".join(cls.one_of)
-            raise told(f"got {' and '.join(given) or 'none'}, need exactly one of {known}")
+            raise refusal(f"got {' and '.join(given) or 'none'}, need exactly one of {known}")
         for key, partners in cls.goes_with.items():
             if key in value and not any(partner in value for partner in partners):
-                raise told(f"goes with {' or '.join(partners)} only", key=key)
+                raise refusal(f"goes with {' or '.join(partners)} only", key=key)
         return value
 
 
@@ -177,7 +177,7 @@ def optional(text: str) -> Any:
 
 def missing(key: str, what: str) -> PydanticCustomError:
     """The error of a mapping without a key that it needs: raise it."""
-    return told(f"the key {key!r} is missing, need {key}: {what}")
+    return refusal(f"the key {key!r} is missing, need {key}: {what}")
 
 
 def one_or_many(value: Any) -> str:
@@ -201,7 +201,7 @@ def _complaint(item: Any) -> tuple[Where, str]:
         step for step in item["loc"] if isinstance(step, int) or not step.startswith("<")
     )
     context = item.get("ctx", {})
-    if item["type"] == "told":
+    if item["type"] == "refusal":
         key = context["key"]
         return (where if key is None else (*where, key)), context["text"]
     what = f", need {context['need']}" if item["type"] == "need" else f": {item['msg']}"

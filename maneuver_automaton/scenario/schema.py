@@ -43,7 +43,7 @@ from maneuver_automaton.scenario.parts import (
     need,
     one_or_many,
     optional,
-    told,
+    refusal,
 )
 from maneuver_automaton.scenario.vehicles import VehiclePart
 
@@ -204,9 +204,9 @@ class ViaPart(FilePart, title="Via"):
     @model_validator(mode="after")
     def _somewhere(self) -> ViaPart:
         if self.pose is None and self.gate is None:
-            raise told("got neither pose nor gate, need one of them")
+            raise refusal("got neither pose nor gate, need one of them")
         if self.pose is not None and len(self.pose) == 2 and not self.free_heading:
-            raise told("got 2 numbers, need [x, y, heading], or free_heading: true", key="pose")
+            raise refusal("got 2 numbers, need [x, y, heading], or free_heading: true", key="pose")
         return self
 
 

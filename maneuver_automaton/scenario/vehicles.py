@@ -49,8 +49,8 @@ from maneuver_automaton.scenario.parts import (
     need,
     one_or_many,
     optional,
+    refusal,
     stated,
-    told,
 )
 
 SHARP = "an angle between 0 and pi / 2, 1.5708"
@@ -307,7 +307,7 @@ def _check_model(value: Any, info: ValidationInfo) -> Any:
     if "model" not in value:
         raise missing("model", what)
     if model not in MODELS or own is not None:
-        raise told(f"got {shown(model)}, need {what}{'' if own else _hint(model)}", key="model")
+        raise refusal(f"got {shown(model)}, need {what}{'' if own else _hint(model)}", key="model")
     return value
 
 

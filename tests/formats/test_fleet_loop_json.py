@@ -149,6 +149,11 @@ def test_interrupted_and_sources(tmp_path):
             "steps[0].swaps[0].vehicles: is missing, need a list",
         ),
         (lambda d: d.pop("closest"), "closest: is missing, need a list"),
+        (lambda d: d.update(step_s=-1.0), "step_s: got -1.0, need a positive number"),
+        (
+            lambda d: d["clearance_m"].update(between={}),
+            "clearance_m.between: got {}, need a finite number",
+        ),
     ],
 )  # fmt: skip
 def test_a_damaged_file_is_told(tmp_path, change, message):

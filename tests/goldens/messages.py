@@ -92,6 +92,34 @@ COMMANDS: dict[str, list[str]] = {
     "show nothing": ["automaton", "show", "nowhere.json"],
     "a folder of nothing": ["plan", "empty"],
     "a step longer than the horizon": ["mpc", "long.yaml"],
+    "time limit that is nan": ["plan", "x.yaml", "--time-limit", "nan"],
+    "time limit of a loop": ["mpc", "loop.yaml", "--time-limit", "0"],
+    "out of a loop is a file": ["mpc", "loop.yaml", "--out", "x.yaml"],
+    "alternatives of a loop": ["mpc", "loop.yaml", "--alternatives", "2"],
+    "retimed without a fixed time": ["mpc", "retimed.yaml"],
+    "noise of another group": ["mpc", "climbing.yaml"],
+    "two files of one name": ["plan", "twice"],
+    "convert a scenario to a map": ["convert", "x.yaml", "x.map"],
+    "processes for one file": ["plan", "x.yaml", "--dask", "local"],
+    "resume a folder": ["mpc", "many", "--resume", "log.json"],
+    "size of a word": ["plan", "x.yaml", "--size", "wide"],
+    "size of nothing": ["mpc", "loop.yaml", "--size", "0x3"],
+    "unknown style": ["plot", "x.yaml", "--style", "poster"],
+    "unknown style of a library": ["automaton", "draw", "x.yaml", "--style", "poster"],
+    "no such road": ["plan", "nowhere.xml"],
+    "seeds on roads": ["mpc", "road.xml", "--seeds", "2"],
+    "check a road": ["check", "road.xml"],
+    "check two roads": ["check", "two.xml"],
+    "a case that a road has not": ["mpc", "road.xml", "--case", "3"],
+    "a unicycle on roads": ["plan", "road.xml", "--with", "x.yaml"],
+    "alternatives of a fleet": ["plan", "fleet.yaml", "--alternatives", "2"],
+    "gap of a fleet": ["plan", "fleet.yaml", "--gap", "0.1"],
+    "a case of a fleet": ["plan", "fleet.yaml", "--case", "1"],
+    "a fleet with a scenario": ["plan", "fleet.yaml", "--with", "x.yaml"],
+    "library of a fleet": ["automaton", "show", "fleet.yaml"],
+    "seeds of a fleet": ["mpc", "fleet.yaml", "--seeds", "3"],
+    "gap of a fleet's loop": ["mpc", "fleet.yaml", "--gap", "0.1"],
+    "no closed loop of a fleet": ["mpc", "still.yaml"],
 }
 
 # Wrong usage: only the exit code is kept, the words are those of the library that parses it.
@@ -101,6 +129,10 @@ USAGE: dict[str, list[str]] = {
     "no file": ["plan"],
     "unknown option": ["plan", "x.yaml", "--bad"],
     "no whole number": ["mpc", "loop.yaml", "--steps", "two"],
+    "no steps": ["mpc", "loop.yaml", "--steps", "0"],
+    "seed below zero": ["mpc", "loop.yaml", "--seed", "-1"],
+    "no seeds": ["mpc", "loop.yaml", "--seeds", "0"],
+    "no processes": ["plan", "x.yaml", "--jobs", "0"],
 }
 
 
@@ -205,11 +237,18 @@ def folder() -> Iterator[Path]:
             Path("none.yaml").write_text(SCENARIO + "bounds_m: {x: [-0.5, 0.5]}\n")
             fleet = FLEET.replace("time_limit_s: 1", "time_limit_s: 20")  # it ends before
             Path("fleet.yaml").write_text(fleet + "receding_horizon: {step_s: 0.5}\n")
+            Path("still.yaml").write_text(fleet)
             Path("road.xml").write_text(ALONE)
             Path("two.xml").write_text(TOGETHER)
             Path("many").mkdir()
             Path("many", "a.yaml").write_text(LOOP)
             Path("many", "b.yaml").write_text(LOOP.replace("A case", "Another"))
+            Path("twice").mkdir()
+            Path("twice", "a.yaml").write_text(SCENARIO)
+            Path("twice", "a.yml").write_text(SCENARIO)
+            Path("retimed.yaml").write_text(LOOP.replace("0.5}", "0.5, retimed: true}"))
+            noise = "0.5, disturbance: {twist_scale: [1, 1, 1, 1]}}"
+            Path("climbing.yaml").write_text(LOOP.replace("0.5}", noise))
             Path("long.yaml").write_text(FIXED + "receding_horizon: {step_s: 5.0}\n")
             yield Path(name)
         finally:

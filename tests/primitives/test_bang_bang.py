@@ -23,10 +23,9 @@ from maneuver_automaton.primitives import (
     Trim,
     bang_bang,
     connect_bang_bang,
+    from_rest,
     ramp_of,
-    strokes,
     trims_of,
-    turns,
 )
 from maneuver_automaton.primitives.closed_form import differing, has_limited_rates
 
@@ -203,7 +202,7 @@ def test_strokes_have_their_length_and_least_time(length, steering):
     a, v = 1.0, 2.5
     short = abs(length) <= v * v / a
     expected = 2.0 * math.sqrt(abs(length) / a) if short else abs(length) / v + v / a
-    (whole,) = strokes(CAR, [rest], [length])
+    (whole,) = from_rest(CAR, [rest], [length], "speed")
     assert whole.duration == pytest.approx(expected, rel=1e-12)
     turned = length * math.tan(steering) / CAR.wheelbase
     arc = SE2.exp([length, 0.0, turned]).pose  # the same circle, whatever the speed
@@ -213,13 +212,13 @@ def test_strokes_have_their_length_and_least_time(length, steering):
 
 
 @settings(max_examples=30)
-@given(angle=st.floats(0.01, 9.0), left=st.booleans(), limit=st.floats(0.1, 0.6))
-def test_turns_on_the_spot(angle, left, limit):
+@given(angle=st.floats(0.01, 9.0), left=st.booleans())
+def test_turns_on_the_spot(angle, left):
     angle = angle if left else -angle
     rest = trim_at(ROBOT, 0.0, 0.0)
-    (whole,) = turns(ROBOT, [rest], [angle], max_turn_rate=limit)
+    (whole,) = from_rest(ROBOT, [rest], [angle], "turn_rate")
     np.testing.assert_allclose(whole.displacement, [0.0, 0.0, angle], atol=1e-12)
-    assert np.abs(whole.course.reduced_state[:, 1]).max() <= limit + 1e-12
+    assert np.abs(whole.course.reduced_state[:, 1]).max() <= ROBOT.max_turn_rate + 1e-12
 
 
 def test_braking_may_be_harder_than_speeding_up():
@@ -247,10 +246,10 @@ def test_reverse_must_be_allowed():
     with pytest.raises(
         ValueError, match=r"stroke: got -1\.0, but the speed of the second_order_car"
     ):
-        strokes(forward, [trim_at(forward, 0.0, 0.0)], [-1.0])
+        from_rest(forward, [trim_at(forward, 0.0, 0.0)], [-1.0], "speed")
     with pytest.raises(ValueError, match="second_order_car has no turn_rate, need one"):
-        turns(CAR, [trim_at(CAR, 0.0, 0.0)], [1.0])
+        from_rest(CAR, [trim_at(CAR, 0.0, 0.0)], [1.0], "turn_rate")
     with pytest.raises(NotATrim, match=r"trim 'speed 1, steering 0': moves with .*, need a rest"):
-        strokes(CAR, [trim_at(CAR, 1.0, 0.0)], [1.0])
+        from_rest(CAR, [trim_at(CAR, 1.0, 0.0)], [1.0], "speed")
     with pytest.raises(ValueError, match="ramp: max_speed must be positive, got -1"):
         ramp_of(1.0, max_speed=-1.0, acceleration=1.0)

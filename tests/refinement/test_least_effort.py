@@ -94,8 +94,8 @@ def test_what_does_not_last_is_left_alone():
     ("options", "said"),
     [
         ({"pieces": 1}, "pieces must be at least 2, got 1"),
-        ({"cost": Cost(time=1.0)}, "the cost has to count effort, and nothing else but time"),
-        ({"cost": Cost(effort=1.0, switch=1.0)}, "nothing else but time"),
+        ({"cost": Cost(time=1.0)}, r"the terms\(\) of the cost have to be effort, and at most"),
+        ({"cost": Cost(effort=1.0, switch=1.0)}, "and at most time beside it"),
         ({"limits": [[-1.0, 1.0]]}, "limits have shape"),
     ],
 )

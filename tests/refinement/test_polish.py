@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import math
 
 import numpy as np
@@ -16,28 +15,24 @@ from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
-from maneuver_automaton.optimal_control.polishing import intervals_for
-from maneuver_automaton.optimal_control.scene import BodyPart, Polished, PolishSettings
+from maneuver_automaton.optimal_control.scene import BodyPart, Polished
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.refinement.closure import closed
 from maneuver_automaton.refinement.gear_sequences import (
     without_shuffles,
 )
-from maneuver_automaton.refinement.guesses import (
-    car_guess,
-    pace_of_car,
-    timed,
-)
+from maneuver_automaton.refinement.guesses import path_guesses, timed
 from maneuver_automaton.refinement.polish import PolishTask, polish_guesses
 
 CAR = SecondOrderCar(
     wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
 )
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
-SETTINGS = PolishSettings()
 HERE = SE2([0.0, 0.0, 0.0])
-STEPS = functools.partial(intervals_for, settings=SETTINGS)
+REST = np.zeros(2)
+PATHS = path_guesses(CAR)
+assert PATHS is not None
 
 
 def trim(speed: float, curvature: float, name: str) -> Trim:
@@ -77,11 +72,11 @@ def around():
     rest = (14.0 - reach) / 2.0
     whole = plan((1.0, 0.0, rest), (1.0, kappa, arc), (1.0, -kappa, 2 * arc), (1.0, kappa, arc),
                  (1.0, 0.0, rest))  # fmt: skip
-    return car_guess(CAR, whole, intervals=STEPS)
+    return PATHS.guess(whole, REST, REST)
 
 
 def test_a_straight_stroke_is_timed_like_on_paper() -> None:
-    run = timed(plan((1.0, 0.0, 10.0)), pace_of_car(CAR))
+    run = timed(plan((1.0, 0.0, 10.0)), PATHS.pace)
     v, a = 0.9 * 2.5, 0.9  # 90 % of the limits
     assert run.duration == pytest.approx(10.0 / v + v / a, rel=2e-2)
     assert run.twist[:, 0].max() <= v + 1e-12
@@ -144,7 +139,7 @@ def wide():
     arc = angle / kappa
     bend = ((1.0, kappa, arc), (1.0, -kappa, 2 * arc), (1.0, kappa, arc))
     rest = (14.0 - float(plan(*bend).end[0])) / 2.0
-    return car_guess(CAR, plan((1.0, 0.0, rest), *bend, (1.0, 0.0, rest)), intervals=STEPS)
+    return PATHS.guess(plan((1.0, 0.0, rest), *bend, (1.0, 0.0, rest)), REST, REST)
 
 
 def test_work_is_counted_in_iterations() -> None:

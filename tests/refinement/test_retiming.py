@@ -231,7 +231,9 @@ def test_costs_and_limits_are_checked():
     plan = plan_of(["straight", "rest"], [1.0, 1.0])
     with pytest.raises(ValueError) as error:
         retime(plan, Unicycle(), cost=Cost(time=1.0))
-    assert str(error.value) == "retime: the cost has no effort, need one with effort > 0"
+    assert (
+        str(error.value) == "retime: the cost has no effort, need one whose terms() have effort > 0"
+    )
     with pytest.raises(ValueError, match=r"limits have shape \(2,\), need \(2, 2\): least and"):
         retime(plan, Unicycle(), limits=[-1.0, 1.0])
     with pytest.raises(ValueError) as error:
