@@ -100,7 +100,7 @@ class FromState(PlanningStep):
                 if plan is not None:
                     _offer_whole(found, one, plan)
 
-        first: PlanResult | None = None
+        results: dict[int, PlanResult] = {}
         for k, result, _ in found.ask(
             [one.problem for one in questions],
             self.answer,
@@ -108,13 +108,16 @@ class FromState(PlanningStep):
             budget=budget.before(kept_back),
             alternatives=found.alternatives,
         ):
-            first = result if k == 0 else first
+            results[k] = result
             offer(result)
         polish = Polish()
         if polishes and polish.is_due(found):
             polish.offer(found)
         if not found.plans:
-            ended.why = _why_none(found, first)
+            why = found.why_none(results.values())
+            if why is None and results:  # proven from one trim, and not from another
+                why = PlanStatus.NO_PLAN, results[0].reason
+            ended.why = why or (PlanStatus.OUT_OF_BUDGET, f"no plan within {budget.seconds:.4g} s")
 
 
 def _offer_whole(found: Incumbents, one: BetweenTrims, plan: Plan) -> None:
@@ -324,17 +327,3 @@ def _between_trims(setting: Problem) -> Problem:
     )
     start = name if setting.start_state is not None else setting.start_trim
     return replace(setting, start_state=None, start_trim=start, goals=goals)
-
-
-def _why_none(found: Incumbents, first: PlanResult | None) -> tuple[PlanStatus, str]:
-    """Why there is no plan: of all that were refused the first, or of the first question."""
-    if found.why_unchecked:
-        return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
-    if found.why_refused:
-        return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
-    if first is None:
-        return PlanStatus.OUT_OF_BUDGET, f"no plan within {found.budget.seconds:.4g} s"
-    status = first.status
-    if status is not PlanStatus.OUT_OF_BUDGET:
-        status = PlanStatus.NO_PLAN  # what is proven from one trim is not so from another
-    return status, first.reason

@@ -168,6 +168,15 @@ class Incumbents:
         late = f"a plan was found too late to be checked within {self.budget.seconds:.4g} s"
         return late if self.unchecked else ""
 
+    def why_none(self, answers: Iterable[PlanResult] = ()) -> tuple[PlanStatus, str] | None:
+        """Why there is no plan: all were refused, or one of the `answers` to questions is open."""
+        if self.why_unchecked:
+            return PlanStatus.OUT_OF_BUDGET, self.why_unchecked
+        if self.why_refused:
+            return PlanStatus.NO_PLAN, f"every plan found was refused: {self.why_refused}"
+        left = (one for one in answers if one.status is PlanStatus.OUT_OF_BUDGET)
+        return next(((one.status, one.reason) for one in left), None)
+
     @property
     def rejected(self) -> int:
         """How many plans were refused for more than their times."""

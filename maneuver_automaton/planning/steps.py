@@ -293,10 +293,8 @@ def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:
     proof = proof or ("" if found.problem.has_inertia else why_impossible(found.problem))
     if proof:
         return PlanStatus.UNREACHABLE, proof
-    if found.why_unchecked:
-        return PlanStatus.OUT_OF_BUDGET, found.why_unchecked
-    if found.why_refused:
-        return PlanStatus.NO_PLAN, f"every plan found was refused: {found.why_refused}"
+    if why := found.why_none():
+        return why
     if unlinked := _why_unlinked(found.problem):
         return PlanStatus.NO_PLAN, unlinked
     near = ""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,10 +32,10 @@ from maneuver_automaton.search.limits import why_impossible
 
 INSIDE = 1e-6  # share of a tolerance by which poses that are aimed at stay within it
 AROUND = 4  # directions in which poses at a distance lie, the first towards the start
-DENSE = 16  # the same where the goal itself is blocked
-RINGS = (1.0, 0.5)  # shares of the tolerance at which these lie
 MOST_NODES = 32  # of a lattice that are aimed at for each goal
 MOST_AIMS = 12  # poses that are aimed at where the goal itself is blocked
+SPREAD, FEW = 4096, 32  # poses all over the tolerance of one in the plane, and in space
+STEPS = 0.8191725134, 0.6710436067, 0.5497004779  # whose multiples cut each unit interval evenly
 SHARES = (1.0, 0.5, 0.25)  # of the tolerance that an end may use, until it is free
 LATER = (0.45, 0.8, 0.8)  # shares of the time left for each question but the last
 MOST_LAST = 4  # trims at the end whose times alone are changed where all of them hit something
@@ -83,10 +83,7 @@ class WithinTolerance(PlanningStep):
                         break  # with the cheapest end that passes
         exact = results[0]
         if not found.plans:
-            late = PlanStatus.OUT_OF_BUDGET, found.why_unchecked
-            ended.why = (
-                late if late[1] else _why_none(problem, exact, found.why_refused, ends_blocked)
-            )
+            ended.why = _why_none(found, results, ends_blocked)
             return
         bound = exact.bound if exact.problem.goals == problem.goals else None
         ended.bound, ended.nodes = ended.bound or bound or formula_bound(problem), exact.nodes
@@ -99,8 +96,8 @@ def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:
     """
     lattice, proven = problem.automaton.lattice is not None, False
     if lattice:
-        nodes = tuple(node for goal in problem.goals for node in aims_within(problem, goal))
-        exact, beside = nodes or problem.goals, tuple[Goal, ...]()
+        nodes = (nodes_within(problem, goal)[:MOST_NODES] for goal in problem.goals)
+        exact, beside = tuple(itertools.chain(*nodes)) or problem.goals, tuple[Goal, ...]()
         blocked = all(why_goal_blocked(problem, goal) for goal in exact)
     else:
         touching = [bool(why_goal_blocked(problem, goal)) for goal in problem.goals]
@@ -117,8 +114,8 @@ def _questions(problem: Problem, budget: Budget) -> tuple[list[Problem], bool]:
         ]
         free = tuple(aim for aim in shown if not why_goal_blocked(problem, aim))
         beside = () if lattice else free
-    near, others = beside[:1], beside[1:]
-    asked = [goals for goals in (() if blocked and beside else exact, near, others) if goals]
+    first = () if blocked and beside else exact
+    asked = [goals for goals in (first, beside[:1], beside[1:]) if goals]
     most = problem.search.max_expansions
     share = None if most is None else max(1, most // len(asked))
     search = replace(problem.search, max_expansions=share)
@@ -131,34 +128,39 @@ def _aims(problem: Problem, blocked: Sequence[bool]) -> Iterator[Goal]:
         if is_blocked:
             yield from itertools.islice(free_aims(problem, goal), MOST_AIMS)
         else:
-            yield from _exactly(
-                problem, goal, _poses_within(goal, problem.start, AROUND, RINGS[:1])
-            )
+            yield from _exactly(problem, goal, _poses_within(goal, problem.start))
 
 
 def free_aims(problem: Problem, goal: Goal) -> Iterator[Goal]:
     """Poses within the tolerance of a goal that is blocked itself, clear of all that stands.
 
-    In the plane the kernels look at all of them at once: shapely takes 10 to 50 ms for each.
+    In the plane the kernels look at thousands of them at once: shapely takes 10 to 50 ms for each.
     """
-    aims = list(aims_within(problem, goal))
-    if aims and problem.start.size == 3 and not goal.free_heading:
-        still = tuple(one for one in problem.obstacles if not moves(one))
-        free = proven_free(replace(problem, obstacles=still), [aim.pose for aim in aims])
-        aims = [aim for aim, is_free in zip(aims, free, strict=True) if is_free]
+    if problem.automaton.lattice is not None:
+        aims: Iterable[Goal] = nodes_within(problem, goal)[:MOST_NODES]
+    else:
+        poses = np.array([*_poses_within(goal, problem.start), *_spread(problem, goal)])
+        if problem.start.size == 3:
+            still = tuple(one for one in problem.obstacles if not moves(one))
+            poses = poses[proven_free(replace(problem, obstacles=still), poses)]
+        aims = _exactly(problem, goal, poses)
     return (aim for aim in aims if not why_goal_blocked(problem, aim))
 
 
-def aims_within(problem: Problem, goal: Goal) -> Iterator[Goal]:
-    """Poses within the tolerance of a goal that is blocked itself, aimed at exactly.
+def _spread(problem: Problem, goal: Goal) -> Array:
+    """Poses (n, dof) spread evenly over the tolerance of a goal, by additive recurrences.
 
-    On a lattice they are its nodes, since plans end nowhere else.
+    Source: Roberts (2018), The unreasonable effectiveness of quasirandom sequences.
     """
-    if problem.automaton.lattice is not None:
-        return iter(nodes_within(problem, goal)[:MOST_NODES])
-    few = _poses_within(goal, problem.start, AROUND, RINGS[:1])
-    many = _poses_within(goal, problem.start, DENSE, RINGS)
-    return _exactly(problem, goal, itertools.chain(few, many))
+    n = SPREAD if goal.pose.size == 3 else FEW
+    far, angle, turn = (np.outer(np.arange(1.0, n + 1.0), STEPS) % 1.0).T
+    off = goal.tolerance_m * np.sqrt(far) * np.exp(1j * (goal.pose[2] + 2.0 * math.pi * angle))
+    poses = np.tile(goal.pose, (n, 1))
+    poses[:, :2] += (1.0 - INSIDE) * np.column_stack([off.real, off.imag])
+    if trim_headings(problem.automaton) is None:
+        most = math.pi if goal.free_heading else (1.0 - INSIDE) * goal.tolerance_rad
+        poses[:, 2] += most * (2.0 * turn - 1.0)
+    return poses
 
 
 def _exactly(problem: Problem, goal: Goal, poses: Iterable[Array]) -> Iterator[Goal]:
@@ -169,9 +171,7 @@ def _exactly(problem: Problem, goal: Goal, poses: Iterable[Array]) -> Iterator[G
             yield replace(goal, pose=pose, tolerance_m=0.0, tolerance_rad=0.0)
 
 
-def _poses_within(
-    goal: Goal, start: Array, directions: int, rings: tuple[float, ...]
-) -> Iterator[Array]:
+def _poses_within(goal: Goal, start: Array) -> Iterator[Array]:
     """Poses (dof,) within the tolerance of a goal, those nearer to the start first."""
     far, turned = ((1.0 - INSIDE) * value for value in (goal.tolerance_m, goal.tolerance_rad))
     places = [0, 1, *range(3, start.size)]
@@ -194,15 +194,14 @@ def _poses_within(
     if far:
         towards = math.atan2(offset[1], offset[0])
         shifts = [offset * min(1.0, far / distance)] if distance > 0.0 else []
-        for share in rings:
-            for k in range(1 if shifts else 0, directions):
-                angle = towards + k * 2.0 * math.pi / directions
-                shift = np.zeros(len(places))
-                shift[:2] = share * far * np.array([math.cos(angle), math.sin(angle)])
-                shifts.append(shift)
+        for k in range(1 if shifts else 0, AROUND):
+            angle = towards + k * 2.0 * math.pi / AROUND
+            shift = np.zeros(len(places))
+            shift[:2] = far * np.array([math.cos(angle), math.sin(angle)])
+            shifts.append(shift)
         shifts.append(np.zeros(len(places)))
     for n_th, shift in enumerate(shifts):
-        for angle in turns if n_th in (0, len(shifts) - 1) or directions > AROUND else (0.0,):
+        for angle in turns if n_th in (0, len(shifts) - 1) else (0.0,):
             if shift.any() or angle:
                 pose = np.array(goal.pose)
                 pose[places] += shift
@@ -237,12 +236,16 @@ def _goals_met(problem: Problem, plan: Plan) -> Iterator[int]:
 
 
 def _why_none(
-    problem: Problem, exact: PlanResult, refused: str, ends_blocked: bool
+    found: Incumbents, results: Mapping[int, PlanResult], ends_blocked: bool
 ) -> tuple[PlanStatus, str]:
     """The verdict on the poses that were aimed at, as far as it holds for all within tolerance."""
-    if refused:
-        return PlanStatus.NO_PLAN, f"every plan found was refused: {refused}"
-    if exact.status is PlanStatus.UNREACHABLE and not why_impossible(problem):
+    exact = results[0]
+    unreachable = exact.status is PlanStatus.UNREACHABLE
+    if unreachable and why_impossible(found.problem):
+        return exact.status, exact.reason
+    if why := found.why_none(results.values()):
+        return why
+    if unreachable:
         return PlanStatus.NO_PLAN, exact.reason  # proven for these poses alone
     if exact.status is PlanStatus.GOAL_BLOCKED and not ends_blocked:
         return PlanStatus.NO_PLAN, f"no free pose was found within the tolerance: {exact.reason}"

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.collision import Box, Disc
 from maneuver_automaton.costs import Cost
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import PlanStatus, plan
+from maneuver_automaton.planning.within_tolerance import free_aims
 from maneuver_automaton.problem import Goal, Horizon, Problem, SearchSettings
 from tests import scenes
 from tests.quickly import quick_are
@@ -121,6 +125,20 @@ def test_a_blocked_goal_is_reached_beside_it():
     assert result.terminal_error.position_m > 0.15
     blocked = replace(near, obstacles=[Disc(0.5, [4.5, 1.0])])
     assert plan(blocked, time_limit=LIMIT).status is PlanStatus.GOAL_BLOCKED
+
+
+def test_a_slot_is_found_within_the_tolerance_of_a_blocked_goal():
+    at = SE2([4.63, 1.17, 0.81])
+    walls = [Box([3.0, 1.0], [0.0, 0.57]).moved(at), Box([3.0, 1.0], [0.0, -0.57]).moved(at)]
+    problem = to_goal("unicycle", 0.4, 0.5, obstacles=walls, footprint=Box([0.8, 0.1]))
+    aims = list(itertools.islice(free_aims(problem, problem.goals[0]), 3))
+    assert len(aims) == 3
+    for aim in aims:
+        body = shapely.Polygon(problem.footprint[0].moved(SE2(aim.pose)).corners)
+        assert not any(body.intersects(shapely.Polygon(wall.corners)) for wall in walls)
+        off = problem.goals[0].off(aim.pose)
+        assert off[0] <= 0.4
+        assert off[1] <= 0.5
 
 
 def test_who_is_there_already_need_not_move():
