@@ -30,8 +30,15 @@ class SolveStatus(enum.Enum):
     FAILED = "failed"  # the solver gave up, or its numbers do not hold
 
 
-MU_INIT = 1e-3  # first barrier parameter: a large one pushes the iterate away from its guess, and
-# with it out of the sequence of moves that the guess stands for
+# A large first barrier parameter pushes the iterate away from its guess, and with it out of the
+# sequence of moves that the guess stands for.
+NEAR = {"ipopt.mu_init": 1e-3}
+# Of a guess that stands for none; from there the barrier falls in few and loose steps.
+FAR = {
+    "ipopt.mu_init": 0.1,
+    "ipopt.mu_linear_decrease_factor": 0.1,
+    "ipopt.barrier_tol_factor": 50.0,
+}
 
 QUIET: dict[str, Any] = {
     "print_time": False,
@@ -58,6 +65,7 @@ class SolverSettings:
     tolerance: float = 1e-9  # of the scaled optimality conditions [-]
     max_iterations: int = 300
     admitted_defect: float = 1e-7  # of defects and violations, computed again, in their units
+    far: bool = False  # whether guesses may be far from the solution
 
     def __post_init__(self) -> None:
         for name in ("tolerance", "max_iterations", "admitted_defect"):
@@ -67,8 +75,7 @@ class SolverSettings:
 
 def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
     """Options of IPOPT."""
-    return QUIET | {
-        "ipopt.mu_init": MU_INIT,
+    return QUIET | (FAR if settings.far else NEAR) | {
         "ipopt.tol": settings.tolerance,
         "ipopt.constr_viol_tol": settings.tolerance,
         "ipopt.acceptable_tol": 1e3 * settings.tolerance,

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._limits import LONGEST_STROKE
@@ -21,7 +20,7 @@ from maneuver_automaton.models.speeds import (
     standing_price,
     steers_at_rest,
 )
-from maneuver_automaton.primitives.driving import drive_all
+from maneuver_automaton.primitives.driving import BoolArray, drive_all
 from maneuver_automaton.primitives.primitive import Maneuver, Trajectory, Trim
 
 Pairs = Literal["all", "neighbours"] | Sequence[tuple[int, int]]
@@ -146,9 +145,13 @@ def _maneuvers(
 
 
 def quickest_between(
-    model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool = False
+    model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool | BoolArray = False
 ) -> list[Maneuver]:
-    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them."""
+    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them.
+
+    Which of them are `late` may differ from pair to pair (m,).
+    """
+    late = np.broadcast_to(late, len(pairs))
     source = np.array([source.reduced_state for source, _ in pairs])
     target = np.array([target.reduced_state for _, target in pairs])
     same = ~(np.abs(target - source) > EQUAL * np.maximum(1.0, np.abs(source))).any(axis=1)
@@ -173,11 +176,11 @@ def quickest_between(
     return [
         Maneuver.along(
             course,
-            name=f"{a.name} to {b.name}" + (", late" if late else ""),
+            name=f"{a.name} to {b.name}" + (", late" if waits else ""),
             source=a.name,
             target=b.name,
         )
-        for (a, b), course in zip(pairs, courses, strict=True)
+        for (a, b), course, waits in zip(pairs, courses, late.tolist(), strict=True)
     ]
 
 
@@ -186,15 +189,16 @@ def _one_by_one(model: Model, source: Array, target: Array) -> tuple[Trajectory,
     k = model.reduced_names.index("speed")
     falls = np.abs(target[:, k]) <= np.abs(source[:, k])
     middle = np.where(falls[:, None] == (np.arange(source.shape[1]) == k), target, source)
-    legs = [segments(model, *ends, late=False) for ends in ((source, middle), (middle, target))]
+    early = np.zeros(len(source), dtype=np.bool_)
+    legs = [segments(model, *ends, late=early) for ends in ((source, middle), (middle, target))]
     control, durations = (np.concatenate(parts, axis=1) for parts in zip(*legs, strict=True))
     return drive_all(model, source, control=control, durations=durations)
 
 
-def segments(model: Model, source: Array, target: Array, *, late: bool) -> tuple[Array, Array]:
+def segments(model: Model, source: Array, target: Array, *, late: BoolArray) -> tuple[Array, Array]:
     """Controls (m, n, n) and durations (m, n) that lead from reduced states (m, n) to others."""
     change = target - source
-    low, high = np.moveaxis(model.control_limits, -1, 0)
+    low, high = model.control_limits.T
     rate = np.where(change > 0.0, high, low)
     stuck = (change != 0.0) & (rate * np.sign(change) <= 0.0)
     if stuck.any():
@@ -209,10 +213,12 @@ def segments(model: Model, source: Array, target: Array, *, late: bool) -> tuple
     rate = np.where(close, change / np.where(close, longest, 1.0), rate)
     needed = np.where(close, longest, needed)
     ends = np.sort(needed, axis=1)
-    durations = np.diff(ends, axis=1, prepend=0.0)
+    durations = ends.copy()
+    durations[:, 1:] -= ends[:, :-1]
     active = (needed[:, None, :] >= ends[:, :, None]) & (needed[:, None, :] > 0.0)
     control = np.where(active, rate[:, None, :], 0.0)
-    return (control[:, ::-1], durations[:, ::-1]) if late else (control, durations)
+    control[late], durations[late] = control[late, ::-1], durations[late, ::-1]
+    return control, durations
 
 
 def _chosen(trims: Sequence[Trim], pairs: Pairs) -> list[tuple[Trim, Trim]]:
@@ -223,7 +229,7 @@ def _chosen(trims: Sequence[Trim], pairs: Pairs) -> list[tuple[Trim, Trim]]:
     states = np.array([trim.reduced_state for trim in trims]).reshape(len(trims), -1)
     levels = np.stack([_levels(column) for column in states.T], axis=-1)
     steps = np.abs(levels[:, None] - levels).max(axis=2, initial=0)
-    wanted: NDArray[np.bool_] = (steps > 0) & ((steps == 1) | (pairs == "all"))
+    wanted: BoolArray = (steps > 0) & ((steps == 1) | (pairs == "all"))
     if (count := np.count_nonzero(wanted)) > MOST:
         raise ValueError(
             f"pairs: got {count} maneuvers between {len(trims)} trims, need at most {MOST}: fewer "

@@ -190,6 +190,7 @@ def _is_rough(elements: Elements) -> BoolArray:
 
 
 MOST_SAMPLES = 500_000  # of one motion
+TOGETHER = 4096  # samples that are placed at once
 
 
 def drive(
@@ -363,12 +364,11 @@ def _gained(elements: Elements, at: tuple[IntArray, IntArray], share: Array) -> 
     """Pose from the begin of the element, then reduced state gained, at shares of elements."""
     rates = np.concatenate([elements.flow, elements.rates], axis=-1)
     series = SERIES @ rates * elements.step[..., None, None]
-    shares, which, counts = np.unique(share, return_inverse=True, return_counts=True)
     gained = np.empty((share.size, rates.shape[-1]))
-    order, ends = np.argsort(which, kind="stable"), np.cumsum(counts)
-    for row, begin, end in zip(integrals_to(shares), ends - counts, ends, strict=True):
-        same = order[begin:end]
-        gained[same] = row @ series[at[0][same], at[1][same]]
+    for k in range(0, share.size, TOGETHER):
+        few = slice(k, k + TOGETHER)
+        integrals = integrals_to(share[few])[:, None]
+        gained[few] = (integrals @ series[at[0][few], at[1][few]])[:, 0]
     return gained
 
 

@@ -36,7 +36,7 @@ from maneuver_automaton.primitives.primitive import Maneuver, Trim
 from maneuver_automaton.primitives.turning import hitch_maneuvers
 
 FEW = TransferSettings(  # intervals: enough for a short way, and solved in some 20 ms
-    intervals=8, solver=SolverSettings(tolerance=1e-7, max_iterations=80)
+    intervals=8, solver=SolverSettings(tolerance=1e-7, max_iterations=80, far=True)
 )
 GUESSES = ((1.0, 0.0), (2.0, 0.5))  # (factor of the guessed duration, swing), in turn
 MODELS = 16  # whose programs are kept
@@ -133,7 +133,8 @@ def _in_closed_form(
     model: Model, pairs: Sequence[tuple[Trim, Trim]]
 ) -> Iterator[tuple[Maneuver, ...]]:
     try:
-        early, late = (quickest_between(model, pairs, late=late) for late in (False, True))
+        late = np.arange(2 * len(pairs)) >= len(pairs)
+        made = quickest_between(model, [*pairs, *pairs], late=late)
     except ValueError:  # a component cannot change that way at all
         if len(pairs) == 1:
             yield ()
@@ -141,7 +142,7 @@ def _in_closed_form(
         for pair in pairs:
             yield from _in_closed_form(model, [pair])
         return
-    for one, other in zip(early, late, strict=True):
+    for one, other in zip(made[: len(pairs)], made[len(pairs) :], strict=True):
         both = (one, *differing([one], [other]))
         yield tuple(one for one in both if may_drive(model, one))
 
@@ -195,7 +196,7 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
             continue
         raw = Inputs(control=found.control, interval=found.duration / len(found.control))
         limits, enough = model.control_limits, CLOSED / 2.0
-        _, course = closed(model, start, end, inputs=raw, limits=limits, enough=enough, substeps=1)
+        _, course = closed(model, start, end, inputs=raw, limits=limits, enough=enough, substeps=2)
         missed = float(np.abs(course.reduced_state[-1] - end).max())
         if (
             not missed <= CLOSED
