@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,7 +47,7 @@ class PlaceCost(Protocol):
     derivatives (..., dof) by the pose; ``least(low, high)``, a number that no rate is below while
     x and y [m] are in a box; ``moved(by)``, the same cost elsewhere; ``on(problem)``, the cost once
     it knows obstacles and body; ``smooth()``, nearly the same without jumps, for better coasting
-    times; ``scale`` [m], the size of its finest feature;
+    times; ``scale`` [m], the size of its finest feature; ``continuous``, whether rates never jump;
     and ``allows(poses, velocities)``, where the vehicle may be at all. What is missing is found by
     differences, is 0, or is the cost at poses moved back.
 
@@ -165,6 +165,7 @@ class _Near:
     around: tuple[tuple[int | None, tuple[float, float] | None, World], ...]
     body_height: tuple[float, float]  # [m]
     automaton: Automaton
+    continuous: ClassVar[bool] = True
 
     @property
     def per(self) -> str:
@@ -574,12 +575,6 @@ def moved(cost: PlaceCost, by: LieGroup) -> PlaceCost:
     """The cost moved by a group element: by its own method, or at poses moved back."""
     own: Callable[[LieGroup], PlaceCost] | None = getattr(cost, "moved", None)
     return _Moved(cost, by) if own is None else own(by)
-
-
-def least_of(cost: PlaceCost, low: ArrayLike, high: ArrayLike) -> float:
-    """A number that no rate is below while x and y [m] are between two corners; 0 if not known."""
-    own: Callable[[Any, Any], float] | None = getattr(cost, "least", None)
-    return 0.0 if own is None else own(low, high)
 
 
 def smoothed(cost: PlaceCost) -> PlaceCost:

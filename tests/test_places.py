@@ -29,7 +29,7 @@ from maneuver_automaton import (
     verify,
 )
 from maneuver_automaton.formats.plan_json import plan_to_dict
-from maneuver_automaton.places import gradient_of, least_of
+from maneuver_automaton.places import gradient_of
 
 CONTROLS = {f"{v:+d} {s:+.1f}": (v, s) for v in (1, -1) for s in (-0.5, 0.0, 0.5)}
 CAR = Automaton.of_controls(Car(wheelbase=2.5, max_steering=0.5), CONTROLS)
@@ -154,10 +154,9 @@ def test_gradients_and_least_rates():
     raster = Ground.of_raster([[0.0, 1.0, 4.0]], resolution=1.0)
     poses = np.array([[1.0, 0.5, 0.3]])
     assert gradient_of(raster, poses, np.zeros((1, 3))) == pytest.approx(np.array([[1.0, 0, 0]]))
-    assert least_of(raster, [1.6, 0.2], [1.9, 0.4]) == 1.0
-    assert least_of(Ground(Box([4, 4]), 3.0), [-1, -1], [1, 1]) == 3.0
-    assert least_of(Ground(Box([4, 4]), 3.0), [-1, -1], [3, 1]) == 0.0
-    assert least_of(Crosswind(), [0, 0], [1, 1]) == 0.0
+    assert raster.least([1.6, 0.2], [1.9, 0.4]) == 1.0
+    assert Ground(Box([4, 4]), 3.0).least([-1, -1], [1, 1]) == 3.0
+    assert Ground(Box([4, 4]), 3.0).least([-1, -1], [3, 1]) == 0.0
 
 
 def test_a_moved_problem_has_a_moved_plan():

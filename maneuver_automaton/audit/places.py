@@ -17,7 +17,7 @@ from maneuver_automaton.places import Clearance, PlaceCost
 
 AGREED = 1e-3  # of the plan's whole cost, by which two integrations may differ
 CLOSE = 2e-4  # of that cost: stretches are halved until what is still open is less
-LONGEST = 0.5  # [s], [m] of a stretch, before any is halved
+LONGEST = 0.75  # [s], [m] of a stretch, before any is halved
 MOST_ROUNDS = 22
 # Lobatto's rule with four points, and Kronrod's seven that contain them: ends count, so that no
 # jump of a rate hides beyond the last one. Source: Gander and Gautschi (2000), Adaptive quadrature.

@@ -191,7 +191,7 @@ class LatticeWords(PlanningStep):
                 easy, budget=limit, table=self.table, begun=begun, aside=aside, is_proven=proven
             )
             self._count(first, searches=1)
-            word = first.word and with_cost(first.word, query)
+            word = first.word if easy is query else first.word and with_cost(first.word, query)
         if word is not None:
             self.gained(word)
         ended.lattice, ended.nodes = first, first.nodes if first else None
