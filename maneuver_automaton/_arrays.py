@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from typing import Any
@@ -13,22 +14,25 @@ from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+REAL = "biuf"  # kinds of NumPy's types that are real numbers
 FEW = 16  # numbers that are looked at faster one by one
 
 
 def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None) -> Array:
     """`value` as finite float64 with `last` components in its last axis; `name` is for messages.
 
-    Anything that NumPy can turn into float64 but text, of any shape where `last` is None. The array
+    Real numbers of any type, no text and no dates, and of any shape where `last` is None. The array
     is in the order of C, and `value` itself if it is one.
     """
     try:
         known = np.asarray(value)
-        if known.dtype.kind in "SU":
-            raise TypeError("a text is no number")
+        if known.dtype.kind == "O":
+            known = np.array([_float(one) for one in known.flat]).reshape(known.shape)
+        if known.dtype.kind not in REAL:
+            raise TypeError
         array = np.asarray(known, dtype=np.float64, order="C")
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: got {value!r}, need numbers") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: got {reprlib.repr(value)}, need numbers") from error
     if last is not None:
         admitted = (last,) if isinstance(last, int) else tuple(last)
         if array.ndim == 0 or array.shape[-1] not in admitted:
@@ -62,7 +66,7 @@ def plain_numbers(instance: Any) -> None:
                 object.__setattr__(instance, name, convert(value))
             except (TypeError, ValueError, OverflowError) as error:
                 what = f"{type(instance).__name__}: {name}"
-                raise ValueError(f"{what}: got {value!r}, need {need}") from error
+                raise ValueError(f"{what}: got {reprlib.repr(value)}, need {need}") from error
 
 
 @functools.cache
@@ -80,16 +84,25 @@ def _numbers_of(kind: type) -> tuple[tuple[str, bool, tuple[Callable[[Any], Any]
 def _float(value: Any) -> float:
     if isinstance(value, float) and not isinstance(value, np.generic):
         return value  # perhaps of a kind of its own, which says more than the number
-    if isinstance(value, str | bytes) or np.ndim(value):
+    known = np.asarray(value)
+    if known.ndim or known.dtype.kind not in (*REAL, "O") or isinstance(value, str | bytes):
         raise TypeError
     return float(value)
 
 
 def _int(value: Any) -> int:
+    _float(value)
     number = int(value)
-    if number != value:  # nor is a text equal to it
+    if number != value:
         raise ValueError
     return number
+
+
+def _bool(value: Any) -> bool:
+    number = _int(value)
+    if number not in (0, 1):
+        raise ValueError
+    return bool(number)
 
 
 def _floats(values: Any) -> tuple[float, ...]:
@@ -101,7 +114,7 @@ def as_number(name: str, value: Any) -> float:
     try:
         return _float(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: got {value!r}, need a number") from error
+        raise ValueError(f"{name}: got {reprlib.repr(value)}, need a number") from error
 
 
 def as_whole(name: str, value: Any) -> int:
@@ -109,12 +122,13 @@ def as_whole(name: str, value: Any) -> int:
     try:
         return _int(value)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: got {value!r}, need a whole number") from error
+        raise ValueError(f"{name}: got {reprlib.repr(value)}, need a whole number") from error
 
 
 NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "float": (_float, "a number"),
     "int": (_int, "a whole number"),
+    "bool": (_bool, "True or False"),
     "tuple[float, float]": (_floats, "two numbers"),
     "tuple[float, ...]": (_floats, "numbers"),
 }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -28,7 +29,10 @@ def test_a_float_array_is_not_copied():
     assert as_array("x", array) is array
 
 
-@pytest.mark.parametrize("value", [[1, 2], (1, 2), range(1, 3), np.array([1, 2], dtype=np.int8)])
+@pytest.mark.parametrize(
+    "value",
+    [[1, 2], (1, 2), range(1, 3), np.array([1, 2], dtype=np.int8), np.array([1, Fraction(2)])],
+)
 def test_numbers_of_any_kind_become_floats(value):
     array = as_array("x", value, last=2)
     assert array.dtype == np.float64
@@ -52,6 +56,12 @@ def test_without_a_length_any_shape_will_do():
         ([1.0, [2.0]], None, "speed: got [1.0, [2.0]], need numbers"),
         ([{}], None, "speed: got [{}], need numbers"),
         ([1.0, "2"], None, "speed: got [1.0, '2'], need numbers"),
+        (
+            [1.0, 10**400],
+            None,
+            "speed: got [1.0, 100000000000000000...0000000000000000000], need numbers",
+        ),
+        ([1j], None, "speed: got [1j], need numbers"),
         ([1.0, 2.0], 3, "speed: got shape (2,), need 3 components last"),
         ([[1.0, 2.0]], (3, 4), "speed: got shape (1, 2), need 3 or 4 components last"),
         (1.0, 1, "speed: got shape (), need 1 components last"),

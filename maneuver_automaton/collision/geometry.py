@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 
@@ -73,18 +74,24 @@ def one_ring(what: str, geometry: Any) -> Rings:
 def are_points(value: Any) -> bool:
     """Whether an array, or a sequence, is a list of points and not one of shapes."""
     if isinstance(value, np.ndarray):
-        return value.ndim < 3 and value.dtype != np.object_
+        return value.ndim < 3 and _holds_numbers(value)
     return len(value) > 0 and all(_is_point(one) for one in value)
 
 
 def _is_point(value: Any) -> bool:
     """Whether it is a number, or a row of numbers."""
     if isinstance(value, np.ndarray):
-        return value.ndim < 2 and value.dtype != np.object_
+        return value.ndim < 2 and _holds_numbers(value)
     if isinstance(value, Sequence) and not isinstance(value, str):
         return len(value) > 0 and all(map(_is_number, value))
     return _is_number(value)
 
 
+def _holds_numbers(array: NDArray[Any]) -> bool:
+    return array.dtype != np.object_ or (array.size > 0 and all(map(_is_number, array.flat)))
+
+
 def _is_number(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return not value.ndim and _holds_numbers(value)
     return bool(np.isscalar(value)) and not isinstance(value, str)

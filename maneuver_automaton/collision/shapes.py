@@ -6,6 +6,7 @@ All are solids, and closed: to touch one is to collide with it.
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -187,8 +188,8 @@ def as_shapes(what: str, value: Any, *, or_else: str = "") -> tuple[Shape, ...]:
             return (_polygon_of_points(what, value),)
         return tuple(one for part in value for one in as_shapes(what, part))
     raise ValueError(
-        f"{what}: got {value!r}, need {or_else}Polygon, Disc or Box, geometry of shapely, or "
-        "corners (n, 2)"
+        f"{what}: got {reprlib.repr(value)}, need {or_else}Polygon, Disc or Box, geometry of "
+        "shapely, or corners (n, 2)"
     )
 
 
@@ -328,13 +329,11 @@ class OccupancyMap:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        given = np.asarray(self.blocked)
+        given = self.blocked
+        if not (isinstance(given, np.ndarray) and given.dtype.kind in "biu"):
+            given = as_array("map: cells", given)
         if given.ndim != 2 or given.size == 0:
             raise ValueError(f"map: cells have shape {given.shape}, need (rows, columns)")
-        if given.dtype != np.bool_ and given.dtype.kind not in "iuf":
-            raise ValueError(f"map: cells have the type {given.dtype}, need booleans or numbers")
-        if given.dtype.kind == "f":
-            as_array("map: cells", given)
         cells = given.astype(np.bool_, order="C")
         cells.setflags(write=False)
         object.__setattr__(self, "blocked", cells)

@@ -77,6 +77,8 @@ BESIDE = 1e-6  # [m, rad] from a goal, per metre to it, where exact times are wo
 Passage = tuple[float, Goal]
 """Where in a word, 1 after its first trim, 1.5 in the midst of its second, what is passed."""
 
+ROUNDED = 1e-3  # share of it that rounding may take
+Complexes = NDArray[np.complex128]
 NONE = 1e-8  # [s, rad] of a coast that is none, or of one that misses a whole turn
 MOST_TRIMS = 40  # of a library, of which every two are tried
 
@@ -125,16 +127,13 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
                 plan = Plan(start, first, durations=[0.0] * len(first), start_time=clock)
                 found.append((plan, index))
         elif len(joined := _joined(problem, goal)) <= MOST_TRIMS:
-            poses = [goal.pose]
-            if goal.free_heading:  # those of single trims that end beside the start
-                far = math.dist(goal.pose[:2], start[:2])
-                rows = [trim.body_velocity for trim in joined if far <= BESIDE]
-                turns = {far * float(row[2]) / v for row in rows if (v := math.hypot(*row[:2]))}
-                poses = [np.array([*goal.pose[:2], start[2] + t, *goal.pose[3:]]) for t in turns]
-            for pose in poses:
-                for trims, times in _short_words(problem, pose, joined):
-                    switches = () if automaton.is_kinematic else (None,) * (len(trims) - 1)
-                    plan = Plan(start, trims, durations=times, maneuvers=switches, start_time=clock)
+            asked = [(goal.pose, joined)]
+            if goal.free_heading:
+                asked = [(pose, [trim]) for trim in joined for pose in _passed(start, goal, trim)]
+            for pose, trims in asked:
+                for word, times in _short_words(problem, pose, trims):
+                    switches = () if automaton.is_kinematic else (None,) * (len(word) - 1)
+                    plan = Plan(start, word, durations=times, maneuvers=switches, start_time=clock)
                     found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
 
@@ -149,31 +148,54 @@ def _joined(problem: Problem, goal: Goal) -> list[Trim]:
     return [trim for trim, kind in both if kind == first == last and not trim.is_rest]
 
 
+def _passed(start: Array, goal: Goal, trim: Trim) -> Iterator[Array]:
+    """The pose in which a trim passes right beside a goal of any heading."""
+    (v_x, v_y, w), way = trim.body_velocity[:3].tolist(), goal.pose - start
+    v, z = complex(v_x, v_y), complex(way[0], way[1]) * cmath.rect(1.0, -start[2])
+    if v:
+        r = -1j * v / w if w else 0.0
+        turn = cmath.phase((z + r) / r) if r else 0.0
+        aside = abs(z + r) - abs(r) if r else (z / v).imag * abs(v)
+        if abs(aside) <= BESIDE * (1.0 + abs(z)):
+            yield np.array([*goal.pose[:2], start[2] + turn, *goal.pose[3:]])
+
+
 def _short_words(
     problem: Problem, goal: Array, trims: list[Trim]
 ) -> Iterator[tuple[list[Trim], list[float]]]:
     """Words of at most two of these trims that end at a goal but for `MET`, with their times."""
     rows = np.array([trim.body_velocity for trim in trims]).reshape(-1, problem.start.size)
     way = goal - problem.start
-    z, h = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
-    last = cmath.rect(1.0, h)
+    z, heading = complex(way[0], way[1]) * cmath.rect(1.0, -problem.start[2]), float(way[2])
     i, j = np.indices((len(trims), len(trims))).reshape(2, -1)
     v, w = rows[:, 0] + 1j * rows[:, 1], rows[:, 2]
     turns = w != 0.0
+
+    def ended(h: Array) -> tuple[Array, Complexes, Complexes]:
+        """Of words that end heading `h`: heading at the switch, what is left, what stays aside."""
+        last = np.exp(1j * h)
+        centres = np.angle((z + r[i] - r[j] * last) / (r[i] - r[j]))  # of two turns decide
+        between = np.where(turns[j] & (r[i] != r[j]), centres, h) * turns[i]
+        switch = np.exp(1j * between)
+        left = z - r[i] * (switch - 1.0) - r[j] * (last - switch)  # for straights to cover
+        straight = np.where(turns[j], v[i], v[j] * switch)
+        aside = 1j * (left / straight).imag * straight
+        return between, left, np.where(turns[i] & turns[j], left, aside)
+
     with np.errstate(divide="ignore", invalid="ignore"):
         r = np.where(turns, -1j * v / w, 0.0)  # from the centre of a turn to the pose
-        centres = np.angle((z + r[i] - r[j] * last) / (r[i] - r[j]))  # of two turns decide
-        between = np.where(turns[j] & (r[i] != r[j]), centres, h) * turns[i]  # at the switch
-        left = z - r[i] * (np.exp(1j * between) - 1.0) - r[j] * (last - np.exp(1j * between))
-        first, second = v[i], v[j] * last  # straights, which have to cover what is left
-        straight = np.where(turns[j], first, second)
-        beside = np.where(turns[i] & turns[j], left, (left / straight).imag * straight)
-        beside = np.where(turns[i] | turns[j], np.abs(beside), abs(wrapped(h)))
+        h = np.full(i.size, heading)
+        aside = ended(h)[2]
+        beside = np.where(turns[i] | turns[j], np.abs(aside), abs(wrapped(heading)))
         kept = np.flatnonzero(beside <= BESIDE * (1.0 + abs(z)))
         if not kept.size:
             return
-        i, j, between = i[kept], j[kept], between[kept]
-        left, first, second = left[kept], first[kept], second[kept]
+        i, j, h, aside = i[kept], j[kept], h[kept], aside[kept]
+        slope = (ended(h + BESIDE)[2] - aside) / BESIDE
+        most = (1.0 - ROUNDED) * MET  # by which the last heading may be off as well
+        h = h + np.where(np.abs(aside) > most, (-aside / slope).real.clip(-most, most), 0.0)
+        between, left, _ = ended(h)
+        first, second = v[i], v[j] * np.exp(1j * between)
         area = (first.conj() * second).imag
         times = np.array([(left.conj() * second).imag / area, (first.conj() * left).imag / area])
         one = turns[i] | turns[j] | (np.abs(area) <= NONE * np.abs(first * second))
@@ -185,7 +207,7 @@ def _short_words(
     times[~((np.abs(times) < np.inf) & ((times > 0.0) | (times < -NONE)))] = 0.0
     group, seen = problem.automaton.model.group, set[tuple[int, ...]]()
     ends = group.exp(times[0, :, None] * rows[i]) @ group.exp(times[1, :, None] * rows[j])
-    off = ends.pose - np.array([z.real, z.imag, h, *way[3:]])
+    off = ends.pose - np.array([z.real, z.imag, heading, *way[3:]])
     turned = np.abs(wrapped(off[:, 2]))
     off = np.maximum(turned, np.linalg.norm(np.delete(off, 2, axis=1), axis=1))
     for k in np.flatnonzero((times >= 0.0).all(axis=0) & (off <= MET)).tolist():

@@ -102,7 +102,7 @@ def test_dark_and_transparent_pixels_are_blocked(pixels):
         (lambda: ma.OccupancyMap([1, 0], resolution=1.0),
          "map: cells have shape (2,), need (rows, columns)"),
         (lambda: ma.OccupancyMap([["a"]], resolution=1.0),
-         "map: cells have the type <U1, need booleans or numbers"),
+         "map: cells: got [['a']], need numbers"),
         (lambda: ma.OccupancyMap([[np.nan]], resolution=1.0),
          "map: cells: got nan, need finite numbers"),
         (lambda: ma.OccupancyMap.of_picture(np.zeros((2, 2, 5)), resolution=1.0),
