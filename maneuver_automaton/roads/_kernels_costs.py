@@ -223,6 +223,34 @@ def in_time(
 
 
 @bare_inner_kernel
+def cost_between(
+    weights: Weights, speed: float, end: float, most: float, distance: float, time: float
+) -> float:
+    """Cost to drive a distance in a time [s] from one speed to another, no faster than `most`.
+
+    The least integral of squared acceleration, which then is linear in time. What the limits can
+    do at best is to accelerate, hold a speed, and brake, or the other way round.
+    """
+    time, gain, braking = max(time, SOON), weights.gain, weights.braking
+    changes = max((end - speed) / gain, (speed - end) / braking) / time
+    beyond = changes - 1.0
+    if changes <= 1.0:
+        each = 1.0 / gain + 1.0 / braking
+        high = min((time + speed / gain + end / braking) / each, max(most, speed, end))
+        low = max((speed / braking + end / gain - time) / each, 0.0)
+        far = high * time - 0.5 * ((high - speed) ** 2 / gain + (high - end) ** 2 / braking)
+        near = low * time + 0.5 * ((speed - low) ** 2 / braking + (end - low) ** 2 / gain)
+        beyond = max(distance / max(far, SOON), near / max(distance, SOON)) - 1.0
+    # Who has more time than that to stop on the way stands for the rest of it.
+    both = speed + end
+    lasting = 3.0 * distance / max(both - math.sqrt(speed * end), SOON)
+    lasting = max(min(time, lasting), SOON)
+    mean = distance / lasting
+    effort = 4.0 * (both * both - speed * end - 3.0 * mean * (both - mean)) / lasting
+    return weights.ahead * effort + (IMPOSSIBLE * (beyond + STEP) if beyond > 0.0 else 0.0)
+
+
+@bare_inner_kernel
 def along_to_goal(
     horizon: RoadArrays, g: int, station: float, speed: float, least: float, most: float
 ) -> tuple[float, float]:
@@ -258,7 +286,11 @@ def along_to_goal(
             cost, final = IMPOSSIBLE * (quickest / time - 1.0 + STEP), fastest
         else:
             cost, final = in_time(weights, speed, fastest, distance, time)
-    return cost + to_speed(weights, goals, g, final, time), time
+    wanted = min(max(final, goals.speed[g, 0]), goals.speed[g, 1])
+    if wanted == final or cost >= IMPOSSIBLE * STEP:
+        return cost + to_speed(weights, goals, g, final, time), time
+    distance = min(max(0.5 * (speed + wanted) * time, low, 0.0), high)
+    return cost_between(weights, speed, wanted, fastest, distance, time), time
 
 
 @bare_inner_kernel

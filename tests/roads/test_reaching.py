@@ -109,6 +109,17 @@ def test_what_the_loop_drives_is_a_plan(tmp_path, monkeypatch):
     assert reason.startswith("; driven step by step until 2 s: missed, no goal was reached until 2")
 
 
+@pytest.mark.parametrize(
+    ("begin", "away", "wanted", "end"),
+    [(0.0, 71.0, (0.0, 0.0), 93), (10.8, 143.0, (3.4, 3.6), 118), (7.4, 79.0, (2.8, 3.0), 70)],
+)
+def test_the_narrowest_search_speeds_up_and_brakes(tmp_path, monkeypatch, begin, away, wanted, end):
+    monkeypatch.setattr(driving, "WIDTHS", driving.WIDTHS[:1])
+    asked = goal(place(10.0 + away, 2.0, 3.0), speed(*wanted), time=(0, end))
+    scene = scene_of(tmp_path, LANES[0], problem(goal=asked, speed=begin))
+    assert plan_road(scene, time_limit=LIMIT).plan is not None
+
+
 def test_late_goals_are_found(tmp_path):
     step, begin, end = 0.04, 31.2, 33.6
     asked = goal(place(190.0, 2.0, 16.0), time=(round(begin / step), round(end / step)))
