@@ -25,7 +25,7 @@ import heapq
 import itertools
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
@@ -58,6 +58,7 @@ EACH = 0.05  # [s] for one vehicle: with less its first plan is taken as it is f
 AS_LONG = 20  # vehicles whose first plans take as long as one thorough search
 LOOKS = 400  # at a conflict, to see how long it lasts
 WORTH = 1e-6  # share of the value that another leaf has to save
+DRAWS = 8  # of an order, until one is new
 MOST_ASIDE = 3  # times that one vehicle makes room for others
 MOST_PLACES = 8  # aside, of which one with a way home from there is looked for
 BEGINS, HALVINGS = 24, 6  # of a leg that are tried, and how far the first free one is refined
@@ -76,6 +77,7 @@ class Turns:
     margin: float  # [m] that any two bodies keep
     budget: Budget
     schedule: WordSchedule = AT_ONCE  # by which words are improved
+    most: int = LONG  # expansions where nothing else helps
     queries: int = 0
 
     def one_after_another(self, order: Sequence[int], held: HeldPlans) -> HeldPlans:
@@ -95,7 +97,7 @@ class Turns:
             may_evict = evicted < MOST_EVICTED and k not in failed
             hurried = hurried or (found is None and is_short(self.budget, AS_LONG + len(waiting)))
             if found is None and not (hurried and may_evict):
-                found = self.past(k, held, self.without_plan(held, {k, *waiting}), most=LONG)
+                found = self.past(k, held, self.without_plan(held, {k, *waiting}), most=self.most)
             if found is None and may_evict:
                 failed.add(k)
                 found, out = self._before_those_it_hits(k, held)
@@ -337,10 +339,29 @@ def _until(one: FleetCourse, other: FleetCourse, begin: float, keep: float) -> f
 
 
 def one_at_a_time(
-    vehicles: Sequence[FleetMember], order: Sequence[int], margin: float, budget: Budget
-) -> HeldPlans:
-    """Plans in an order, each past others where they stand; those that arrive, if not all do."""
-    return _Floor(vehicles, margin, budget).run(order)
+    vehicles: Sequence[FleetMember],
+    order_of: Callable[[int], tuple[int, ...]],
+    margin: float,
+    budget: Budget,
+) -> Iterator[tuple[HeldPlans, int]]:
+    """Plans of those that arrive, each past others where they stand, and of how many searches.
+
+    In one order after another: who does not arrive goes first in the next one, and strictly so, as
+    long as that order is new. An order that comes again is tried with twice the work.
+    """
+    tried: Counter[tuple[int, ...]] = Counter()
+    order, strictly = order_of(0), False
+    while True:
+        key = strictly, *order
+        floor = _Floor(vehicles, margin, budget, QUICK << tried[key])
+        yield floor.in_order(order, strictly=strictly), floor.legs
+        tried[key] += 1
+        first = floor.waiting[:1]
+        order = *first, *(k for k in order if k not in first)
+        strictly = (True, *order) not in tried
+        if not strictly:
+            drawn = (order_of(len(tried) + n) for n in range(DRAWS))
+            order = next((one for one in drawn if (False, *one) not in tried), order)
 
 
 @dataclass(slots=True, eq=False)
@@ -348,21 +369,29 @@ class _Floor:
     vehicles: Sequence[FleetMember]
     margin: float  # [m] that any two bodies keep
     budget: Budget
+    most: int = QUICK  # expansions of a leg
+    legs: int = 0  # that were searched
     driven: HeldPlans = field(default_factory=dict)  # so far
     waiting: list[int] = field(default_factory=list)  # who is not at its goal
     asides: Counter[int] = field(default_factory=Counter)
 
-    def run(self, order: Sequence[int]) -> HeldPlans:
-        """The plans of those that arrive."""
+    def in_order(self, order: Sequence[int], *, strictly: bool) -> HeldPlans:
+        """The plans of those that arrive, without help if not all do.
+
+        Room is made for the first of an order that needs it; unless `strictly` in order only where
+        none of those that wait can drive home without: who is home may be in the way of others.
+        """
         self.waiting = list(order)
-        unaided: HeldPlans | None = None
+        unaided: HeldPlans = {}
         while self.waiting and not self.budget.is_over:
-            if any(self._drives_home(k) for k in tuple(self.waiting)):
-                continue
-            unaided = dict(self.driven) if unaided is None else unaided
-            if not any(self._is_made_room_for(k) for k in tuple(self.waiting)):
+            unaided = unaided if self.asides else dict(self.driven)
+            ways, waiting = (self._drives_home, self._is_made_room_for), tuple(self.waiting)
+            tries = [(way, k) for way in ways for k in waiting]
+            if strictly:
+                tries.sort(key=lambda row: waiting.index(row[1]))
+            if not any(way(k) for way, k in tries):
                 break
-        if self.waiting and unaided is not None:
+        if self.waiting and self.asides:
             return unaided
         for k in self.asides:
             self.vehicles[k].keep_aside(self.driven[k])
@@ -442,8 +471,10 @@ class _Floor:
             late, soonest = (late, middle) if is_free(middle) else (middle, soonest)
         self.driven[k] = begun(soonest)
 
-    def _leg(self, k: int, others: Sequence[Obstacle], **aim: Goal) -> OwnPlan | None:
-        return self.vehicles[k].leg(self.driven.get(k), others, self._clock, self.budget, **aim)
+    def _leg(self, k: int, others: Sequence[Obstacle], aim: Goal | None = None) -> OwnPlan | None:
+        self.legs += 1
+        before, vehicle = self.driven.get(k), self.vehicles[k]
+        return vehicle.leg(before, others, self._clock, self.budget, aim=aim, most=self.most)
 
     def _courses(self) -> dict[int, FleetCourse]:
         """What everybody has driven so far."""

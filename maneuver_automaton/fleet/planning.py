@@ -7,6 +7,7 @@ way alone.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,7 @@ from maneuver_automaton._interrupts import patient
 from maneuver_automaton._parallel import gathered
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.fleet.coordination import HeldPlans, is_short, one_at_a_time
+from maneuver_automaton.fleet.coordination import DRAWS, HeldPlans, is_short, one_at_a_time
 from maneuver_automaton.fleet.courses import FleetCourse
 from maneuver_automaton.fleet.meetings import components, meetings
 from maneuver_automaton.fleet.problem import FleetProblem
@@ -40,6 +41,7 @@ Objective = Literal["sum", "last"]
 
 ALONE_SHARE = 0.5  # of the time, for all ways alone
 ORDERS_SHARE = 0.7  # of the time left, for one order of the vehicles before they drive by turns
+SEARCH = 1000  # expansions that take as long as the rest of a search
 WORTH = 1e-6  # share of the objective that another plan has to save
 LARGEST_GROUP = 4  # vehicles that are planned anew together
 AT_ONCE: tuple[How, ...] = ("in turn", "by priorities", "by conflicts")
@@ -142,6 +144,7 @@ class _FleetSearch:
     queries: int = 0
     rounds: int = 0
     whole: list[tuple[tuple[int, ...], How]] = field(default_factory=list)  # groups to begin with
+    tried: Counter[tuple[int, ...]] = field(default_factory=Counter)  # orders, and how often
     versions: Counter[int] = field(default_factory=Counter)  # of what is known of each vehicle
     asked: set[tuple[object, ...]] = field(default_factory=set)  # groups, how, and versions of all
 
@@ -202,53 +205,71 @@ class _FleetSearch:
         short = is_short(self.budget, len(rest))  # to drive by turns takes longer than one order
         until = self.budget if short else self.budget.stage(ORDERS_SHARE)
         rng = np.random.default_rng(self.seed)
-        drawn = [self._order_of(rest, n_th, rng) for n_th in range(orders)]
+        drawn = list(dict.fromkeys(self._order_of(rest, rng, n_th) for n_th in range(orders)))
+        order_of = functools.partial(self._order_of, able, rng)
+        by_turns = one_at_a_time(self.vehicles, order_of, self.fleet.margin, self.budget)
+        before = self._work
         best, to_come, n_th = self._in_orders(drawn[:1], until), drawn[1:], 0
-        # All the time there is for those that have no plan, in turn by both ways: orders are many
-        # and quick, so ever more of them stand between two turns, however many processes there are.
+        # All the time there is for those that have no plan, in turn by both ways, with about the
+        # same work; ever more orders stand between, however many processes there are.
+        due = self._work - before
         while len(best) < len(able) and not self.budget.is_over:
-            order = self._order_of(able, n_th, rng)
-            by_turns = one_at_a_time(self.vehicles, order, self.fleet.margin, self.budget)
-            best = by_turns if self._rank(by_turns) < self._rank(best) else best
-            if len(best) == len(able) or not (to_come or max_rounds is None):
+            before = self._work
+            if due >= 0:
+                driven, legs = next(by_turns)
+                self.queries += legs
+                best = min(best, driven, key=self._rank)
+                due -= self._work - before
+                continue
+            if not (to_come or max_rounds is None):
                 break
             n_th += 1
             some, to_come = to_come[: 2**n_th], to_come[2**n_th :]
             if not some:
-                some = [self._order_of(rest, n_th, rng) for _ in range(self.pool.jobs)]
+                more = [self._order_of(rest, rng, n_th) for _ in range(DRAWS * self.pool.jobs)]
+                some = sorted(more, key=self.tried.__getitem__)[: self.pool.jobs]
             best = self._in_orders(some, self.budget, best)
+            due += self._work - before
         self.held = best
         for k in able:
             if k not in best:
                 self.reasons[k] = self._who_is_in_the_way(k)
 
     def _in_orders(
-        self, drawn: Sequence[list[int]], until: Budget, best: HeldPlans | None = None
+        self, drawn: Sequence[tuple[int, ...]], until: Budget, best: HeldPlans | None = None
     ) -> HeldPlans:
         """The best plans of some orders past those that are held: the first that are complete."""
         for begin in range(0, len(drawn), self.pool.jobs):
             if until.is_over and best is not None:
                 break
             chosen = drawn[begin : begin + self.pool.jobs]
-            tasks = [PoolTask(tuple(order), self.held, "in order") for order in chosen]
+            times, self.tried = self.tried, self.tried + Counter(chosen)
+            tasks = [PoolTask(one, self.held, "in order", times=times[one]) for one in chosen]
             for order, done in zip(chosen, self.pool.each(tasks, until), strict=True):
                 planned = done.held or {}
                 self.queries += done.queries
                 if best is None or self._rank(planned) < self._rank(best):
-                    best, self.order = planned, order
+                    best, self.order = planned, list(order)
             if len(best or ()) == len(self.vehicles) - len(self.reasons):
                 break
         return best or {}
 
-    def _order_of(self, numbers: Sequence[int], n_th: int, rng: np.random.Generator) -> list[int]:
+    @property
+    def _work(self) -> int:
+        """What all searches have taken so far, in expansions."""
+        return SEARCH * self.queries + sum(one.expansions for one in self.vehicles)
+
+    def _order_of(
+        self, numbers: Sequence[int], rng: np.random.Generator, n_th: int
+    ) -> tuple[int, ...]:
         """The more important first, then the shortest way first; later orders are shuffled."""
 
         def key(k: int) -> tuple[float, float]:
             cost = float(f"{self._alone_cost(k):.9g}")  # equal ones stay so in a moved problem
-            blur = 1.0 if n_th == 0 else float(rng.uniform(0.3, 1.7))
+            blur = float(rng.uniform(0.3, 1.7)) ** n_th if n_th else 1.0
             return -self.fleet.priority[k], blur * cost
 
-        return sorted(numbers, key=key)
+        return tuple(sorted(numbers, key=key))
 
     def _rank(self, held: Mapping[int, OwnPlan]) -> tuple[int, float]:
         """How good plans are: as many as can be, then by the objective."""

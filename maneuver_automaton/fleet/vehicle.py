@@ -332,7 +332,8 @@ class FleetMember:
             # No search among moving obstacles sees at once that one of them stays at the goal.
             if not self._aims(self._past_the_arrived(others)):
                 return None
-            found = self._found(self._planned(problem, budget, improve=again))
+            most = max(most, LONG)
+            found = self._found(self._planned(problem, budget, improve=again, most=most))
             return found if found is not None and found.cost < known else None
         own, aims = self.aimed, self.aims
         query = self._query(replace(problem, goals=own.goals))
@@ -360,7 +361,7 @@ class FleetMember:
             word = self._first(query, budget, most).word
             if word is not None and word.cost < (best.cost if best else math.inf):
                 best = word
-        if best is None and most == LONG and self.alone is not None:
+        if best is None and most >= LONG and self.alone is not None:
             best = by_a_refuge(own, query, self._query, self.alone.plan, budget)
         if best is None:
             return None
@@ -378,6 +379,7 @@ class FleetMember:
         budget: Budget,
         *,
         aim: Goal | None = None,
+        most: int = QUICK,
     ) -> OwnPlan | None:
         """A plan from where it stands at a time [s], past others that all stand: home, or aside.
 
@@ -395,9 +397,10 @@ class FleetMember:
         if not aims or blocked_ends(past) is not None:
             return None
         if not self.at_will:
-            return self._found(self._planned(past, budget, improve=False))
+            most = max(most, LONG)
+            return self._found(self._planned(past, budget, improve=False, most=most))
         query = self._query(past)
-        schedule = replace(AT_ONCE, most=QUICK)
+        schedule = replace(AT_ONCE, most=most)
         found = words_of(query, budget=budget, schedule=schedule).to_the_end()
         self.expansions += found.first.expansions if found.first else 0
         return None if found.word is NO_WORD else self._word_found(query, found.word, aims)
@@ -475,11 +478,13 @@ class FleetMember:
             for aim in itertools.islice(free_aims(among, goal), MOST_AIMS)
         )
 
-    def _planned(self, problem: Problem, budget: Budget, *, improve: bool) -> PlanResult:
+    def _planned(
+        self, problem: Problem, budget: Budget, *, improve: bool, most: int = LONG
+    ) -> PlanResult:
         """What the planner answers for one that does not switch at will, by counted work."""
-        counted = [LONG] if improve or problem is not self.problem else []
-        most = [*counted, *filter(None, [problem.search.max_expansions])]
-        search = replace(problem.search, improve=improve, max_expansions=min(most, default=None))
+        counted = [most] if improve or problem is not self.problem else []
+        counted += filter(None, [problem.search.max_expansions])
+        search = replace(problem.search, improve=improve, max_expansions=min(counted, default=None))
         if problem.obstacles == self.workspace.obstacles:
             workspace = self.workspace
         else:

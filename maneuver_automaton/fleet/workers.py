@@ -31,6 +31,7 @@ from maneuver_automaton.fleet.held import after_head, onward, with_room
 from maneuver_automaton.fleet.problem import FleetProblem
 from maneuver_automaton.fleet.vehicle import (
     AT_ONCE,
+    LONG,
     WITH_TIME,
     FleetMember,
     OwnPlan,
@@ -272,6 +273,7 @@ class PoolTask(NamedTuple):
     held: HeldPlans
     how: How = "in turn"
     known: float = math.inf  # cost of those that they have
+    times: int = 0  # that the order was tried before: each doubles the work
 
 
 class Done(NamedTuple):
@@ -294,6 +296,7 @@ def done(turns: Turns, task: PoolTask) -> Done:
                 one.plan_alone(turns.budget, hurried=short)
         return Done(None)
     if task.how == "in order":
+        turns.most = LONG << task.times
         return Done(turns.one_after_another(numbers, held), turns.queries)
     turns.schedule = WITH_TIME if task.how == "with time" else AT_ONCE
     if task.how in ("in turn", "with time"):

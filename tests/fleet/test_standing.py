@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 
@@ -18,12 +19,14 @@ from maneuver_automaton.fleet import (
     simulate_fleet,
     verify_fleet,
 )
+from maneuver_automaton.fleet.coordination import one_at_a_time
 from maneuver_automaton.fleet.vehicle import vehicles_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.scenario import load_scenario
 from tests.fleet.robots import ROBOT, least_distance
 from tests.inertia import unicycle_automaton
+from tests.matrix.vehicles import VEHICLES
 from tests.quickly import quick_are
 from tests.scenes import reeds_shepp
 
@@ -161,3 +164,22 @@ def test_files_that_were_met(name, cost):
     result = plan_fleet(load_scenario(FIELD / f"{name}.yaml").fleet, time_limit=60.0, max_rounds=4)
     assert is_good(result.problem, result)
     assert result.cost < cost
+
+
+def test_who_finds_no_room_goes_first_the_next_time():
+    """Who drives home as soon as it can stands in the way of the last one."""
+    robot = VEHICLES["unicycle"]
+    walls = [
+        Box([12.0, 0.2], [4.0, -0.5]),
+        Box([7.0, 0.2], [1.35, 0.5]),
+        Box([4.0, 0.2], [8.0, 0.5]),
+        Box([1.5, 0.2], [5.4, 1.5]),
+    ]
+    turned = math.pi
+    ends = [([0, 0, 0], [8, 0, 0]), ([8, 0, turned], [0, 0, turned]), ([-0.8, 0, 0], [8.8, 0, 0])]
+    body = {"footprint": robot.footprint, "obstacles": walls}
+    fleet = FleetProblem([Problem(robot.automaton, a, b, **body) for a, b in ends])
+    tries = one_at_a_time(vehicles_of(fleet), lambda _: (1, 0, 2), 0.0, Budget.from_now(120.0))
+    (unaided, _), (driven, _) = itertools.islice(tries, 2)
+    assert not unaided
+    assert verify_fleet(fleet, {fleet.names[k]: one.plan for k, one in driven.items()}).passed
