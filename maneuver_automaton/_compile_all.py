@@ -136,6 +136,10 @@ def _report(lock: Path, bar: Report | None, done: Sequence[str], names: Collecti
 def work() -> None:
     """What a process does: compile the kernels whose names come in, and say so."""
     gc.disable()  # the compiler makes millions of objects, and few of them in circles
+    with contextlib.suppress(Exception):  # nobody promised that numba's insides stay as they are
+        from maneuver_automaton._compile_sooner import compile_sooner
+
+        compile_sooner()
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # nothing else is an answer
     for line in sys.stdin:
