@@ -28,7 +28,7 @@ from maneuver_automaton.collision import (
 )
 from maneuver_automaton.costs import Cost, StageCost, check_cost, prices_switches
 from maneuver_automaton.groups import SE2, LieGroup, SE2xR, Translations, group_of
-from maneuver_automaton.models import Model, OnLattice, OnlyTranslated
+from maneuver_automaton.models import OnLattice, OnlyTranslated
 from maneuver_automaton.models.speeds import standing_price
 from maneuver_automaton.place_prices import PlacePrice, price_along
 from maneuver_automaton.places import PlaceCost, bound, check_place_costs, moved
@@ -334,7 +334,15 @@ class Problem:
                 )
         object.__setattr__(self, "obstacles", as_obstacles(self.obstacles))
         object.__setattr__(self, "footprint", as_footprint(self.footprint))
-        object.__setattr__(self, "parts", _as_parts(self.automaton.model, self.parts))
+        carried = self.automaton.model.part_names
+        for name in self.parts:
+            if name not in carried:
+                raise ValueError(
+                    f"parts: the {self.automaton.model.name} carries no {name!r}, only "
+                    f"{', '.join(carried) or 'nothing'}"
+                )
+        bodies = {name: as_footprint(shapes) for name, shapes in self.parts.items()}
+        object.__setattr__(self, "parts", bodies)
         low, high = self.body_height
         if not (math.isfinite(low) and math.isfinite(high) and low <= high):
             raise ValueError(
@@ -854,16 +862,6 @@ def _known_rates(automaton: Automaton, cost: StageCost) -> dict[str, tuple[Trim,
             f"cost: trim {wrong!r} costs {known[wrong]:g} per second, need a number of at least 0"
         )
     return {trim.name: (trim, known[trim.name]) for trim in automaton.trims}
-
-
-def _as_parts(
-    model: Model, parts: Mapping[str, AnyShape | Sequence[AnyShape]]
-) -> dict[str, tuple[Shape, ...]]:
-    known = ", ".join(model.part_names) or "nothing"
-    for name in parts:
-        if name not in model.part_names:
-            raise ValueError(f"parts: the {model.name} carries no {name!r}, only {known}")
-    return {name: as_footprint(shapes) for name, shapes in parts.items()}
 
 
 def _pose_of(value: Any) -> Any:

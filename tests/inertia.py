@@ -8,7 +8,14 @@ import itertools
 import numpy as np
 
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.models import CarWithTrailer, Model, SecondOrderCar, SecondOrderUnicycle
+from maneuver_automaton.models import (
+    CarWithTrailer,
+    Helicopter,
+    Hovercraft,
+    Model,
+    SecondOrderCar,
+    SecondOrderUnicycle,
+)
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive_all
 
@@ -24,6 +31,20 @@ ROBOT = SecondOrderUnicycle(
     max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
 )
 TRAILER = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
+HOVERCRAFT = Hovercraft(
+    mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0, max_torque=0.2
+)
+HELICOPTER = Helicopter(
+    max_speed=10.0,
+    max_lateral_speed=3.0,
+    max_climb=3.0,
+    max_turn_rate=1.0,
+    max_tilt=0.6,
+    max_tilt_rate=1.5,
+    max_climb_acceleration=3.0,
+    max_angular_acceleration=2.0,
+    drag=0.1,
+)
 
 
 def rest_of(model) -> Trim:
@@ -53,11 +74,8 @@ def unicycle_automaton(states: tuple[tuple[float, float], ...] = STATES) -> Auto
 @functools.cache
 def car_automaton(speeds=(2.0, 1.0, -1.0), steering=(-0.6, 0.0, 0.6)) -> Automaton:
     """Trims [speed, steering] of the second-order car, rest among them."""
-    model = SecondOrderCar(
-        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-    )
     states = ((0.0, 0.0), *itertools.product(speeds, steering))
-    return _joined(model, states, lambda z: [z[0], 0.0, z[0] * np.tan(z[1]) / 2.8])
+    return _joined(CAR, states, lambda z: [z[0], 0.0, z[0] * np.tan(z[1]) / 2.8])
 
 
 def _joined(model: Model, states, twist) -> Automaton:

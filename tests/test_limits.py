@@ -16,6 +16,7 @@ from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.problem import Goal, Horizon
 from maneuver_automaton.receding_horizon import simulate
 from maneuver_automaton.scenario.scenario import scenario_of_text
+from tests.inertia import CAR
 
 ROBOT = Automaton.of_controls(Unicycle(), {"ahead": (1.0, 0.0), "left": (0.0, 1.0)})
 FAR = 1.5 * FARTHEST
@@ -109,9 +110,7 @@ def test_rides_that_need_elements_without_number_are_refused_together(monkeypatc
 
 
 def test_a_library_of_maneuvers_without_number_is_refused(monkeypatch):
-    model = SecondOrderCar(
-        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-    )
+    model = CAR
     monkeypatch.setattr(sys.modules["maneuver_automaton.primitives.closed_form"], "MOST", 100)
     trims = {"speed": np.linspace(0.0, 2.0, 6), "steering": [0.0, 0.1]}
     with pytest.raises(ValueError, match="got 132 maneuvers between 12 trims, need at most 100"):

@@ -104,13 +104,16 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
     for one in blocks:
         kind, count = one.kind, one.number
         taken = casadi.reshape(x[one.variables.ravel("F").tolist()], kind.size, count)
-        given = _given(casadi, p, one)
+        if one.given.dtype.kind == "i":  # places among the parameters
+            known = casadi.reshape(p[one.given.ravel("F").tolist()], kind.given, count)
+        else:
+            known = casadi.MX(casadi.DM(one.given.reshape(kind.given, count)))
         if kind.is_priced:
-            price += casadi.sum2(kind.price.map(count)(taken, given))
+            price += casadi.sum2(kind.price.map(count)(taken, known))
         weights = casadi.reshape(of_g[first : first + kind.rows * count], kind.rows, count)
-        curve = kind.curve.map(count)(taken, given, casadi.repmat(of_f, 1, count), weights)
-        rows.append(casadi.vec(kind.value.map(count)(taken, given)))
-        entries.append(casadi.vec(kind.slope.map(count)(taken, given)))
+        curve = kind.curve.map(count)(taken, known, casadi.repmat(of_f, 1, count), weights)
+        rows.append(casadi.vec(kind.value.map(count)(taken, known)))
+        entries.append(casadi.vec(kind.slope.map(count)(taken, known)))
         curves.append(casadi.vec(curve))
         first += kind.rows * count
     g = casadi.vertcat(*rows)
@@ -125,13 +128,6 @@ def assembled(casadi: Any, blocks: Sequence[Blocks], *, size: int, given: int) -
         "calc_lam_p": False,
     }
     return BlockProgram({"x": x, "p": p, "f": price, "g": g}, derivatives, _limits(blocks))
-
-
-def _given(casadi: Any, p: Any, one: Blocks) -> Any:
-    """What is given to each block: numbers, or places among the parameters."""
-    if one.given.dtype.kind == "i":
-        return casadi.reshape(p[one.given.ravel("F").tolist()], one.kind.given, one.number)
-    return casadi.MX(casadi.DM(one.given.reshape(one.kind.given, one.number)))
 
 
 def _rows(blocks: Sequence[Blocks]) -> int:

@@ -228,9 +228,7 @@ def _line_blocks(
                 continue
             line = slot[parting.owner[pair]]
             at = first + OF_CORNER * (places.piece[pair] + corner)
-            given = [OF_LINE * line + k for k in range(OF_LINE)] + [
-                at + k for k in range(OF_CORNER)
-            ]
+            given = _parameters(line, at)
             variables = [angle[line], angle[line] + n_lines]
             if moves:
                 at = first + places.shift[pair] + OF_SHIFT * corner

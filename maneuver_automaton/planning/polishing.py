@@ -25,13 +25,7 @@ from maneuver_automaton.models.vehicle import Components
 from maneuver_automaton.optimal_control import Guess, load_casadi, why_no_casadi
 from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
-from maneuver_automaton.optimal_control.scene import (
-    USUAL,
-    BodyPart,
-    Guard,
-    NodeOnTheWay,
-    PlacesAt,
-)
+from maneuver_automaton.optimal_control.scene import BodyPart, Guard, NodeOnTheWay, PlacesAt
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.on_the_way import passed_on_the_way
 from maneuver_automaton.planning.polished_price import (
@@ -476,12 +470,10 @@ def _polished_through(
         free = (None,) * (len(state) - dof)
         seen = replace(task, goal=tuple(pose), goal_state=free).ends(float(state[2])).end
         via.append((node, (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
-    settings, work = USUAL, iterations_within(budget)
-    if work is not None:
-        settings = replace(USUAL, max_iterations=min(work, USUAL.max_iterations))
     stage_cost = price.stage_cost(known)
+    work = iterations_within(budget)
     motion = polish_through(
-        task, guess, via, stage_cost=stage_cost, settings=settings, budget=budget
+        task, guess, via, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
     return None if isinstance(motion, str) else motion
 

@@ -253,16 +253,14 @@ def path_guesses(model: object) -> PathGuesses | None:
     return None
 
 
-def _less(model: SecondOrderCar | CarWithTrailer, pace: PathLimits) -> float:
-    """The share of the greatest curvature that a lateral acceleration allows at full speed."""
-    share = pace.lateral / pace.speed**2 * model.wheelbase / math.tan(model.max_steering)
-    return min(max(share, WIDEST), LESS)
-
-
 def _libraries_of_car(
     model: SecondOrderCar | CarWithTrailer, pace: PathLimits, share: float = 1.0
 ) -> list[Automaton]:
-    """Libraries that turn as tightly as the car may, by a share, and less."""
+    """Libraries that turn as tightly as the car may, by a share, and less.
+
+    Less is what a lateral acceleration allows at full speed.
+    """
+    less = pace.lateral / pace.speed**2 * model.wheelbase / math.tan(model.max_steering)
     return [
         car_library(
             wheelbase=model.wheelbase,
@@ -270,7 +268,7 @@ def _libraries_of_car(
             share=share * turn,
             reverses=pace.reverse_speed > 0.0,
         )
-        for turn in (1.0, _less(model, pace))
+        for turn in (1.0, min(max(less, WIDEST), LESS))
     ]
 
 

@@ -254,8 +254,8 @@ def polish_through(
     via: Sequence[NodeOnTheWay],
     *,
     stage_cost: RunningCost | None = None,
-    settings: PolishSettings = USUAL,
     budget: Budget = UNLIMITED,
+    most_iterations: int | None = None,
 ) -> PolishedMotion | str:
     """The exact motion through poses on the way that a guess leads to; why there is none, if so.
 
@@ -263,8 +263,9 @@ def polish_through(
     in order, with pose and reduced state seen from the start; None is free.
     """
     ends, why = task.ends(float(guess.state[-1, 2])), ""
+    most = min(most_iterations or USUAL.max_iterations, USUAL.max_iterations)
     for room in (1.0, ROOM):  # more of it where closing broke a limit
-        some = replace(settings, tightening=room * settings.tightening)
+        some = replace(USUAL, tightening=room * USUAL.tightening, max_iterations=most)
         found = polish(task.model, ends, task.scene, guess, stage_cost=stage_cost, settings=some,
                        via=via, budget=budget)  # fmt: skip
         if not found.is_feasible:

@@ -17,8 +17,6 @@ from maneuver_automaton.errors import InvalidLibrary
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import (
     Car,
-    Helicopter,
-    Hovercraft,
     SingleTrack,
     Unicycle,
     UserModel,
@@ -145,29 +143,11 @@ MODELS = {
     "trailer": (inertia.TRAILER, {"speed": [-0.5, 0.5], "steering": [0.0, 0.3]}),
     "single track": (SingleTrack(max_turn_rate=1.0), {"speed": [5.0, 20.0], "turn_rate": [0.2]}),
     "hovercraft": (
-        Hovercraft(
-            mass=2.0,
-            inertia=0.1,
-            drag=1.0,
-            lateral_drag=3.0,
-            turn_drag=0.1,
-            max_force=4.0,
-            max_torque=0.2,
-            min_force=-1.0,
-        ),
+        inertia.HOVERCRAFT,
         {"speed": [0.0, 1.0], "turn_rate": [0.0]},
     ),
     "helicopter": (
-        Helicopter(
-            max_speed=10.0,
-            max_lateral_speed=3.0,
-            max_climb=3.0,
-            max_turn_rate=1.0,
-            max_tilt=0.6,
-            max_tilt_rate=1.5,
-            max_climb_acceleration=3.0,
-            max_angular_acceleration=2.0,
-        ),
+        inertia.HELICOPTER,
         {"speed": [0.0, 5.0], "turn_rate": [0.0, 0.5], "climb": [-1.0, 1.0]},
     ),
 }

@@ -12,13 +12,12 @@ from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import (
     Car,
-    Helicopter,
-    SecondOrderCar,
     SecondOrderUnicycle,
     Unicycle,
     UserModel,
 )
 from maneuver_automaton.primitives import Maneuver, Trim
+from tests.inertia import CAR, HELICOPTER
 
 GLIDER = UserModel(
     name="glider",
@@ -171,9 +170,7 @@ def test_two_trims_about_one_center_joined_by_maneuvers():
 
 
 def test_libraries_of_vehicles_with_inertia():
-    car = SecondOrderCar(
-        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-    )
+    car = CAR
     whole = Automaton.of_model(car, {"speed": [-1.0, 0.0, 1.0], "steering": [-0.5, 0.0, 0.5]})
     report = validate(whole)
     assert report.connected
@@ -190,29 +187,19 @@ def test_libraries_of_vehicles_with_inertia():
 
 
 def test_a_helicopter_that_can_turn_climb_and_sink():
-    craft = Helicopter(
-        max_speed=10.0,
-        max_lateral_speed=3.0,
-        max_climb=3.0,
-        max_turn_rate=1.0,
-        max_tilt=0.6,
-        max_tilt_rate=1.5,
-        max_climb_acceleration=3.0,
-        max_angular_acceleration=2.0,
-    )
     grid = {"speed": [0.0, 5.0], "turn_rate": [0.0, 0.5], "climb": [-1.0, 0.0, 1.0]}
-    trims = Automaton.of_model(craft, grid).trims
+    trims = Automaton.of_model(HELICOPTER, grid).trims
     joined = tuple(
         Maneuver(name="", source=a.name, target=b.name, displacement=np.zeros(4), duration=1.0)
         for a, b in zip(trims, (*trims[1:], trims[0]), strict=True)
     )
-    assert validate(Automaton(craft, trims, joined)).controllable
+    assert validate(Automaton(HELICOPTER, trims, joined)).controllable
     level = [trim for trim in trims if trim.body_velocity[3] >= 0.0]
     kept = tuple(
         Maneuver(name="", source=a.name, target=b.name, displacement=np.zeros(4), duration=1.0)
         for a, b in zip(level, (*level[1:], level[0]), strict=True)
     )
-    assert validate(Automaton(craft, tuple(level), kept)).reason == (
+    assert validate(Automaton(HELICOPTER, tuple(level), kept)).reason == (
         "only climbing and level trims: the height never falls"
     )
 

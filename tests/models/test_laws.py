@@ -15,15 +15,10 @@ from maneuver_automaton.models import (
     AcceleratingCar,
     ArticulatedVehicle,
     Car,
-    CarWithTrailer,
     FourWheelSteeringCar,
-    Helicopter,
-    Hovercraft,
     LatticeBody,
     Omnidirectional,
     RearSteeredCar,
-    SecondOrderCar,
-    SecondOrderUnicycle,
     SingleTrack,
     TractorWithTrailers,
     Unicycle,
@@ -34,6 +29,7 @@ from maneuver_automaton.models import (
     rollout,
     vector_field,
 )
+from tests.inertia import CAR, HELICOPTER, HOVERCRAFT, ROBOT, TRAILER
 from tests.quickly import quick_are
 
 
@@ -66,34 +62,12 @@ BALLOON = UserModel(
 MODELS = [
     Unicycle(),
     Car(wheelbase=2.0, max_steering=1.0),
-    SecondOrderUnicycle(
-        max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
-    ),
-    SecondOrderCar(
-        wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-    ),
-    CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5),
+    ROBOT,
+    CAR,
+    TRAILER,
     SingleTrack(),
-    Hovercraft(
-        mass=2.0,
-        inertia=0.1,
-        drag=1.0,
-        lateral_drag=3.0,
-        turn_drag=0.1,
-        max_force=4.0,
-        max_torque=0.2,
-    ),
-    Helicopter(
-        max_speed=10.0,
-        max_lateral_speed=3.0,
-        max_climb=3.0,
-        max_turn_rate=1.0,
-        max_tilt=0.6,
-        max_tilt_rate=1.5,
-        max_climb_acceleration=3.0,
-        max_angular_acceleration=2.0,
-        drag=0.1,
-    ),
+    HOVERCRAFT,
+    HELICOPTER,
     AcceleratingCar(wheelbase=2.3, max_steering=0.8, max_speed=3.0, max_acceleration=2.0),
     LatticeBody(resolution=0.1),
     Omnidirectional(max_speed=1.0, max_lateral_speed=0.5, max_turn_rate=2.0),

@@ -9,7 +9,7 @@ import pytest
 
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.models import Car, Hovercraft, SecondOrderCar
+from maneuver_automaton.models import Car, SecondOrderCar
 from maneuver_automaton.optimal_control.ipopt import SolverSettings, SolveStatus
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
@@ -17,6 +17,7 @@ from maneuver_automaton.optimal_control.maneuvers import (
     solve_transfer,
     transfer_program,
 )
+from tests.inertia import HOVERCRAFT
 
 CAR = SecondOrderCar(
     wheelbase=2.5, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
@@ -98,10 +99,7 @@ def test_what_cannot_be_reached_is_said(program):
 
 
 def test_a_coupled_model_slows_down_in_its_own_way():
-    craft = Hovercraft(
-        mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0,
-        max_torque=0.2,
-    )  # fmt: skip
+    craft = HOVERCRAFT  # fmt: skip
     found = solve_transfer(
         transfer_program(craft),
         start=np.zeros(3),

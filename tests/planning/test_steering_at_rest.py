@@ -15,10 +15,8 @@ from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.primitives.on_the_spot import maneuvers_between, trim_at
 from maneuver_automaton.scenario.scenario import scenario_of_text
 from maneuver_automaton.scenario.writing import to_yaml
+from tests.inertia import CAR
 
-CAR = ma.SecondOrderCar(
-    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-)
 GRID = {"speed": [-1.0, 0.0, 1.0], "steering": [-0.7, 0.0, 0.7]}
 FILE = """
 schema: 1

@@ -3,7 +3,6 @@ from __future__ import annotations
 from itertools import permutations
 
 import numpy as np
-import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
@@ -13,11 +12,10 @@ from maneuver_automaton.models import SecondOrderUnicycle, Unicycle
 from maneuver_automaton.plotting import (
     draw_automaton,
     draw_motions,
-    save_automaton_figure,
     trim_colors,
 )
 from maneuver_automaton.primitives import Maneuver, Trim
-from tests.plotting.cases import ROBOT, assert_picture
+from tests.plotting.cases import ROBOT
 
 GRID = Automaton.of_grid(Unicycle(), [np.linspace(-2, 2, 9), np.linspace(-2, 2, 9)])
 
@@ -80,25 +78,6 @@ def test_motions_last_a_second_and_are_to_scale():
     end = ROBOT["anticlockwise"].coast(_origin(), 1.0).pose
     np.testing.assert_allclose(segments[3][-1], end[:2], atol=1e-12)
     assert ax.get_aspect() == 1.0
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "automaton",
-    [
-        ROBOT,
-        with_inertia(),
-        GRID,
-        Automaton.of_grid(Unicycle(), [[-1, 0, 1], np.linspace(-2, 2, 9)]),
-        Automaton.of_controls(Unicycle(), {"rest": (0, 0)}),
-        Automaton.of_controls(
-            Unicycle(), {f"a trim with a rather long name {k}": (1, k) for k in range(9)}
-        ),
-    ],
-)
-def test_pictures_of_all_sizes_are_written(automaton, tmp_path):
-    save_automaton_figure(automaton, tmp_path / "automaton.png")
-    assert_picture(tmp_path / "automaton.png")
 
 
 def _origin():

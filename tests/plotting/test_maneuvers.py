@@ -1,7 +1,5 @@
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -10,15 +8,12 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.plotting import draw_maneuvers, save_maneuvers_figure
 from maneuver_automaton.primitives import Maneuver
-from tests.plotting.cases import ROBOT, assert_picture
+from tests.plotting.cases import ROBOT
 
 CAR = SecondOrderCar(
     wheelbase=2.0, max_steering=0.6, max_speed=2.0, max_acceleration=1.0, max_steering_rate=0.5
 )
 SMALL = Automaton.of_model(CAR, {"speed": [0.0, 2.0], "steering": [-0.5, 0.0, 0.5]})
-LARGE = Automaton.of_model(
-    CAR, {"speed": np.linspace(-2, 2, 5), "steering": np.linspace(-0.6, 0.6, 5)}, pairs="all"
-)
 
 
 def test_paths_are_to_scale_and_within_the_frame():
@@ -41,13 +36,6 @@ def test_left_and_right_differ_in_colour():
     assert colors[0][2] > colors[0][0]
     assert colors[2][0] > colors[2][2]
     assert len({tuple(color) for color in colors}) == 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("automaton", [SMALL, LARGE, replace(SMALL, maneuvers=SMALL.maneuvers[:1])])
-def test_pictures_of_all_sizes_are_written(automaton, tmp_path):
-    save_maneuvers_figure(automaton, tmp_path / "maneuvers.png")
-    assert_picture(tmp_path / "maneuvers.png")
 
 
 def test_without_maneuvers_there_is_no_picture(tmp_path):

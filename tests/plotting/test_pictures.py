@@ -16,7 +16,7 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.plotting import Look, draw_plane, figure_of, save_picture
 from maneuver_automaton.plotting.cast import cast_of
 from maneuver_automaton.plotting.pages import DPI
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Problem
 from maneuver_automaton.recording import recording_of
 from maneuver_automaton.recording.plans import stated
 from tests.fleet import robots
@@ -33,7 +33,6 @@ from tests.plotting.cases import (
 )
 from tests.plotting.fleets import crossing, fleet_of, no_answer, row_of
 from tests.plotting.loops import (
-    LOOPS,
     pushed_loop,
     straight_loop,
 )
@@ -83,18 +82,6 @@ class TestFiles:
     def test_plans_are_written(self, plan, tmp_path):
         save_picture(with_body(plan, CAR), tmp_path / "plan.png")
         assert_picture(tmp_path / "plan.png")
-
-    def test_scenes_are_written(self, tmp_path):
-        plan = parking_plan()
-        goals = [Goal(pose=plan.end, tolerance_m=0.1), Goal(pose=[2, 0, 1], free_heading=True)]
-        problem = slalom_problem(plan, goal=goals)
-        save_picture(result_of(plan, problem=problem), tmp_path / "plan.png")
-        assert_picture(tmp_path / "plan.png")
-
-    @pytest.mark.parametrize("name", quick_are(["parking", "empty"], LOOPS))
-    def test_loops_are_written(self, name, tmp_path):
-        save_picture(LOOPS[name](), tmp_path / "loop.png")
-        assert_picture(tmp_path / "loop.png")
 
     @pytest.mark.parametrize("result", [row_of(30), NOBODY])
     def test_any_number_is_written(self, tmp_path, result):

@@ -8,22 +8,12 @@ import pytest
 from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d import art3d
 
-from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.planning import PlanStatus
 from maneuver_automaton.plotting import flies_among_heights, save_picture
 from maneuver_automaton.plotting.cast import cast_of
 from maneuver_automaton.plotting.space import RIM, draw_space
 from maneuver_automaton.recording import recording_of
 from tests.plotting.cases import TOWN, assert_picture, flight, parking_plan, result_of
-from tests.plotting.fleets import fleet_of
-from tests.plotting.loops import flight_loop
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("obstacles", [TOWN, TOWN[:1], ()], ids=["town", "one", "none"])
-def test_flights_are_written(obstacles, tmp_path):
-    save_picture(flight(obstacles), tmp_path / "plan_3d.png", view="space")
-    assert_picture(tmp_path / "plan_3d.png")
 
 
 def test_what_memory_held_is_no_corner(monkeypatch, tmp_path):
@@ -61,13 +51,3 @@ def test_only_flights_among_heights_need_space():
     with pytest.raises(ValueError) as error:
         save_picture(result_of(parking_plan()), "plan_3d.png", view="space")
     assert str(error.value) == "a picture in space: the unicycle has no altitude"
-
-
-@pytest.mark.slow
-def test_loops_and_fleets_fly_too(tmp_path):
-    one, other = flight(), flight(plan=flight().plan.moved(SE2xR([0.0, -6.0, 0.0, 1.0])))
-    fleet = fleet_of([one, other], names=["a", "b"])
-    assert flies_among_heights(fleet)
-    for result in (flight_loop(), fleet):
-        save_picture(result, tmp_path / "plan_3d.png", view="space")
-        assert_picture(tmp_path / "plan_3d.png")

@@ -28,10 +28,8 @@ from maneuver_automaton.primitives import (
     trims_of,
 )
 from maneuver_automaton.primitives.closed_form import differing, has_limited_rates
+from tests.inertia import CAR
 
-CAR = SecondOrderCar(
-    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-)
 ROBOT = SecondOrderUnicycle(
     max_speed=0.5, max_turn_rate=0.6, max_acceleration=0.25, max_angular_acceleration=0.3
 )

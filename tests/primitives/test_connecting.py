@@ -5,20 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from maneuver_automaton.models import CarWithTrailer, Helicopter, Hovercraft, SingleTrack, UserModel
+from maneuver_automaton.models import CarWithTrailer, Hovercraft, SingleTrack, UserModel
 from maneuver_automaton.optimal_control.maneuvers import transfer_program
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.primitives.connecting import Inputs, closed, connect, maneuver_defect
 from maneuver_automaton.primitives.equilibrium import trims_of
+from tests.inertia import HELICOPTER
 from tests.reference_dynamics import trim_defect
 
 CRAFT = Hovercraft(
     mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0,
     max_torque=0.2, max_speed=3.0,
-)  # fmt: skip
-HELICOPTER = Helicopter(
-    max_speed=10.0, max_lateral_speed=3.0, max_climb=3.0, max_turn_rate=1.0, max_tilt=0.6,
-    max_tilt_rate=1.5, max_climb_acceleration=3.0, max_angular_acceleration=2.0, drag=0.1,
 )  # fmt: skip
 TRAILER = CarWithTrailer(
     wheelbase=2.5, hitch_length=3.0, max_steering=0.6, max_speed=3.0, min_speed=-1.0, max_hitch=1.0

@@ -9,18 +9,14 @@ from hypothesis import strategies as st
 
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import (
-    SecondOrderCar,
     SingleTrack,
     Unicycle,
     UserModel,
     rollout,
 )
 from maneuver_automaton.primitives import drive, drive_all
+from tests.inertia import CAR
 from tests.models.test_laws import every_model, states_of, within
-
-CAR = SecondOrderCar(
-    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-)
 
 
 def solved(model, z, controls, durations):

@@ -9,43 +9,20 @@ import pytest
 
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import (
-    CarWithTrailer,
-    Helicopter,
-    Hovercraft,
-    SecondOrderCar,
-    SecondOrderUnicycle,
     SingleTrack,
     Unicycle,
     UserModel,
     rollout,
 )
 from maneuver_automaton.primitives import trims_of
+from tests.inertia import CAR, HELICOPTER, HOVERCRAFT, ROBOT
+from tests.inertia import TRAILER as TRUCK
 
-CAR = SecondOrderCar(
-    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-)
-TRUCK = CarWithTrailer(wheelbase=0.25, hitch_length=0.5, max_steering=1.0, max_speed=0.5)
-HOVERCRAFT = Hovercraft(
-    mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0, max_torque=0.2
-)
-HELICOPTER = Helicopter(
-    max_speed=10.0,
-    max_lateral_speed=3.0,
-    max_climb=3.0,
-    max_turn_rate=1.0,
-    max_tilt=0.6,
-    max_tilt_rate=1.5,
-    max_climb_acceleration=3.0,
-    max_angular_acceleration=2.0,
-    drag=0.1,
-)
 TURNS = np.linspace(-0.4, 0.4, 5)
 GRIDS = {
     "unicycle": (Unicycle(max_speed=2.0), {"speed": [-1, 0, 2], "turn_rate": TURNS}, 15),
     "second-order unicycle": (
-        SecondOrderUnicycle(
-            max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
-        ),
+        ROBOT,
         {"speed": [-0.5, 0.0, 0.5], "turn_rate": [-0.5, 0.0, 0.5]},
         9,
     ),

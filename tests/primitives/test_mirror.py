@@ -10,8 +10,6 @@ import pytest
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import (
     Car,
-    Helicopter,
-    Hovercraft,
     SingleTrack,
     Unicycle,
     UserModel,
@@ -19,14 +17,9 @@ from maneuver_automaton.models import (
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.driving import drive
 from maneuver_automaton.primitives.symmetry import mirror_of
+from tests.inertia import HELICOPTER
+from tests.inertia import HOVERCRAFT as CRAFT
 
-CRAFT = Hovercraft(
-    mass=2.0, inertia=0.1, drag=1.0, lateral_drag=3.0, turn_drag=0.1, max_force=4.0, max_torque=0.2
-)
-HELICOPTER = Helicopter(
-    max_speed=10.0, max_lateral_speed=3.0, max_climb=3.0, max_turn_rate=1.0, max_tilt=0.6,
-    max_tilt_rate=1.5, max_climb_acceleration=3.0, max_angular_acceleration=2.0, drag=0.1,
-)  # fmt: skip
 SIGNS = [
     (Unicycle(), [], [1, -1]),
     (Car(wheelbase=2.0), [], [1, -1]),

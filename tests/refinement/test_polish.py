@@ -13,7 +13,6 @@ from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box
 from maneuver_automaton.collision.convex import convex_pieces
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import SecondOrderCar
 from maneuver_automaton.optimal_control.ipopt import SolveStatus
 from maneuver_automaton.optimal_control.scene import BodyPart, Polished
 from maneuver_automaton.primitives import Trim
@@ -24,10 +23,8 @@ from maneuver_automaton.refinement.gear_sequences import (
 )
 from maneuver_automaton.refinement.guesses import path_guesses, timed
 from maneuver_automaton.refinement.polish import PolishTask, polish_guesses
+from tests.inertia import CAR
 
-CAR = SecondOrderCar(
-    wheelbase=2.8, max_steering=0.75, max_speed=2.5, max_acceleration=1.0, max_steering_rate=0.5
-)
 BODY = Box([4.689, 1.942], [1.4155, 0.0])
 HERE = SE2([0.0, 0.0, 0.0])
 REST = np.zeros(2)

@@ -14,8 +14,6 @@ from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
 from maneuver_automaton.models import (
     CarWithTrailer,
-    Helicopter,
-    Hovercraft,
     SecondOrderCar,
     SecondOrderUnicycle,
     SingleTrack,
@@ -83,35 +81,8 @@ def read(vehicle: str, automaton: str, **more: int):
             "{trims: [{name: a, state: [20, 0, 0, 0]}]}",
             SingleTrack(friction=0.8, max_turn_rate=1.0),
         ),
-        (
-            HOVERCRAFT,
-            RESTS % "0, 0, 0",
-            Hovercraft(
-                mass=2.0,
-                inertia=0.1,
-                drag=1.0,
-                lateral_drag=3.0,
-                turn_drag=0.1,
-                max_force=4.0,
-                max_torque=0.2,
-                min_force=-1.0,
-            ),
-        ),
-        (
-            HELICOPTER,
-            RESTS % "0, 0, 0, 0, 0, 0",
-            Helicopter(
-                max_speed=10.0,
-                max_lateral_speed=3.0,
-                max_climb=3.0,
-                max_turn_rate=1.0,
-                max_tilt=0.6,
-                max_tilt_rate=1.5,
-                max_climb_acceleration=3.0,
-                max_angular_acceleration=2.0,
-                drag=0.1,
-            ),
-        ),
+        (HOVERCRAFT, RESTS % "0, 0, 0", dataclasses.replace(inertia.HOVERCRAFT, min_force=-1.0)),
+        (HELICOPTER, RESTS % "0, 0, 0, 0, 0, 0", inertia.HELICOPTER),
     ],
 )
 def test_every_model_is_read_and_written(vehicle, automaton, model):

@@ -10,10 +10,11 @@ from scipy.optimize import brentq
 
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.groups import SE2, SE2xR
-from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle, UserModel
+from maneuver_automaton.models import CarWithTrailer, UserModel
 from maneuver_automaton.primitives import Maneuver, Trim
 from maneuver_automaton.primitives.closed_form import connect_bang_bang
 from maneuver_automaton.primitives.driving import drive
+from tests.inertia import ROBOT
 
 
 def linked(twists, *, rng: np.random.Generator | None = None, size: float = 0.3) -> Automaton:
@@ -65,9 +66,7 @@ def model_of_kinds(dof: int = 3) -> UserModel:
 
 def inertial_unicycle(*, levels: int = 3) -> Automaton:
     """Second-order unicycle: a grid of speeds and turn rates to 0.5, bang-bang maneuvers."""
-    model = SecondOrderUnicycle(
-        max_speed=0.5, max_turn_rate=0.5, max_acceleration=0.25, max_angular_acceleration=0.25
-    )
+    model = ROBOT
     values = np.linspace(-0.5, 0.5, levels)
     trims = [
         Trim(
