@@ -76,6 +76,9 @@ def test_what_was_written_is_said(capsys):
          "\nreceding_horizon", "x.yaml:7: obstacles[0].box_m.heading_rad: 45 rad is more than a "
          "full turn and looks like degrees; 45 degrees are 0.7854 rad\n"),
         ("goal: {pose: [1, 0, 0]}", "goal: {pose: [1, 0, 6.2832]}", ""),
+        ("goal: {pose: [1, 0, 0]}", "goal: {pose: [1, 0, 0], tolerance_rad: 10}",
+         "x.yaml:6: goal.tolerance_rad: 10 rad is more than a full turn and looks like degrees; "
+         "10 degrees are 0.1745 rad\n"),
     ],
 )  # fmt: skip
 def test_headings_that_look_like_degrees_are_remarked_on(capsys, old, new, said):

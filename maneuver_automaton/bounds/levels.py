@@ -36,7 +36,7 @@ HEADINGS = 32  # of the coarsest level
 MOST_FIRST = 300_000  # cells of the coarsest level
 MOST_CELLS = 3_000_000  # of any level
 BLOCK = 100  # steps between two looks at what is proven
-CHUNK = 2_000_000  # values between two looks at the clock, of 10 to 30 ns each
+CHUNK = 1 << 25  # dual values that steps change between two looks at the clock: some 25 ms
 STEPS = (2500, 3000, 5000)  # on each level at most; the last holds for all that follow
 STALLED = 2e-3  # relative gain in PATIENCE blocks below which a level has given what it can
 PATIENCE = 10
@@ -184,8 +184,7 @@ def _solved(
     """Values proven on a level, each with the best function by then, and the steps it took."""
     cells, motions = program.cells, program.motions
     best, found, history = 0.0, np.zeros(program.value.shape), [0.0]
-    values = int((cells.active > 0).sum()) * motions.families.side.size * len(program.value)
-    part = max(1, CHUNK // max(values, 1))
+    part = max(1, CHUNK // max(program.dual.size, 1))
     for done in range(BLOCK, most + 1, BLOCK):
         left = BLOCK
         while left > part:

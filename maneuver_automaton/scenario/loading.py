@@ -16,7 +16,7 @@ from maneuver_automaton._arrays import Array
 from maneuver_automaton._brief import brief
 from maneuver_automaton.collision import Box
 from maneuver_automaton.errors import InvalidScenario
-from maneuver_automaton.formats.registry import YAML_ENDINGS, reader_of, yaml_statements
+from maneuver_automaton.formats.registry import reader_of, yaml_statements
 from maneuver_automaton.formats.statement import Statement
 from maneuver_automaton.formats.text_source import read_text
 from maneuver_automaton.formats.yaml_source import Document, Where, parse
@@ -202,7 +202,7 @@ def remarks_on(path: Path | str) -> list[str]:
         If the file cannot be read.
     """
     path = Path(path)
-    if path.suffix.lower() not in YAML_ENDINGS or reader_of(path) is not None:
+    if reader_of(path) is not None:
         return []
     document = parse(read_text(path), name=str(path))
     if not isinstance(document.value, dict) or "schema" not in document.value:
@@ -229,7 +229,7 @@ def _headings(value: Any, where: Where) -> Iterator[tuple[Where, float]]:
             inner, at = inner[2], (*at, 2)
         elif key == "motion" and isinstance(inner, list) and inner and isinstance(inner[0], list):
             inner, at = inner[0][-1], (*at, 0, len(inner[0]) - 1)  # later ones may add up turns
-        elif key != "heading_rad":
+        elif key not in ("heading_rad", "tolerance_rad"):
             if isinstance(inner, dict | list):
                 yield from _headings(inner, at)
             continue

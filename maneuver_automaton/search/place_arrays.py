@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._kept import kept_with
+from maneuver_automaton.collision.surroundings import parts_of
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.places import Clearance, PlaceCost, allowed, bound
+from maneuver_automaton.places import Clearance, PlaceCost, allowed, bound, extent_of, scale_of
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search.arrays import LeastPrices, PlaceArrays
 from maneuver_automaton.search.distance_grid import NO_PRICES
@@ -48,17 +50,15 @@ def place_arrays(
     kept with the setting, at samples as near as suits the vehicle.
     """
     found = NOTHING
-    others = list(problem.place_costs)
-    for one in problem.place_costs:
-        if isinstance(one, Clearance):
-            others.remove(one)
-            found = found._replace(
-                weight=float(one.weight),
-                within=float(one.within),
-                per_second=one.per == "second",
-                step=NEARING * float(one.within),
-            )
-            break
+    near = next((one for one in problem.place_costs if isinstance(one, Clearance)), None)
+    others = [one for one in problem.place_costs if one is not near]
+    if near is not None:
+        found = found._replace(
+            weight=float(near.weight),
+            within=float(near.within),
+            per_second=near.per == "second",
+            step=NEARING * float(near.within),
+        )
     if not others:
         return found
     unit = BESIDE * float(library.radius)
@@ -137,35 +137,23 @@ def _sampled(
     same = all(getattr(one, "isotropic", False) for one in costs)
     turns = 1 if same else TURNS
     sheets = 1 if same and all(one.per == "metre" for one in costs) else 3
-    width = high - low
-    cell = max(cell, math.sqrt(float(width.prod()) * turns * sheets / MOST_SAMPLES))
-    columns, rows = (np.ceil(width / cell).astype(int) + 1).tolist()
+    cell = max(cell, math.sqrt(float((high - low).prod()) * turns * sheets / MOST_SAMPLES))
+    columns, rows = (np.ceil((high - low) / cell).astype(int) + 1).tolist()
     headings = np.arange(turns) * (2.0 * math.pi / turns)
-    ahead = np.zeros(problem.start.size)
-    ahead[0] = 1.0
+    ahead = np.eye(problem.start.size)[0]
     value = np.zeros((sheets, turns, rows, columns))
+    dear = [(one, _dear(one, frame, low, cell)) for one in costs]
     # Each sample is the mean of four about it: so the areas of what is sampled stay what they are.
-    for x, y in (0.25 * cell * np.array(FOUR)).tolist():
-        places = np.stack(
-            np.broadcast_arrays(
-                low[0] + x + cell * np.arange(columns)[None, None, :],
-                low[1] + y + cell * np.arange(rows)[None, :, None],
-                headings[:, None, None],
-            ),
-            axis=-1,
-        )
-        poses = (SE2(frame) @ SE2(places)).pose
+    for (x, y), (one, (i, j)) in product((0.25 * cell * np.array(FOUR)).tolist(), dear):
+        along = (x + low[0] + cell * np.arange(columns)[j], y + low[1] + cell * np.arange(rows)[i])
+        at = np.meshgrid(headings, *along[::-1], indexing="ij")
+        poses = (SE2(frame) @ SE2(np.stack(at[::-1], axis=-1))).pose
         higher = np.broadcast_to(problem.start[3:], (*poses.shape[:-1], problem.start.size - 3))
         poses = np.concatenate([poses, higher], axis=-1)
-        for one in costs:
-            if one.per == "second":
-                value[2] += 0.25 * one.rates(poses, np.broadcast_to(ahead, poses.shape))
-                continue
-            for sheet in range(min(sheets, 2)):
-                velocities = np.broadcast_to(ahead * (1.0, -1.0)[sheet], poses.shape)
-                rates = one.rates(poses, velocities)
-                good = allowed(one, poses, velocities)
-                value[sheet] += 0.25 * (rates + np.where(good, 0.0, FORBIDDEN))
+        for sheet in (2,) if one.per == "second" else range(min(sheets, 2)):
+            velocities = np.broadcast_to(ahead * (1.0, -1.0, 1.0)[sheet], poses.shape)
+            forbidden = np.where(allowed(one, poses, velocities), 0.0, FORBIDDEN)
+            value[sheet, :, i, j] += 0.25 * (one.rates(poses, velocities) + forbidden)
     if (value == value[:, :1]).all():
         value = value[:, :1]
     if sheets == 3 and (value[0] == value[1]).all() and not value[2].any():
@@ -176,3 +164,15 @@ def _sampled(
         origin_y=float(low[1]),
         cell=float(cell),
     )
+
+
+def _dear(one: PlaceCost, frame: Array, low: Array, cell: float) -> tuple[slice, slice]:
+    """The rows and columns of a raster beyond which a place costs nothing."""
+    if not (extent := extent_of(one)):
+        return slice(None), slice(None)
+    parts = parts_of(extent)
+    places = SE2(frame).inverse().act([part.middle for part in parts])
+    reach = np.array([[part.reach] for part in parts]) + scale_of(one) + cell
+    ends = np.stack([(places - reach).min(axis=0), (places + reach).max(axis=0) + cell]) - low
+    (j, i), (n, m) = np.maximum(ends // cell, 0.0).astype(int).tolist()
+    return slice(i, m), slice(j, n)
