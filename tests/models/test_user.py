@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import casadi
 import numpy as np
 import pytest
 
@@ -28,6 +27,8 @@ def test_plain_field_becomes_a_model_and_back():
     assert model.name == "skater"
     assert model.control_names == ("u1", "u2")
     assert model.reduced_names == ("speed",)
+    import casadi
+
     speed, push = casadi.SX.sym("speed"), casadi.SX.sym("push")
     x, y, turn = model.velocity([speed], [push, 0.5])
     assert (str(x), y, turn) == ("speed", 0.0, 0.5)
