@@ -402,13 +402,7 @@ def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
 
 
 def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
-    """Obstacles from obstacles, maps and all that `as_shapes` takes, or one of these.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else.
-    """
+    """Obstacles from obstacles, maps and all that `as_shapes` takes, or one of these."""
     if isinstance(value, Obstacle | OccupancyMap):
         return (value,)
     if type(value) is tuple and {Obstacle, OccupancyMap}.issuperset(map(type, value)):
@@ -421,13 +415,7 @@ def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
 
 
 def as_footprint(value: Any) -> tuple[Shape, ...]:
-    """Parts of a body from all that `as_shapes` takes; empty for a vehicle that is a point.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else, or reaches too far.
-    """
+    """Parts of a body from all that `as_shapes` takes; empty for a vehicle that is a point."""
     shapes = as_shapes("footprint", value)
     for shape in shapes:
         reach = reach_of(shape)

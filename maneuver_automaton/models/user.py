@@ -102,15 +102,10 @@ class UserModel:
         return tuple(tuple(part) for part in self.part_poses(_components(z)[None])[0])
 
     def _row_by_row(
-        self,
-        what: str,
-        function: ComponentFunction,
-        reduced_state: Array,
-        control: Array,
-        n: int,
+        self, what: str, function: ComponentFunction, z: Array, u: Array, n: int
     ) -> Array:
-        z = as_array(f"{self.name}: reduced state", reduced_state, last=len(self.reduced_names))
-        u = as_array(f"{self.name}: control", control, last=len(self.control_names))
+        z = as_array(f"{self.name}: reduced state", z, last=len(self.reduced_names))
+        u = as_array(f"{self.name}: control", u, last=len(self.control_names))
         batch = np.broadcast_shapes(z.shape[:-1], u.shape[:-1])
         z, u = np.broadcast_to(z, (*batch, z.shape[-1])), np.broadcast_to(u, (*batch, u.shape[-1]))
         result = np.empty((*batch, n))
