@@ -329,9 +329,8 @@ class OccupancyMap:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        given = self.blocked
-        if not (isinstance(given, np.ndarray) and given.dtype.kind in "biu"):
-            given = as_array("map: cells", given)
+        whole = isinstance(self.blocked, np.ndarray) and self.blocked.dtype.kind in "biu"
+        given: NDArray[Any] = self.blocked if whole else as_array("map: cells", self.blocked)
         if given.ndim != 2 or given.size == 0:
             raise ValueError(f"map: cells have shape {given.shape}, need (rows, columns)")
         cells = given.astype(np.bool_, order="C")

@@ -181,7 +181,7 @@ def model_of_vector_field(
                 f"{n_controls}; need reduced_names for what else the state holds"
             ) from error
 
-    def at_identity(z: Components, u: Components) -> Components:
+    def at_identity(z: Components, u: Components) -> Any:
         x, u = _components([*np.zeros(dof), *z]), _components(u)
         return f(x, u) if np.object_ in (x.dtype, u.dtype) else rates(x, u)
 
