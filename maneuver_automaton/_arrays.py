@@ -55,30 +55,29 @@ def freeze(instance: Any, name: str, *, last: int | Sequence[int] | None = None)
 def plain_numbers(instance: Any) -> None:
     """Replace the numbers in the fields of a frozen dataclass by Python's own.
 
-    Kernels are compiled for float64 and int64: for any other type, be it float32 or an integer
-    where a float is stated, they would be compiled anew, and round otherwise. Fields that state
-    arrays are for `freeze`.
+    Kernels are compiled for float64 and int64: for float32, or an integer where a float is stated,
+    they would be compiled anew, and round otherwise. Fields that state arrays are for `freeze`.
     """
-    for name, may_be_none, (convert, need) in _numbers_of(instance.__class__):
+    for name, kind, may_be_none in _numbers_of(instance.__class__):
         value = getattr(instance, name)
         if not (value is None and may_be_none):
-            try:
-                object.__setattr__(instance, name, convert(value))
-            except (TypeError, ValueError, OverflowError) as error:
-                what = f"{type(instance).__name__}: {name}"
-                raise ValueError(f"{what}: got {reprlib.repr(value)}, need {need}") from error
+            what = f"{instance.__class__.__name__}: {name}"
+            object.__setattr__(instance, name, _read(what, value, kind))
 
 
 @functools.cache
-def _numbers_of(kind: type) -> tuple[tuple[str, bool, tuple[Callable[[Any], Any], str]], ...]:
-    """The fields of a dataclass that are numbers, what makes them so, and what they have to be.
+def _numbers_of(kind: type) -> tuple[tuple[str, str, bool], ...]:
+    """The fields of a dataclass that are numbers, of which kind, and whether they may be None."""
+    stated = ((one.name, *str(one.type).partition(" | None")[:2]) for one in fields(kind))
+    return tuple((name, kind, bool(none)) for name, kind, none in stated if kind in NUMBERS)
 
-    And whether they may be None.
-    """
-    stated = ((one.name, str(one.type).partition(" | None")) for one in fields(kind))
-    return tuple(
-        (name, bool(none), NUMBERS[kind]) for name, (kind, none, _) in stated if kind in NUMBERS
-    )
+
+def _read(what: str, value: Any, kind: str) -> Any:
+    convert, need = NUMBERS[kind]
+    try:
+        return convert(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{what}: got {reprlib.repr(value)}, need {need}") from error
 
 
 def _float(value: Any) -> float:
@@ -98,37 +97,24 @@ def _int(value: Any) -> int:
     return number
 
 
-def _bool(value: Any) -> bool:
-    number = _int(value)
-    if number not in (0, 1):
-        raise ValueError
-    return bool(number)
-
-
 def _floats(values: Any) -> tuple[float, ...]:
     return tuple(map(_float, values))
 
 
 def as_number(name: str, value: Any) -> float:
     """A number that is handed in, as Python's own, whatever type it is written in."""
-    try:
-        return _float(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: got {reprlib.repr(value)}, need a number") from error
+    return float(_read(name, value, "float"))
 
 
 def as_whole(name: str, value: Any) -> int:
     """A whole number that is handed in, as `as_number` reads numbers."""
-    try:
-        return _int(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: got {reprlib.repr(value)}, need a whole number") from error
+    return int(_read(name, value, "int"))
 
 
 NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "float": (_float, "a number"),
     "int": (_int, "a whole number"),
-    "bool": (_bool, "True or False"),
+    "bool": (lambda value: bool((0, 1).index(_int(value))), "True or False"),
     "tuple[float, float]": (_floats, "two numbers"),
     "tuple[float, ...]": (_floats, "numbers"),
 }

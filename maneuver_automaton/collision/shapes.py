@@ -329,9 +329,8 @@ class OccupancyMap:
 
     def __post_init__(self) -> None:
         plain_numbers(self)
-        given = self.blocked
-        if not (isinstance(given, np.ndarray) and given.dtype.kind in "biu"):
-            given = as_array("map: cells", given)
+        whole = isinstance(self.blocked, np.ndarray) and self.blocked.dtype.kind in "biu"
+        given: NDArray[Any] = self.blocked if whole else as_array("map: cells", self.blocked)
         if given.ndim != 2 or given.size == 0:
             raise ValueError(f"map: cells have shape {given.shape}, need (rows, columns)")
         cells = given.astype(np.bool_, order="C")
@@ -402,13 +401,7 @@ def name_of(obstacle: AnyObstacle, index: int, place: str) -> str:
 
 
 def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
-    """Obstacles from obstacles, maps and all that `as_shapes` takes, or one of these.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else.
-    """
+    """Obstacles from obstacles, maps and all that `as_shapes` takes, or one of these."""
     if isinstance(value, Obstacle | OccupancyMap):
         return (value,)
     if type(value) is tuple and {Obstacle, OccupancyMap}.issuperset(map(type, value)):
@@ -421,13 +414,7 @@ def as_obstacles(value: Any) -> tuple[AnyObstacle, ...]:
 
 
 def as_footprint(value: Any) -> tuple[Shape, ...]:
-    """Parts of a body from all that `as_shapes` takes; empty for a vehicle that is a point.
-
-    Raises
-    ------
-    ValueError
-        If it holds anything else, or reaches too far.
-    """
+    """Parts of a body from all that `as_shapes` takes; empty for a vehicle that is a point."""
     shapes = as_shapes("footprint", value)
     for shape in shapes:
         reach = reach_of(shape)

@@ -99,23 +99,13 @@ class UserModel:
 
     def part_frames(self, z: Components, /) -> tuple[tuple[Any, ...], ...]:
         """Components of the pose of each part, for numbers and symbols: those of `part_poses`."""
-        row = np.empty((1, len(self.reduced_names)), dtype=object)
-        for k in range(row.size):
-            row[0, k] = z[k]
-        if all(isinstance(one, Real) for one in row[0]):
-            row = row.astype(np.float64)
-        return tuple(tuple(part) for part in self.part_poses(row)[0])
+        return tuple(tuple(part) for part in self.part_poses(_components(z)[None])[0])
 
     def _row_by_row(
-        self,
-        what: str,
-        function: ComponentFunction,
-        reduced_state: Array,
-        control: Array,
-        n: int,
+        self, what: str, function: ComponentFunction, z: Array, u: Array, n: int
     ) -> Array:
-        z = as_array(f"{self.name}: reduced state", reduced_state, last=len(self.reduced_names))
-        u = as_array(f"{self.name}: control", control, last=len(self.control_names))
+        z = as_array(f"{self.name}: reduced state", z, last=len(self.reduced_names))
+        u = as_array(f"{self.name}: control", u, last=len(self.control_names))
         batch = np.broadcast_shapes(z.shape[:-1], u.shape[:-1])
         z, u = np.broadcast_to(z, (*batch, z.shape[-1])), np.broadcast_to(u, (*batch, u.shape[-1]))
         result = np.empty((*batch, n))
@@ -144,7 +134,8 @@ def model_of_vector_field(
     Parameters
     ----------
     f : callable
-        ``f(x, u)`` for one state (dof + n_z,) and one control (n_u,): rates (dof + n_z,).
+        ``f(x, u)`` for one state (dof + n_z,) and one control (n_u,): rates (dof + n_z,), as a list
+        where maneuvers are built, since optimal control hands it symbols.
     group : type[LieGroup]
         Group of the poses.
     n_controls : int
@@ -177,7 +168,7 @@ def model_of_vector_field(
     [1.0, 0.0, 0.5]
     """
     name = getattr(f, "__name__", type(f).__name__)
-    names, dof, origin = tuple(reduced_names), group.dof, np.zeros(group.dof)
+    names, dof = tuple(reduced_names), group.dof
     n_states = dof + len(names)
 
     def rates(x: Array, u: Array) -> Array:
@@ -190,8 +181,9 @@ def model_of_vector_field(
                 f"{n_controls}; need reduced_names for what else the state holds"
             ) from error
 
-    def at_identity(z: Components, u: Components) -> Array:
-        return rates(np.concatenate([origin, z]), np.asarray(u))
+    def at_identity(z: Components, u: Components) -> Any:
+        x, u = _components([*np.zeros(dof), *z]), _components(u)
+        return f(x, u) if np.object_ in (x.dtype, u.dtype) else rates(x, u)
 
     if check:
         _try_symmetry(rates, name, group, (n_states, n_controls), tolerance)
@@ -200,9 +192,17 @@ def model_of_vector_field(
         group=group,
         control_names=tuple(f"u{i + 1}" for i in range(n_controls)),
         reduced_names=names,
-        velocity=lambda z, u: group.identity().body_twist(at_identity(z, u)[:dof]),
+        velocity=lambda z, u: at_identity(z, u)[:dof],
         dynamics=(lambda z, u: at_identity(z, u)[dof:]) if names else no_rates,
     )
+
+
+def _components(values: Components) -> Array:
+    """Components in one row: an array of numbers, or of symbols as they are."""
+    row = np.empty(len(values), dtype=object)
+    for k in range(row.size):
+        row[k] = values[k]
+    return row.astype(np.float64) if all(isinstance(one, Real) for one in row) else row
 
 
 def _try_symmetry(

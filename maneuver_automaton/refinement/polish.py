@@ -57,50 +57,22 @@ FINER = 0.6  # share of the step with which the best is solved once more
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PolishTask:
-    """A vehicle, its start and goal, and the obstacles around it.
-
-    Parameters
-    ----------
-    model : Model
-        The vehicle.
-    start, start_state : (dof,), (n_z,) arrays
-        First pose and reduced state.
-    goal, goal_state : sequences of dof, n_z numbers
-        Last pose and reduced state; None for a heading, a height or a reduced state that is free.
-    parts : tuple of BodyPart
-        The body; without one, no obstacle counts.
-    obstacles : tuple of Shape
-        The static obstacles around it.
-    movers : tuple of Obstacle
-        Those that move.
-    start_time : float
-        When it starts, on their clock [s].
-    bounds : Bounds
-        Where the reference point may be.
-    margin : float
-        Distance to keep from obstacles [m].
-    guards : sequence of (Guard, Shape)
-        Limits of the twist where the body touches a shape.
-    durations : (2,) tuple
-        Least and greatest duration [s].
-    places : callable, optional
-        What places cost, seen from the start, in the units of the objective.
-    """
+    """A vehicle, its start and goal, and the obstacles around it."""
 
     model: Model
-    start: Array
-    start_state: Array
-    goal: tuple[float | None, ...]
-    goal_state: tuple[float | None, ...]
-    parts: tuple[BodyPart, ...] = ()
-    obstacles: tuple[Shape, ...] = ()
+    start: Array  # (dof,)
+    start_state: Array  # (n_z,)
+    goal: tuple[float | None, ...]  # (dof,) None for a heading or a height that is free
+    goal_state: tuple[float | None, ...]  # (n_z,) None for what is free
+    parts: tuple[BodyPart, ...] = ()  # the body; without one, no obstacle counts
+    obstacles: tuple[Shape, ...] = ()  # static
     movers: tuple[Obstacle, ...] = ()
-    start_time: float = 0.0  # [s]
-    bounds: Bounds = field(default_factory=Bounds)
-    margin: float = 0.0  # [m]
-    guards: tuple[tuple[Guard, Shape], ...] = ()
-    durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s]
-    places: PlacesAt | None = None
+    start_time: float = 0.0  # [s] on their clock
+    bounds: Bounds = field(default_factory=Bounds)  # of the reference point
+    margin: float = 0.0  # [m] distance kept from obstacles
+    guards: tuple[tuple[Guard, Shape], ...] = ()  # limits of the twist where the body touches
+    durations: tuple[float, float] = (LEAST_DURATION, MOST_DURATION)  # [s] least and greatest
+    places: PlacesAt | None = None  # what they cost, seen from the start, as the objective
 
     def __post_init__(self) -> None:
         freeze(self, "start", last=self.model.group.dof)

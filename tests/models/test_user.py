@@ -27,6 +27,12 @@ def test_plain_field_becomes_a_model_and_back():
     assert model.name == "skater"
     assert model.control_names == ("u1", "u2")
     assert model.reduced_names == ("speed",)
+    import casadi
+
+    speed, push = casadi.SX.sym("speed"), casadi.SX.sym("push")
+    x, y, turn = model.velocity([speed], [push, 0.5])
+    assert (str(x), y, turn) == ("speed", 0.0, 0.5)
+    assert str(model.dynamics([speed], [push, 0.5])[0]) == "(push-(0.1*speed))"
 
 
 def test_field_with_height():

@@ -17,6 +17,8 @@ ROBOTS = {
     "spin": {"rest": (0, 0), "ahead": (1, 0), "spin": (0, 1)},
 }
 
+SIN, COS = math.sin(1.4), 1.0 - math.cos(1.4)  # where a turn of 1.4 rad ends
+
 
 def robot(name):
     return ma.Automaton.of_controls(ma.Unicycle(), ROBOTS[name])
@@ -53,10 +55,20 @@ def test_what_passes_the_checks_is_found(name):
             assert ma.verify(problem, result.plan).passed, seed
 
 
-@pytest.mark.parametrize("place", [(5e-9, 4e-10), (5e-9, -4e-10), (2e-9, 9e-10)])
-def test_nor_does_a_goal_of_any_heading_cost_a_turn(place):
-    goal = ma.Goal([*place, 0.0], free_heading=True)
-    assert ma.plan(ma.Problem(robot("dubins"), [0, 0, 0], goal)).cost < 1e-8
+@pytest.mark.parametrize(
+    ("name", "goal", "cost"),
+    [
+        ("dubins", ma.Goal([5e-9, 4e-10, 0], free_heading=True), 5e-9),
+        ("dubins", ma.Goal([2e-9, 9e-10, 0], free_heading=True), 2e-9),
+        ("left only", ma.Goal([2, -7e-10, 0], free_heading=True), 2.0),  # beside one straight,
+        ("left only", ma.Goal([SIN - 3e-10 * SIN, COS + 3e-10, 0], free_heading=True), 1.4),  # turn
+        ("spin", ma.Goal([1.4e-6, 1.3e-10, 0], free_heading=True), 1.4e-6),
+        ("dubins", [SIN, COS, 1.4 + 8.5e-10], 1.4),  # off in place, or in heading
+        ("left only", [SIN + 3 * np.cos(1.4), COS + 3 * np.sin(1.4), 1.4 - 9e-10], 4.4),
+    ],
+)
+def test_nor_does_a_goal_off_in_place_and_heading_cost_a_turn(name, goal, cost):
+    assert ma.plan(ma.Problem(robot(name), [0, 0, 0], goal)).cost == pytest.approx(cost, abs=1e-8)
 
 
 def test_a_moved_problem_has_the_moved_plan():
