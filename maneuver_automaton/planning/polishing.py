@@ -403,12 +403,10 @@ def polish_task(problem: Problem, goal_index: int, places: PlacesAt | None) -> P
         bounds=problem.bounds,
         margin=problem.margin,
         guards=tuple(
-            (
-                Guard(*(math.inf if most is None else most for most in limits), one.reverse),
-                one.shape,
-            )
+            (Guard(speed, lateral, one.reverse), one.shape)
             for one in zones
             for limits in [(one.max_speed, one.max_lateral_acceleration)]
+            for speed, lateral in [[math.inf if most is None else most for most in limits]]
         ),
         durations=admitted_durations(problem),
         places=places,
