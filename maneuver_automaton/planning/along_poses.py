@@ -106,7 +106,8 @@ class AlongPoses(PlanningStep):
         best = search.best(budget.before((1.0 - SEARCHED) * budget.left))
         if best is not None and found.wants_more:
             whole = found.for_better.part(POLISHED)
-            if not polish_on_the_way(found, search.guesses(best, whole), whole):
+            better = polish_on_the_way(found, search.guesses(best, whole), whole)
+            if not better or any(via.stop for via in problem.via):  # whose legs are more alone
                 best = search.varied(best, budget.before((1.0 - VARIED) * budget.left))
                 search.with_more_time(best)
         if not found.plans:

@@ -208,7 +208,7 @@ def _times(problem: Problem, plan: Plan) -> list[float | None]:
 def _rests(problem: Problem, plan: Plan) -> list[tuple[float, float]]:
     """From when to when [s] a plan is in trims in which the vehicle stands, for no time too."""
     found, model = list[tuple[float, float]](), problem.automaton.model
-    for trim, begin, end in _coasts(plan):
+    for trim, begin, end in coasts_of(plan):
         if model.reduced_names:
             velocity = model.body_velocity(trim.reduced_state, trim.control)
             still = float(np.abs(velocity).max()) <= AT_REST
@@ -231,12 +231,12 @@ def _stops(problem: Problem, plan: Plan) -> list[tuple[float, float]]:
         return []
     return [
         (begin, end)
-        for trim, begin, end in _coasts(plan)
+        for trim, begin, end in coasts_of(plan)
         if not model.body_velocity(trim.reduced_state, none).any()
     ]
 
 
-def _coasts(plan: Plan) -> Iterator[tuple[Trim, float, float]]:
+def coasts_of(plan: Plan) -> Iterator[tuple[Trim, float, float]]:
     """The trims of a plan, and from when to when [s] each is coasted in."""
     time = 0.0
     for k, (trim, lasting) in enumerate(zip(plan.trims, plan.durations.tolist(), strict=True)):

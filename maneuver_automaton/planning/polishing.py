@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,7 +28,7 @@ from maneuver_automaton.optimal_control.polishing import intervals_for
 from maneuver_automaton.optimal_control.problem import RunningCost
 from maneuver_automaton.optimal_control.scene import BodyPart, Guard, NodeOnTheWay, PlacesAt
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
-from maneuver_automaton.planning.on_the_way import passed_on_the_way
+from maneuver_automaton.planning.on_the_way import coasts_of, passed_on_the_way
 from maneuver_automaton.planning.polished_price import (
     PolishedPrice,
     admitted_durations,
@@ -56,6 +57,7 @@ from maneuver_automaton.search.cost_to_go import cost_to_go_table
 from maneuver_automaton.search.result import plan_of
 from maneuver_automaton.search.setup import search_setup, sub_library
 from maneuver_automaton.search.words import search_setup_words
+from maneuver_automaton.via import MET
 
 NUMBERS_ALONE = "part_poses of the vehicle takes numbers alone, no symbols"
 NO_TERMS = "the cost has no method terms(), which would return the weights it is the sum of"
@@ -400,25 +402,30 @@ def polish_task(problem: Problem, goal_index: int, places: PlacesAt | None) -> P
         bounds=problem.bounds,
         margin=problem.margin,
         guards=tuple(
-            (
-                Guard(_limit(one.max_speed), _limit(one.max_lateral_acceleration), one.reverse),
-                one.shape,
-            )
+            (Guard(speed, lateral, one.reverse), one.shape)
             for one in zones
+            for limits in [(one.max_speed, one.max_lateral_acceleration)]
+            for speed, lateral in [[math.inf if most is None else most for most in limits]]
         ),
         durations=admitted_durations(problem),
         places=places,
     )
 
 
-def _plan_of(problem: Problem, goal_index: int, motion: PolishedMotion) -> Plan:
-    first, last = problem.first_trim, problem.last_trim(problem.goals[goal_index])
-    maneuver = motion.maneuver("polished", source=first.name, target=last.name)
+def _plan_of(
+    problem: Problem, goal_index: int, *motions: PolishedMotion, stays: Sequence[float] = ()
+) -> Plan:
+    """The plan of some motions, which stays at rest between them for so many seconds each."""
+    automaton, last = problem.automaton, problem.last_trim(problem.goals[goal_index])
+    trims = problem.first_trim, *[automaton.trims[automaton.rest or 0]] * len(stays), last
     return Plan(
         problem.start,
-        (first, last),
-        durations=[0.0, 0.0],
-        maneuvers=(maneuver,),
+        trims,
+        durations=[0.0, *stays, 0.0],
+        maneuvers=[
+            motion.maneuver("polished", source=source.name, target=target.name)
+            for motion, (source, target) in zip(motions, itertools.pairwise(trims), strict=True)
+        ],
         start_time=problem.start_time,
     )
 
@@ -432,18 +439,18 @@ def polish_on_the_way(
     likes. A place that may be chosen stays.
     """
     problem, before = found.problem, found.cost
-    stays = any(via.stay_s for via in problem.via)
-    if stays or budget.is_over or why_not_polished(problem):
+    waits = problem.moves and any(via.stay_s for via in problem.via)
+    if waits or budget.is_over or why_not_polished(problem):
         return False
     for plan, goal_index in guesses:
         try:
-            motion = _polished_through(problem, plan, goal_index, budget.part(WAY_SHARE))
+            better = _polished_through(problem, plan, goal_index, budget.part(WAY_SHARE))
         except RuntimeError:  # the solver gave up on a number; the plan in hand stays
             found.counts.update(solver_errors=1)
             continue
         found.counts.update(polished=1)
-        if motion is not None:
-            found.offer(_plan_of(problem, goal_index, motion), goal_index)
+        if better is not None:
+            found.offer(better, goal_index)
         if budget.is_over:
             break
     return found.cost < before
@@ -451,20 +458,32 @@ def polish_on_the_way(
 
 def _polished_through(
     problem: Problem, known: Plan, goal_index: int, budget: Budget
-) -> PolishedMotion | None:
-    """The motion to which one guess leads, if there is one."""
+) -> Plan | None:
+    """The plan to which one guess leads, if there is one; where it stops on its way it rests."""
+    passed, times = passed_on_the_way(problem, known), [0.0]
+    moving, stays = known.durations.copy(), list[float]()  # it is polished without its stays
+    for one in passed:
+        asked, at = problem.via[one.number - 1], one.time - known.start_time
+        times.append(at - sum(stays))
+        stays += [asked.stay_s] * asked.stop
+        for k, (trim, begin, end) in enumerate(coasts_of(known) if asked.stay_s else ()):
+            if trim.is_rest and begin >= at - MET and end - begin >= asked.stay_s - MET:
+                moving[k] = max(moving[k] - asked.stay_s, 0.0)
+                break
+    known = replace(known, durations=moving)
     price = polished_price(problem)
     task = polish_task(_without_passed(problem, known), goal_index, price.places(known))
     course = replace(known, start=np.zeros(known.start.size), start_time=0.0).sample()
-    passed, count = passed_on_the_way(problem, known), intervals_for(known.duration)
-    times = np.array([0.0, *(one.time - known.start_time for one in passed), known.duration])
-    nodes = np.round(count * times / known.duration).astype(int)
+    times, count = [*times, known.duration], intervals_for(known.duration)
+    nodes = np.round(count * np.array(times) / known.duration).astype(int)
     if np.diff(nodes).min() < 1:
         return None
     guess = guess_at(course, np.interp(np.arange(count + 1), nodes, times))
-    via, dof = list[NodeOnTheWay](), known.start.size
+    via, dof, rest = list[NodeOnTheWay](), known.start.size, problem.automaton.rest or 0
     for one, node in zip(passed, nodes[1:-1].tolist(), strict=True):
         state, asked = guess.state[node], problem.via[one.number - 1]
+        if asked.stay_s:  # the wheels may be turned where it stops for no time
+            state = np.append(state[:dof], problem.automaton.trims[rest].reduced_state)
         pose = (one.pose if asked.radius > 0.0 else asked.pose).tolist()
         pose[2] = None if asked.free_heading else pose[2]
         free = (None,) * (len(state) - dof)
@@ -472,14 +491,12 @@ def _polished_through(
         via.append((node, (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
     stage_cost = price.stage_cost(known)
     work = iterations_within(budget)
-    motion = polish_through(
+    motions = polish_through(
         task, guess, via, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
-    return None if isinstance(motion, str) else motion
-
-
-def _limit(most: float | None) -> float:
-    return math.inf if most is None else most
+    if isinstance(motions, str):
+        return None
+    return _plan_of(problem, goal_index, *motions, stays=stays)
 
 
 def _shapes_of(obstacle: AnyObstacle) -> list[Shape]:

@@ -228,9 +228,10 @@ def polish_through(
     stage_cost: RunningCost | None = None,
     budget: Budget = UNLIMITED,
     most_iterations: int | None = None,
-) -> PolishedMotion | str:
-    """The exact motion through poses on the way that a guess leads to; why there is none, if so.
+) -> list[PolishedMotion] | str:
+    """Exact motions through poses on the way that a guess leads to; why there is none, if so.
 
+    One follows the other where a reduced state on the way is given, one leads past all others.
     Nothing may move. `guess`: seen from the start, with nodes at the poses on the way; `via`: these
     in order, with pose and reduced state seen from the start; None is free.
     """
@@ -251,11 +252,12 @@ def polish_through(
 
 def _closed_through(
     task: PolishTask, found: Polished, nodes: Sequence[NodeOnTheWay], budget: Budget
-) -> PolishedMotion | str:
-    """The motion closed from node to node, each from where the one before it came out."""
+) -> list[PolishedMotion] | str:
+    """The motions closed from node to node, each from where the one before it came out."""
     group, here = group_of(task.start.size), np.zeros(task.start.size)
-    first, state = 0, task.start_state
+    first, state, begun = 0, task.start_state, task.start_state
     dof, control, durations = here.size, list[Array](), list[Array]()
+    motions = list[PolishedMotion]()
     for last, wanted in nodes:
         aim = np.array([found.state[last, k] if v is None else v for k, v in enumerate(wanted)])
         seen = np.array((group(here).inverse() @ group(aim[:dof])).pose)
@@ -278,11 +280,13 @@ def _closed_through(
         turned = here[2] + ending.course.pose[-1, 2]
         here = np.array((group(here) @ group(ending.course.pose[-1])).pose)
         here[2], first, state = turned, last, ending.course.reduced_state[-1]
-    every, lasting = np.concatenate(control), np.concatenate(durations)
-    course = drive(task.model, task.start_state, control=every, durations=lasting)
-    return PolishedMotion(
-        course=course, control=every, durations=lasting, objective=found.objective, error=0.0
-    )
+        if None in wanted[dof:] and last < len(found.control):
+            continue
+        every, lasting = np.concatenate(control), np.concatenate(durations)
+        course = drive(task.model, begun, control=every, durations=lasting)
+        motions.append(PolishedMotion(course=course, control=every, durations=lasting, error=0.0))
+        begun, control, durations = state, [], []
+    return motions
 
 
 @dataclass(slots=True, eq=False)

@@ -159,6 +159,10 @@ def test_with_inertia_it_passes_in_motion_or_stops():
     stops = planned(replace(passing, via=(ma.Via([10, 0, 0], stop=True),)))
     assert fast.cost < stops.cost
     assert not ma.verify(replace(passing, via=(ma.Via([10, 0, 0], stop=True),)), fast.plan).passed
+    beside = ma.Via([10, 3, 0], free_heading=True, stay_s=2.0)  # polished by legs alone: 25.1
+    stays = planned(replace(passing, via=(beside,)))
+    assert stays.cost < 16.0
+    assert 2.0 in stays.plan.durations
 
 
 def test_in_space():
