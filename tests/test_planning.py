@@ -20,16 +20,10 @@ from maneuver_automaton.planning import PlanResult, PlanStatus, plan
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from tests.quickly import quick_are
+from tests.search.cases import NAMED_TABLE_2 as TABLE_2
 
 LIMIT = 60.0  # [s] a bound that a busy machine does not reach
 
-TABLE_2 = {
-    "rest": (0.0, 0.0),
-    "straight": (1.5, 0.0),
-    "clockwise": (-0.25, -1.0),
-    "anticlockwise": (-0.25, 1.0),
-    "spin": (0.0, 1.0),
-}
 SIX = {
     f"{way} {side}".strip(): (speed, steering)
     for way, speed in (("ahead", 1.0), ("back", -1.0))

@@ -119,12 +119,11 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
     for index, goal in enumerate(problem.goals):
         distance, turn = goal.off(start)
         if distance <= goal.tolerance_m + MET and turn <= goal.tolerance_rad + MET:
-            restless = automaton.is_kinematic and automaton.rest is None
-            first = [] if restless else [problem.first_trim]
-            if automaton.is_kinematic or np.array_equal(
-                first[0].reduced_state, problem.last_trim(goal).reduced_state
-            ):
-                plan = Plan(start, first, durations=[0.0] * len(first), start_time=clock)
+            first, last = problem.first_trim, problem.last_trim(goal)
+            if np.array_equal(first.reduced_state, last.reduced_state):
+                restless = automaton.is_kinematic and automaton.rest is None
+                word = [] if restless else [first]
+                plan = Plan(start, word, durations=[0.0] * len(word), start_time=clock)
                 found.append((plan, index))
         elif len(joined := _joined(problem, goal)) <= MOST_TRIMS:
             asked = [(goal.pose, joined)]

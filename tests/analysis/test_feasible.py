@@ -14,17 +14,9 @@ from maneuver_automaton.groups import SE2
 from maneuver_automaton.models import Unicycle
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem
 from maneuver_automaton.search.limits import closed_bound
+from tests.search.cases import NAMED_TABLE_2, robot
 
-TABLE_2 = Automaton.of_controls(
-    Unicycle(),
-    {
-        "rest": (0.0, 0.0),
-        "straight": (1.5, 0.0),
-        "clockwise": (-0.25, -1.0),
-        "anticlockwise": (-0.25, 1.0),
-        "spin": (0.0, 1.0),
-    },
-)
+TABLE_2 = robot(NAMED_TABLE_2)
 DUBINS = Automaton.of_controls(Unicycle(), {"l": (1, 1), "s": (1, 0), "r": (1, -1)})
 TURNS = Automaton.of_controls(Unicycle(), {"go": (1.5, 0), "left": (0, 0.5), "right": (0, -0.5)})
 POSES = np.random.default_rng(5).uniform([-4, -4, -3], [4, 4, 3], (20, 3))

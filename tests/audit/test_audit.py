@@ -18,17 +18,9 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal
+from tests.search.cases import NAMED_TABLE_2, robot
 
-ROBOT = Automaton.of_controls(
-    Unicycle(),
-    {
-        "rest": (0.0, 0.0),
-        "straight": (1.5, 0.0),
-        "clockwise": (-0.25, -1.0),
-        "anticlockwise": (-0.25, 1.0),
-        "spin": (0.0, 1.0),
-    },
-)
+ROBOT = robot(NAMED_TABLE_2)
 CAR = Automaton.of_controls(
     Car(wheelbase=2.0, max_steering=0.6),
     {"left": (1.0, 0.6), "ahead": (1.0, 0.0), "back right": (-0.5, -0.4)},

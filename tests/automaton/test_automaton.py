@@ -15,14 +15,8 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Car, SingleTrack, Unicycle, UserModel
 from maneuver_automaton.primitives import Maneuver, Trajectory, Trim
 from tests.inertia import CAR
+from tests.search.cases import NAMED_TABLE_2 as TABLE_2
 
-TABLE_2 = {
-    "rest": (0.0, 0.0),
-    "straight": (1.5, 0.0),
-    "clockwise": (-0.25, -1.0),
-    "anticlockwise": (-0.25, 1.0),
-    "spin": (0.0, 1.0),
-}
 ROBOT = Automaton.of_controls(Unicycle(), TABLE_2)
 
 

@@ -31,7 +31,7 @@ from maneuver_automaton.groups import SE2, SE2xR
 from maneuver_automaton.models import Car, Unicycle, UserModel
 from maneuver_automaton.problem import Bounds, Goal, Horizon, Problem, SearchSettings
 from tests import scenes
-from tests.search.cases import REVERSED_SPIN, TABLE_2, robot
+from tests.search.cases import REVERSED_SPIN, SLOW_AND_FAST, TABLE_2, robot
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 EXPANSIONS = 3000
@@ -233,19 +233,9 @@ def depot(seed: int, **changed) -> Problem:
 def strip(seed: int, **zone) -> Problem:
     """A zone across the way, a box beside it."""
     over = Zone(shape=Box([2.0, 40.0], [0.5 * seed, 0.0]), **zone)
-    controls = {
-        "rest": (0.0, 0.0),
-        "fast": (1.0, 0.0),
-        "slow": (0.4, 0.0),
-        "left": (1.0, 1.0),
-        "right": (1.0, -1.0),
-        "slow left": (0.4, 0.4),
-        "slow right": (0.4, -0.4),
-        "back": (-1.0, 0.0),
-    }
     obstacles = [Box([0.5, 2.0], [-2.0, 0.4])] if seed % 2 else []
     return Problem(
-        robot(controls),
+        robot(SLOW_AND_FAST),
         [-4.0, 0.0, 0.0],
         [4.0, 0.5 * seed, 0.0],
         zones=[over],

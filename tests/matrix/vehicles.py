@@ -28,14 +28,7 @@ from maneuver_automaton.primitives.driving import drive_all
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
 from maneuver_automaton.scenario.automata import preset_automaton
 from tests import translations
-
-TABLE_2 = {
-    "rest": (0.0, 0.0),
-    "straight": (1.5, 0.0),
-    "clockwise": (-0.25, -1.0),
-    "anticlockwise": (-0.25, 1.0),
-    "spin": (0.0, 1.0),
-}
+from tests.search.cases import NAMED_TABLE_2 as TABLE_2
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,28 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.same_motion import same_motion
-from maneuver_automaton.collision import Box, Disc, Zone
+from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan
 from maneuver_automaton.problem import Problem, SearchSettings
-from tests import scenes
+from tests.planning.test_within_tolerance import STONE, VEHICLES
 from tests.quickly import quick_are
-from tests.search.cases import TABLE_2, robot
 from tests.solids import check_plan
 
 LIMIT = 60.0  # [s] a limit that a busy machine does not reach
 SHORTER = 8.0  # [s] improvement takes as long as it may; a plan is there at once
-AXIS = np.linspace(-2.0, 2.0, 9)
-VEHICLES = {
-    "unicycle": robot(TABLE_2),
-    "car": scenes.reeds_shepp(1.0),
-    "dubins": scenes.dubins(0.8),
-    "grid": Automaton.of_grid(Unicycle(), [AXIS, AXIS]),
-}
-STONE = Disc(0.4, [2.2, 0.5])
 
 
 def furthest(one: Plan, other: Plan) -> float:

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from maneuver_automaton.audit import audit_plan
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Box, Zone
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import plan
 from maneuver_automaton.planning.among_zones import admitted_automaton, quickened
 from maneuver_automaton.planning.checking import check_plan
@@ -18,20 +17,10 @@ from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from maneuver_automaton.search.choose import search_insertion
 from maneuver_automaton.search.result import plan_of
 from tests.inertia import unicycle_automaton
-from tests.search.cases import compiled_only
+from tests.search.cases import SLOW_AND_FAST, compiled_only, robot
 
 pytestmark = compiled_only
-CONTROLS = {
-    "rest": (0.0, 0.0),
-    "fast": (1.0, 0.0),
-    "slow": (0.4, 0.0),
-    "left": (1.0, 1.0),
-    "right": (1.0, -1.0),
-    "slow left": (0.4, 0.4),
-    "slow right": (0.4, -0.4),
-    "back": (-1.0, 0.0),
-}
-ROBOT = Automaton.of_controls(Unicycle(), CONTROLS)
+ROBOT = robot(SLOW_AND_FAST)
 ACROSS = Box([2.0, 40.0], [3.0, 0.0])  # from x = 2 to 4, cannot be gone around in passing
 ALONG = [6.0, 0.0, 0.0]
 WORK = SearchSettings(max_expansions=2000)

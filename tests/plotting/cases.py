@@ -9,25 +9,16 @@ import numpy as np
 from PIL import Image
 
 from maneuver_automaton.audit import TerminalError
-from maneuver_automaton.automaton import Automaton, Plan
+from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, OccupancyMap, Polygon
 from maneuver_automaton.costs import Cost
-from maneuver_automaton.models import Unicycle
 from maneuver_automaton.planning import Alternative, PlanResult, PlanStatus
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Problem
+from tests.search.cases import NAMED_TABLE_2, robot
 
-ROBOT = Automaton.of_controls(
-    Unicycle(),
-    {
-        "rest": (0.0, 0.0),
-        "straight": (1.5, 0.0),
-        "clockwise": (-0.25, -1.0),
-        "anticlockwise": (-0.25, 1.0),
-        "spin": (0.0, 1.0),
-    },
-)
+ROBOT = robot(NAMED_TABLE_2)
 NO_ERROR = TerminalError(position_m=2e-16, heading_rad=0.0)
 
 

@@ -28,7 +28,19 @@ TABLE_2 = {
     "acw": (-0.25, 1.0),
     "spin": (0.0, 1.0),
 }
+LONG = {"cw": "clockwise", "acw": "anticlockwise"}
+NAMED_TABLE_2 = {LONG.get(name, name): control for name, control in TABLE_2.items()}
 REVERSED_SPIN = TABLE_2 | {"spin": (0.0, -1.0)}
+SLOW_AND_FAST = {
+    "rest": (0.0, 0.0),
+    "fast": (1.0, 0.0),
+    "slow": (0.4, 0.0),
+    "left": (1.0, 1.0),
+    "right": (1.0, -1.0),
+    "slow left": (0.4, 0.4),
+    "slow right": (0.4, -0.4),
+    "back": (-1.0, 0.0),
+}
 REEDS_SHEPP = {
     "L+": (1.0, 1.0),
     "S+": (1.0, 0.0),
