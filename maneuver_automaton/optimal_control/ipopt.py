@@ -30,11 +30,9 @@ class SolveStatus(enum.Enum):
     FAILED = "failed"  # the solver gave up, or its numbers do not hold
 
 
-# A large first barrier parameter pushes the iterate away from its guess, and with it out of the
-# sequence of moves that the guess stands for.
+# A large first barrier pushes the iterate away from the moves that its guess stands for, if any.
 NEAR = {"ipopt.mu_init": 1e-3}
-# Of a guess that stands for none; from there the barrier falls in few and loose steps.
-FAR = {
+FAR = {  # of guesses that stand for none: the barrier falls in few and loose steps
     "ipopt.mu_init": 0.1,
     "ipopt.mu_linear_decrease_factor": 0.1,
     "ipopt.barrier_tol_factor": 50.0,
@@ -46,6 +44,7 @@ QUIET: dict[str, Any] = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",  # no banner
     "ipopt.mu_strategy": "monotone",
+    "ipopt.bound_relax_factor": 0.0,  # limits are limits
 }
 
 
@@ -54,13 +53,15 @@ STATUS = {
     "Solved_To_Acceptable_Level": SolveStatus.SOLVED,
     "Infeasible_Problem_Detected": SolveStatus.INFEASIBLE,
     "Maximum_Iterations_Exceeded": SolveStatus.OUT_OF_BUDGET,
+    "Maximum_CpuTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
+    "Maximum_WallTime_Exceeded": SolveStatus.OUT_OF_BUDGET,
     "User_Requested_Stop": SolveStatus.OUT_OF_BUDGET,  # by what is asked between iterations
 }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SolverSettings:
-    """When the solver stops, and what is believed of its answer."""
+    """When the solver stops, how it begins, and what is believed of its answer."""
 
     tolerance: float = 1e-9  # of the scaled optimality conditions [-]
     max_iterations: int = 300
@@ -75,13 +76,13 @@ class SolverSettings:
 
 def ipopt_options(settings: SolverSettings) -> dict[str, Any]:
     """Options of IPOPT."""
-    return QUIET | (FAR if settings.far else NEAR) | {
+    stops = {
         "ipopt.tol": settings.tolerance,
         "ipopt.constr_viol_tol": settings.tolerance,
         "ipopt.acceptable_tol": 1e3 * settings.tolerance,
         "ipopt.max_iter": settings.max_iterations,
-        "ipopt.bound_relax_factor": 0.0,  # limits are limits
     }
+    return QUIET | (FAR if settings.far else NEAR) | stops
 
 
 @functools.cache

@@ -147,10 +147,7 @@ def _maneuvers(
 def quickest_between(
     model: Model, pairs: Sequence[tuple[Trim, Trim]], *, late: bool | BoolArray = False
 ) -> list[Maneuver]:
-    """The maneuvers of `bang_bang` for pairs of trims, of a vehicle that is known to have them.
-
-    Which of them are `late` may differ from pair to pair (m,).
-    """
+    """The maneuvers of `bang_bang` of a vehicle known to have them; `late`: all, or which (m,)."""
     late = np.broadcast_to(late, len(pairs))
     source = np.array([source.reduced_state for source, _ in pairs])
     target = np.array([target.reduced_state for _, target in pairs])
@@ -161,7 +158,7 @@ def quickest_between(
             f"bang-bang: {a.name!r} and {b.name!r} have the same reduced state, so the vehicle "
             "switches between them without a maneuver"
         )
-    control, durations = segments(model, source, target, late=late)
+    control, durations = _segments(model, source, target, late)
     courses = list(drive_all(model, source, control=control, durations=durations))
     limited = math.isfinite(lateral_limit(model))
     sharp = [
@@ -190,12 +187,12 @@ def _one_by_one(model: Model, source: Array, target: Array) -> tuple[Trajectory,
     falls = np.abs(target[:, k]) <= np.abs(source[:, k])
     middle = np.where(falls[:, None] == (np.arange(source.shape[1]) == k), target, source)
     early = np.zeros(len(source), dtype=np.bool_)
-    legs = [segments(model, *ends, late=early) for ends in ((source, middle), (middle, target))]
+    legs = [_segments(model, a, b, early) for a, b in ((source, middle), (middle, target))]
     control, durations = (np.concatenate(parts, axis=1) for parts in zip(*legs, strict=True))
     return drive_all(model, source, control=control, durations=durations)
 
 
-def segments(model: Model, source: Array, target: Array, *, late: BoolArray) -> tuple[Array, Array]:
+def _segments(model: Model, source: Array, target: Array, late: BoolArray) -> tuple[Array, Array]:
     """Controls (m, n, n) and durations (m, n) that lead from reduced states (m, n) to others."""
     change = target - source
     low, high = model.control_limits.T

@@ -122,7 +122,7 @@ def all_maneuvers_between(
         speeds = [speed for speed in (high, low) if speed]
         for source, target in pairs:
             yield hitch_maneuvers(model, [(source, target, speed) for speed in speeds])
-    elif _limited(model):
+    elif _is_limited(_ModelKey(model)):
         yield from _in_closed_form(model, pairs)
     else:
         for source, target in pairs:
@@ -162,10 +162,6 @@ class _ModelKey:
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _ModelKey) and self._key == other._key
-
-
-def _limited(model: Model) -> bool:
-    return _is_limited(_ModelKey(model))
 
 
 @functools.lru_cache(maxsize=MODELS)
@@ -213,5 +209,5 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
 
 def prepare_maneuvers(model: Model) -> None:
     """Have the program of a model ready, before a clock runs."""
-    if not (isinstance(model, CarWithTrailer) or _limited(model)):
+    if not (isinstance(model, CarWithTrailer) or _is_limited(_ModelKey(model))):
         _program_of(_ModelKey(model))

@@ -18,7 +18,8 @@ from maneuver_automaton.automaton.cutting import head_of
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.planning.blocked import open_goals
 from maneuver_automaton.planning.checking import what_is_hit
-from maneuver_automaton.primitives import Trim
+from maneuver_automaton.primitives import Maneuver, Trim
+from maneuver_automaton.primitives.on_the_spot import maneuvers_between
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.receding_horizon.candidates import StepPlan, allowed, bounded
 from maneuver_automaton.receding_horizon.failsafe import FailSafe, Mitigation, settled
@@ -248,17 +249,25 @@ class OverManeuvers(StepSearch):
         begin, automaton = self.now.trim, self.here.automaton
         if begin.is_rest or (self.now.last is None and not self.anew):
             return self._standing(self.settings.step)
-        if automaton.rest is None or begin.name not in automaton:
+        if automaton.rest is None:
             return None
-        library = priced_library(automaton, Cost(time=1.0))
-        source = automaton.index_of(begin.name)
-        if not math.isfinite(library.transitions.cost[library.class_pair(source, automaton.rest)]):
-            return None
-        links = library.chain(source, automaton.rest)
-        trims = (begin, *(automaton.trims[target] for _, target in links))
-        maneuvers = tuple(automaton.maneuvers[k] if k >= 0 else None for k, _ in links)
-        lasting = [0.0] * len(links) + [self.settings.step]
-        return self._then(Plan(self.here.start, trims, durations=lasting, maneuvers=maneuvers))
+        trims, driven = [begin, automaton.trims[automaton.rest]], list[Maneuver | None]()
+        if begin.name not in automaton:  # a plan may drive at any speed
+            driven += maneuvers_between(automaton.model, *trims)[:1]
+            if not driven:
+                return None
+        else:
+            library = priced_library(automaton, Cost(time=1.0))
+            source = automaton.index_of(begin.name)
+            pair = library.class_pair(source, automaton.rest)
+            if not math.isfinite(library.transitions.cost[pair]):
+                return None
+            links = library.chain(source, automaton.rest)
+            trims = [begin, *(automaton.trims[target] for _, target in links)]
+            driven += (automaton.maneuvers[k] if k >= 0 else None for k, _ in links)
+        lasting = [0.0] * len(driven) + [self.settings.step]
+        plan = Plan(self.here.start, tuple(trims), durations=lasting, maneuvers=tuple(driven))
+        return self._then(plan)
 
     def _standing(self, lasting: float) -> Plan:
         """The committed part, then so long [s] at rest; no time in a trim that moves."""

@@ -158,6 +158,28 @@ def test_one_that_still_rolls_at_the_goal_brakes(speed: float, arrived: bool) ->
         np.testing.assert_allclose(end_state(step.piece), 0.0, atol=1e-12)
 
 
+def test_it_brakes_from_a_speed_that_no_trim_has() -> None:
+    """Its plan drives at 0.29 m/s, from where the pushed robot finds no way, but could stop."""
+    goal = ma.Goal([2.3708, 0.7903, 0.5], tolerance_m=0.253, tolerance_rad=0.6)
+    boxes = [([0.2377, 0.3118], [1.6858, 1.1754]), ([0.1767, 0.2849], [1.4925, 0.1558])]
+    problem = ma.Problem(
+        ma.load_stock_library("second_order_unicycle"),
+        [0.0, 0.0, 0.0],
+        goal,
+        footprint=ma.Box([0.5, 0.25]),
+        obstacles=[ma.Box(size, center) for size, center in boxes],
+        search=ma.SearchSettings(improve=False, polish=False, max_expansions=1500),
+    )
+    loop = ma.RecedingHorizon(problem, step=0.316, time_limit=60.0)
+    pose, state = problem.start, np.zeros(2)
+    for _ in range(2):
+        piece = loop.step(pose, state)[1].piece
+        pose, state = piece.end, end_state(piece)
+    step = loop.step(pose, [0.2194, 0.1577])[1]
+    assert step.decision is Decision.APPROACHED
+    assert {one.guarantee for one in step.disturbed} <= GIVEN_AWAY
+
+
 @pytest.mark.exhaustive
 @pytest.mark.slow
 def test_a_step_takes_the_measured_state() -> None:
