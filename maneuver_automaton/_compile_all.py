@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import functools
-import gc
 import itertools
 import math
 import os
@@ -22,7 +21,6 @@ from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from maneuver_automaton import _kernel_list
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 from maneuver_automaton._kernel_list import LATER, kernel_names, later_uses, module_of
 
@@ -133,22 +131,6 @@ def _report(lock: Path, bar: Report | None, done: Sequence[str], names: Collecti
         bar(done, names)
 
 
-def work() -> None:
-    """What a process does: compile the kernels whose names come in, and say so."""
-    gc.disable()  # the compiler makes millions of objects, and few of them in circles
-    answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # nothing else is an answer
-    for line in sys.stdin:
-        name, answer = line.strip(), "done"
-        try:
-            for signature in _kernel_list.signatures_of(name):
-                _kernel_list.kernel_named(name).compile(signature)  # type: ignore[attr-defined]
-        except Exception as error:  # noqa: BLE001, whatever it is, the kernel is compiled when used
-            answer = " ".join(f"{type(error).__name__}: {error}".split())
-        answers.write(f"{answer}\n")
-        answers.flush()
-
-
 def ship(package: Path) -> list[str]:
     """Compile kernels into a package that is built, for every processor of its kind.
 
@@ -236,7 +218,7 @@ def _worker(settings: dict[str, str]) -> subprocess.Popen[str]:
     # This package, and not the clone in whose folder an installed one is called.
     where = f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})"
     return subprocess.Popen(
-        [sys.executable, "-c", f"{where}; from {__name__} import work; work()"],
+        [sys.executable, "-c", f"{where}; from {__package__}._compile_work import work; work()"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -336,9 +336,11 @@ if __name__ == "__main__":
 def test_what_kernels_share_is_compiled_once_and_handed_records_by_their_address(tmp_path):
     (tmp_path / "example_sharing.py").write_text(SHARING)
     code = "import runpy; runpy.run_module('example_sharing', run_name='__main__')"
+    sooner = "from maneuver_automaton._compile_work import compile_sooner; compile_sooner();"
     first, again = (run(code, tmp_path, NUMBA_CACHE_DIR=tmp_path / "cache") for _ in range(2))
+    alike = run(sooner + code, tmp_path, NUMBA_CACHE_DIR=tmp_path / "sooner")
     refused = "Tried: made where references are counted: decorate it as by_value"
-    assert first[0] == again[0] == [2.0 * 3.0 + 10.0 * 5.0 * 3.0, 35.0**2, refused]
+    assert first[0] == again[0] == alike[0] == [2.0 * 3.0 + 10.0 * 5.0 * 3.0, 35.0**2, refused]
     assert (first[1], again[1]) == ([0, 0, 0], [1, 1, 1])
 
 

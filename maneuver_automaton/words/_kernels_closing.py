@@ -162,7 +162,7 @@ def close_times(
             start, twists, heading, product, free_heading, rows, targets, now, gap, columns
         )
         if worst < least:
-            best[:], least = now, worst
+            best, least = now.copy(), worst
         elif least < met:
             break
         if worst < exact or not any_lasts:
