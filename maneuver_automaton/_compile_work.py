@@ -84,11 +84,11 @@ def without_lives(usual: Method) -> Method:
     def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
         code = self.func_ir
         if emit_dels or code.is_generator:
-            return usual(self, emit_dels, extend_lifetimes)
-        code.blocks = transforms.canonicalize_cfg(code.blocks)
-        code.variable_lifetime = postproc.VariableLifetime(code.blocks)
-        code.generator_info = None
-        return None
+            usual(self, emit_dels, extend_lifetimes)
+        else:
+            code.blocks = transforms.canonicalize_cfg(code.blocks)
+            code.variable_lifetime = postproc.VariableLifetime(code.blocks)
+            code.generator_info = None
 
     return run
 
