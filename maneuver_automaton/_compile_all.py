@@ -24,14 +24,19 @@ from pathlib import Path
 from maneuver_automaton._kernel_folders import KERNELS, SHIPPED, kernel_folder, source_hash
 from maneuver_automaton._kernel_list import LATER, kernel_names, later_uses, module_of
 
-FIRST = (  # modules that share functions, those that take longest first; the others share less
-    "refinement.",
-    "search._kernels_lattice",
-    "receding_horizon.",
-    "search._kernels_begin",
-    "search._kernels_distance",
-    "search._kernels_waiting",
-    "collision.",
+FIRST = (  # modules that take longest; those of a row share kernels, and are for one process
+    (
+        "refinement.",
+        "collision._kernels_advancement",
+        "search._kernels_connection",
+        "search._kernels_place",
+        "words._kernels_candidates",
+    ),
+    ("search._kernels_begin", "search._kernels_lattice"),
+    ("receding_horizon.",),
+    ("search._kernels_distance",),
+    ("search._kernels_waiting",),
+    ("collision.",),
 )
 HELD = 2e9  # [bytes] that one process may come to hold; 1.6 to 1.9 GB are measured
 KEPT = 8  # folders of compiled kernels, of other versions and of sources that were edited
@@ -54,9 +59,8 @@ def compile_kernels(
 ) -> list[str]:
     """Compile those that are not compiled yet, in several processes; what failed, and why."""
     workers = [_worker(settings or {}) for _ in range(min(jobs or affordable(), len(names)))]
-    modules = [list(its) for _, its in itertools.groupby(sorted(names), module_of)]
     waiting = deque(
-        sorted(modules, key=lambda its: [not module_of(its[0]).startswith(one) for one in FIRST])
+        list(its) for _, its in itertools.groupby(sorted(sorted(names), key=_handed), _handed)
     )
     failed, done = list[str](), list[str]()
 
@@ -90,6 +94,13 @@ def compile_kernels(
             with contextlib.suppress(OSError):
                 worker.communicate()
     return failed
+
+
+def _handed(name: str) -> tuple[list[bool], str]:
+    """What is handed to one process, in the order in which it is: a row of `FIRST`, or a module."""
+    module = module_of(name)
+    row = next((one for one in FIRST if module.startswith(one)), ())
+    return [row != one for one in FIRST], "" if len(row) > 1 else module
 
 
 def compile_missing(names: Collection[str], *, jobs: int | None = None) -> list[str] | None:
