@@ -47,6 +47,7 @@ from maneuver_automaton.roads.vehicle import RoadLibrary, RoadVehicle
 STRIPS = 17  # along the route, side by side
 LONGEST = 60.0  # [s] that is looked ahead from its begin on to a goal without a last time
 SIMPLER = 0.005  # [m] by which the edge of the road may be drawn more simply
+INSIDE = 1e-8  # [m] by which a plan ends within its place, so that it does in any coordinates
 STRIP = 6.0  # [m] of land along the edge: more than the car is wide or moves in a tick
 
 
@@ -83,7 +84,7 @@ def closed_lines(
 
 def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
     """Goals for the kernels; times as ticks [s] from the start of the scene."""
-    rings = [outlines_of(goal.places or ()) for goal in scene.goals]
+    rings = [[_within(ring) for ring in outlines_of(goal.places or ())] for goal in scene.goals]
     step, every = scene.step, round(scene.step / tick)
     flat = [ring for group in rings for ring in group]
     start = scene.start.time
@@ -111,6 +112,15 @@ def goal_arrays(scene: RoadScene, route: Route, *, tick: float) -> GoalArrays:
             [_turned(goal, at, route) for goal, at in zip(scene.goals, route.extents, strict=True)]
         ),
     )
+
+
+def _within(ring: Array) -> Array:
+    """The corners (n, 2) of what is inside a ring, off its edge; the ring if that is no polygon."""
+    import shapely
+
+    inner = shapely.buffer(shapely.Polygon(ring), -INSIDE, join_style="mitre")
+    same = inner.geom_type == "Polygon" and len(inner.exterior.coords) == len(ring) + 1
+    return np.asarray(inner.exterior.coords)[:-1] if same else ring
 
 
 def static_obstacles(scene: RoadScene, route: Route, vehicle: RoadVehicle) -> StaticObstacles:

@@ -64,6 +64,8 @@ def test_it_stops_at_a_place_exactly(tmp_path, lanes, begin, where, time):
     drive = drive_road(scene_of(tmp_path, *lanes, problem(goal=asked, speed=begin)))
     assert drive.status == "reached"
     assert abs(drive.driven.trims[-1].reduced_state[0]) < 1e-9
+    corner = drive.planner.horizon.goals.corner
+    assert length - 1e-6 < np.ptp(corner[:, 0]) < length - 1e-9  # within it in any coordinates
 
 
 @pytest.mark.parametrize(
