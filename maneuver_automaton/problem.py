@@ -369,9 +369,7 @@ class Problem:
                 "shared out on the way; need a free final time"
             )
         if self.order == "free" and len(self.via) > MOST_UNORDERED:
-            raise ValueError(
-                f"via: got {len(self.via)} in a free order, need at most {MOST_UNORDERED}"
-            )
+            raise ValueError(f"via: {len(self.via)} in a free order, need at most {MOST_UNORDERED}")
         automaton, dof = self.automaton, self.start.size
         if (model := automaton.translated) is not None:  # one of its headings stands for any
             unstated = model.stated.group.dof
@@ -389,6 +387,8 @@ class Problem:
                     f"via {k}: pose has {via.pose.size} numbers, need {dof} "
                     f"for the {automaton.model.name}"
                 )
+            if model is not None and not via.free_heading:
+                posed(automaton, via.pose, f"via {k}")
             if automaton.rest is None and (via.stay_s or (via.stop and self.has_inertia)):
                 raise ValueError(
                     f"via {k}: the {automaton.model.name} has no trim that stands still, so it "

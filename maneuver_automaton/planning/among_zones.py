@@ -115,8 +115,8 @@ class AmongZones(PlanningStep):
             "no plan was found that keeps to the zones, by going around them, or through them with "
             "what they admit"
         )
-        none = PlanStatus.OUT_OF_BUDGET if budget.is_over else PlanStatus.NO_PLAN
-        ended.why = none if first.plan is not None else first.status, reason
+        status = PlanStatus.OUT_OF_BUDGET if budget.is_over else PlanStatus.NO_PLAN
+        ended.why = status if first.plan is not None else first.status, reason
 
 
 def _plans(problem: Problem, result: PlanResult) -> Iterator[tuple[Plan, int]]:

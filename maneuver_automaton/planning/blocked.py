@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
-
-import numpy as np
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton.collision import AnyObstacle, Disc
@@ -60,10 +57,10 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     return None
 
 
-def proven_free(problem: Problem, poses: Sequence[Array]) -> list[bool]:
+def proven_free(problem: Problem, poses: Array) -> list[bool]:
     """Whether the kernels prove poses in the plane free of all that stands, all in one call."""
     world = world_around(problem)
-    aside = clearances(world, world.into(np.array(poses))).tolist()
+    aside = clearances(world, world.into(poses)).tolist()
     return [one > problem.margin + CLEARLY for one in aside]
 
 

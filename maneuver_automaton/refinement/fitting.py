@@ -283,7 +283,7 @@ def _without_short(
     changing = (away != 0, (away != 0) & (np.abs(away) <= NEAR), away > 0, away < 0)
     for some, of_these, least in itertools.product(times, changing, (0.0, SHORT)):
         yield _with_times(problem, plan, end, some, of_these, least, through)
-    if plan.maneuvers or problem.horizon.time is not None:
+    if plan.maneuvers:
         return
     moving = [one for one in problem.automaton.trims if not one.is_rest][:MOST_TRIMS]
     beside = (short - 1 if short else 1) % away.size  # a neighbour gives what both take

@@ -100,6 +100,8 @@ def test_a_heading_that_no_trim_has_is_refused_with_the_nearest(boat, start, goa
 
 
 def test_a_trim_of_another_heading_is_refused(boat):
+    with pytest.raises(ValueError, match=r"via 2: the boat has no trim of heading 0\.3 rad"):
+        Problem(boat, [0, 0, 0], [3, 1], via=[[1, 0, 0], [2, 1, 0.3]])
     problem = Problem(boat, [0, 0, 0], [3, 1], start_trim=boat.trim_names[1])
     with pytest.raises(ValueError, match=r"start: has the heading 0 rad, but trim 'heading 1\.57"):
         _ = problem.first_trim

@@ -75,6 +75,17 @@ def test_a_greatest_time_is_searched_for(max_time):
     assert longer.cost < result.cost
 
 
+def test_no_trim_of_milliseconds_where_the_time_is_fixed():
+    turns = {"rest": (0, 0), "ahead": (1, 0), "left": (1, 1), "right": (1, -1)}
+    robot = Automaton.of_controls(Unicycle(), turns)
+    exact = Plan([0, 0, 0], [robot[k] for k in ("left", "ahead", "right")], durations=[0.003, 2, 1])
+    problem = Problem(robot, [0, 0, 0], exact.end, horizon=Horizon(time=5.0))
+    result = plan(problem, time_limit=LIMIT)
+    assert result.plan.duration == pytest.approx(5.0)
+    assert result.plan.durations.min() >= 0.02
+    assert np.abs(result.plan.end - exact.end).max() < 1e-9
+
+
 def test_a_greatest_time_that_does_not_bind_changes_nothing():
     free = Problem(GRID, [0, 0, 0], [0, 3, 0], cost=Cost(effort=1.0))
     roomy = replace(free, horizon=Horizon(max_time=13.0))
