@@ -33,6 +33,7 @@ from maneuver_automaton.planning.arrivals import (
     BetterArrivals,
     LegCosts,
     arrivals_of,
+    first_least,
     freedoms,
     set_bound,
 )
@@ -293,14 +294,14 @@ class _Search:
                 np.floor((headings + TURNED) * SECTORS / (2.0 * math.pi)).astype(int) % SECTORS
             )
             for sector in set(sectors.tolist()):
-                at = int(np.argmin(np.where(sectors == sector, through, np.inf)))
+                at = first_least(np.where(sectors == sector, through, np.inf))
                 picked = [at]
                 for m in range(n, 0, -1):
                     into = self.costs[rows[m - 1], rows[m][picked[0]]]
-                    picked.insert(0, int(np.argmin(ahead[m - 1] + into)))
+                    picked.insert(0, first_least(ahead[m - 1] + into))
                 for m in range(n, len(rows) - 1):
                     on = self.costs[rows[m][picked[-1]], rows[m + 1]]
-                    picked.append(int(np.argmin(on + back[m + 1])))
+                    picked.append(first_least(on + back[m + 1]))
                 chains[tuple(picked)] = float(through[at])
         better = BetterArrivals(problem, self.estimated, order)
         more: list[list[Arrival]] = [[] for _ in self.ways]
@@ -354,7 +355,7 @@ class _Search:
         at, mask, chosen = len(self.arrivals), 0, list[tuple[int, Arrival]]()
         while len(chosen) < len(self.ways):
             after = _following(remains, mask, of_way, self._stays, in_order=self.in_order)
-            at = int(np.argmin(self.costs[at, :-1] + after))
+            at = first_least(self.costs[at, :-1] + after)
             chosen.append(self.arrivals[at])
             mask |= 1 << int(of_way[at])
         return float(remains[0][-1]), chosen
@@ -598,7 +599,9 @@ def _distinct(arrivals: Iterable[Arrival]) -> tuple[Arrival, ...]:
 
 
 def _cheaper(chain: Chain, other: Chain | None) -> Chain:
-    return chain if other is None or chain.cost <= other.cost else other
+    if other is None or chain.cost * (1.0 - GAIN) <= other.cost:
+        return chain
+    return other
 
 
 def _remaining(costs: Array, of_way: IntArray, stays: Array, *, in_order: bool) -> dict[int, Array]:

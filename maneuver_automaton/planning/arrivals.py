@@ -44,6 +44,7 @@ VALLEYS = 8  # chains of arrivals that are improved by estimates
 SWEEPS = 16  # over the arrivals of a chain
 STAR = np.array([-1.0, -0.5, -0.25, -0.1, 0.1, 0.25, 0.5, 1.0])  # steps tried, of the reach
 NARROWER = 0.35  # of the reach from sweep to sweep in which nothing is gained
+ROUNDED = 1e-7  # share of a cost by which equal ones differ: times of words by a root of rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -133,6 +134,15 @@ def _straight_through(problem: Problem, number: int) -> Iterator[float]:
     if problem.order == "given" and abs(np.linalg.det(lines)) > INSIDE:
         share = float(np.linalg.solve(lines, before - gate[0, :2])[0])
         yield min(max(share, 0.0), 1.0)
+
+
+def first_least(costs: Array) -> int:
+    """The first of the costs (n,) that are the least but for rounding.
+
+    Headings between which a vehicle turns on the spot cost the same: in a moved problem rounding
+    would choose another one of them.
+    """
+    return int(np.argmax(costs <= costs.min() * (1.0 + ROUNDED)))
 
 
 def _turned_to(pose: Array, heading: float) -> Array:
@@ -370,7 +380,7 @@ class BetterArrivals:
                 if len(tried) == 1:
                     continue
                 sums = self._through(best, k, tried)
-                least = int(np.argmin(sums))
+                least = first_least(sums)
                 if sums[least] < sums[0] - INSIDE * scale:
                     best[k], gained = tried[least], True
             scale *= 1.0 if gained and scale == 1.0 else NARROWER

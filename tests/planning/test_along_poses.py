@@ -103,6 +103,32 @@ def test_a_moved_problem_has_the_moved_plan():
     assert [one.pose[:2].tolist() for one in moved.via] == [pytest.approx(end) for end in ends]
 
 
+def test_of_headings_that_cost_the_same_a_moved_problem_has_the_moved_one():
+    """Between those a vehicle that turns on the spot is free."""
+    turns = {"right": (-0.25, -1), "left": (-0.25, 1), "spin": (0, 1)}
+    trims = {"rest": (0, 0), "ahead": (1.5, 0)} | turns
+    problem = ma.Problem(
+        ma.Automaton.of_controls(ma.Unicycle(), trims),
+        START,
+        [4.7, 1.5, 0.3],
+        via=[
+            ma.Via([1.7, 1.8], free_heading=True, stay_s=1.2),
+            ma.Via(gate=[[2.0, -1.3], [1.1, -1.6]]),
+            ma.Via([1.9, -2.0], free_heading=True, stop=True),
+        ],
+        order="free",
+        obstacles=[
+            ma.Disc(0.3, [2.7, -1.5]),
+            ma.Box([0.7, 0.3], [1.4, -1.1], 2.2),
+            ma.Disc(0.2, [4.1, -1.2]),
+            ma.Box([0.4, 0.2], [4.9, 0.8], 0.8),
+        ],
+        footprint=ma.Disc(0.2),
+    )
+    result, moved = (planned(one, 100) for one in (problem, problem.moved(ma.SE2([-3, 5, 0.3]))))
+    assert moved.cost == pytest.approx(result.cost, rel=1e-9)
+
+
 @pytest.mark.parametrize("kind", [{}, {"free_heading": True}, {"tolerance_m": 0.1}])
 @pytest.mark.parametrize("lasting", [4e-9, 8e-5, 3e-3])
 def test_no_trim_of_milliseconds_stays_beside_a_pose_on_the_way(kind, lasting):
