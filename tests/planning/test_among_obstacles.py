@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import re
@@ -331,6 +332,10 @@ def test_a_library_that_cannot_turn():
 # --- a moved problem has the moved plan ---
 
 
+def quick(problem, n=250):
+    return replace(problem, bounds=Bounds(), search=SearchSettings(max_expansions=n))
+
+
 def assert_moved(problem, by, *, atol=1e-7):
     here, there = (plan(one, time_limit=LIMIT) for one in (problem, problem.moved(by)))
     assert here.status is there.status, there.reason
@@ -341,6 +346,29 @@ def assert_moved(problem, by, *, atol=1e-7):
     assert there.cost == pytest.approx(here.cost, rel=atol)
     assert here.goal_index == there.goal_index
     return True
+
+
+@functools.cache
+def lively_scenes():
+    """Random scenes whose ends are free, still and moving."""
+    seeds = [seed for seed in range(120) if plan_is_worth_it(scenes.random_scene(seed))]
+    return [scenes.random_scene(seed) for seed in seeds]
+
+
+def plan_is_worth_it(problem):
+    from maneuver_automaton.planning.blocked import blocked_ends
+
+    return blocked_ends(replace(problem, bounds=Bounds())) is None and bool(problem.obstacles)
+
+
+@pytest.mark.slow
+def test_turned_and_shifted_a_little():
+    rng = np.random.default_rng([1, 0])
+    plans = 0
+    for problem in lively_scenes()[::4][:4]:
+        by = SE2([*rng.uniform(-50.0, 50.0, 2), rng.uniform(-3.0, 3.0)])
+        plans += assert_moved(quick(problem), by)
+    assert plans >= 2
 
 
 @pytest.mark.slow
@@ -359,6 +387,15 @@ def test_far_away():
         problem = Problem(ROBOT, start, goal, obstacles=obstacles, footprint=Disc(0.25),
                           search=replace(QUICK, max_expansions=150))  # fmt: skip
         assert_moved(problem, SE2([far, -far, 0.0]))
+
+
+@pytest.mark.slow
+def test_among_what_moves():
+    rng = np.random.default_rng(4)
+    for seed in range(2):
+        problem = quick(scenes.moving_scene(seed, moving=5), n=1000)
+        by = SE2([*rng.integers(-99, 99, 2).astype(float), 0.0])
+        assert_moved(problem, by)
 
 
 @pytest.mark.slow

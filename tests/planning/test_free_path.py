@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
+from benchmarks.unreachable import FAMILIES
 from maneuver_automaton import Automaton, Box, Car, Disc, Obstacle, plan, verify
 from maneuver_automaton.bounds import Reachability, widest_path
 from maneuver_automaton.bounds.separation import connectivity
 from maneuver_automaton.collision import Motion
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.problem import SearchSettings
 from tests.bounds.scenes import BODY, bend, dead_end, walled
@@ -86,6 +88,15 @@ def test_a_bend_beside_which_something_moves():
         found = plan(among, time_limit=300.0)
         assert found.status is PlanStatus.FOUND
         assert verify(among, found.plan).passed
+
+
+@pytest.mark.slow
+def test_a_moved_bend_has_the_moved_plan():
+    problem = with_library(FAMILIES["bend"](np.random.default_rng(5), 0.2))
+    by = SE2([300.0, -50.0, 2.0])
+    found, moved = (plan(one, time_limit=300.0) for one in (problem, problem.moved(by)))
+    assert found.plan.word == moved.plan.word
+    assert np.allclose(found.plan.durations, moved.plan.durations, atol=1e-6)
 
 
 def test_a_bus_gets_into_a_slot_that_is_a_metre_longer():

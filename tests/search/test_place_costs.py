@@ -1,11 +1,13 @@
 """What places cost, in searches: the same as along the plan, and worth a detour."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import maneuver_automaton as ma
+from maneuver_automaton.groups import SE2
 from maneuver_automaton.search.lattice import forward_word, reversed_query
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import lattice_query
@@ -143,3 +145,12 @@ def test_dear_ground_in_the_open_is_worth_a_detour():
     first = ma.plan(replace(problem, search=replace(problem.search, improve=False)))
     seen = with_cost(word_of_plan(CAR, first.plan), lattice_query(problem, [0])).cost
     assert seen == pytest.approx(first.cost, rel=5e-3, abs=0.1)
+
+
+@pytest.mark.slow
+@compiled_only
+def test_a_moved_problem_has_the_moved_plan(through):
+    moved = ma.plan(through.problem.moved(SE2([30.0, -7.0, 2.0])), time_limit=600.0)
+    assert moved.plan.word == through.plan.word
+    assert moved.cost == pytest.approx(through.cost, rel=1e-6)
+    assert math.isclose(moved.plan.duration, through.plan.duration, rel_tol=1e-5)
