@@ -10,8 +10,7 @@ from typing import NoReturn
 from maneuver_automaton._interrupts import listening
 from maneuver_automaton.cli.streams import open_closed_streams
 
-# Importing and planning make a quarter of a million objects and hardly any garbage in circles, of
-# which one look among them takes 30 ms.
+# Importing and planning make 250,000 objects and hardly any garbage; to look for it takes 30 ms.
 COLLECT_EVERY = 1_000_000  # objects more than there were
 
 

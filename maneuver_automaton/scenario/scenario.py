@@ -52,7 +52,7 @@ from maneuver_automaton.scenario.shapes import (
     stated_footprint,
     zones_of,
 )
-from maneuver_automaton.scenario.vehicles import PARTS, STATE_UNITS, carried_of, model_of
+from maneuver_automaton.scenario.vehicles import STATE_UNITS, carried_of, model_of, part_of
 
 T = TypeVar("T")
 Made: TypeAlias = dict[tuple[object, ...], Any]  # of parts of a file, which several vehicles share
@@ -250,7 +250,7 @@ def _names_of(value: Any, own: Model | None) -> dict[str, Any]:
         model = vehicle.get("model") if isinstance(vehicle, dict) else None
         kind = KINDS.get(model) if isinstance(model, str) else None
         with contextlib.suppress(ValueError, LookupError):  # its trailers are counted where stated
-            kind = kind and model_of(PARTS[str(model)].model_validate(vehicle))
+            kind = kind and model_of(part_of(str(model)).model_validate(vehicle))
     names = {} if own is None else {"own": own.name}
     if kind is None:
         return names

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import functools
 import math
 import re
 from collections.abc import Mapping
@@ -16,18 +17,17 @@ from typing import Annotated, Any, ClassVar, Literal, Union
 from annotated_types import Gt, Lt
 from pydantic import (
     AllowInfNan,
-    BeforeValidator,
     Discriminator,
     Field,
-    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
     PlainValidator,
     Strict,
     Tag,
+    TypeAdapter,
     ValidationInfo,
     WithJsonSchema,
     create_model,
 )
-from pydantic_core import CoreSchema
 
 from maneuver_automaton.formats.yaml_source import shown
 from maneuver_automaton.models import Model
@@ -217,7 +217,8 @@ WORDS = {  # on parameters, of all models or of one, that say more than their li
 TRAILER = "shape of the trailer, seen from the middle of its axle"
 
 
-def _part(model: str, what: str) -> type[FilePart]:
+@functools.cache
+def part_of(model: str) -> type[FilePart]:
     """What a file says of the vehicles of a model, by the parameters of its class."""
     parameters = dataclasses.fields(KINDS[model])
 
@@ -248,14 +249,13 @@ def _part(model: str, what: str) -> type[FilePart]:
     for carried in KINDS[model].part_names:
         fields[carried] = (Footprint | None, optional(text(carried, TRAILER)))
     name = "".join(word.title() for word in model.split("_"))
-    part = create_model(f"{name}Part", __base__=FilePart, __doc__=what, **fields)
+    part = create_model(f"{name}Part", __base__=FilePart, __doc__=WHAT[model], **fields)
     is_car = any(one.name == "max_lateral_acceleration" for one in parameters)
     part.instead = REFUSED if is_car else REFUSED | NO_TYRES
     return part
 
 
-PARTS = {model: _part(model, what) for model, what in WHAT.items()}
-MODELS = tuple(PARTS)
+MODELS = tuple(WHAT)
 MEANT = {  # what others call them: Nav2, OMPL, CommonRoad, dynobench; letters and digits alone
     "unicycle": "differential differentialdrive diffdrive diff skidsteer unicycle1 turtlebot",
     "car": "ackermann bicycle kinematicbicycle carlike tricycle dubins dubinscar reedsshepp "
@@ -324,25 +324,25 @@ def _hint(model: Any) -> str:
     return f"{hint} vehicle of your own needs --model MODULE:OBJECT"
 
 
-class _ByModel:
-    """Annotation: the part of the model that a mapping names."""
+def _by_model(value: Any, info: ValidationInfo) -> FilePart:
+    """The part of the model that a mapping names: those of all others are not made for it."""
+    model = _check_model(value, info)["model"]
+    part = part_of(model) if model in MODELS else OwnPart
+    return part.model_validate(value, context=info.context)
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        tagged = [Annotated[part, Tag(f"<{model}>")] for model, part in PARTS.items()]
+
+class _AnyModel:
+    """Annotation: the schema of a mapping that names any of the models."""
+
+    def __get_pydantic_json_schema__(
+        self, schema: Any, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        tagged = [Annotated[part_of(model), Tag(model)] for model in MODELS]
         kinds = Union[(*tagged, Annotated[OwnPart, Tag("<own>")])]  # type: ignore[valid-type]
-        return handler.generate_schema(
-            Annotated[kinds, Discriminator(_tag), BeforeValidator(_check_model)]
-        )
+        return handler(TypeAdapter(Annotated[kinds, Discriminator(str)]).core_schema)
 
 
-def _tag(value: Any) -> str:
-    model = value["model"] if isinstance(value, dict) else value.model
-    return f"<{model}>" if model in MODELS else "<own>"
-
-
-VehiclePart = Annotated[Any, _ByModel()]
+VehiclePart = Annotated[Any, PlainValidator(_by_model), _AnyModel()]
 
 
 def model_of(part: Any, *, own: Model | None = None) -> Model:
@@ -364,14 +364,14 @@ def carried_of(part: Any) -> Mapping[str, Any]:
 
 def is_known(model: Model) -> bool:
     """Whether scenario files can state a model; a user's own they can only name."""
-    return model.name in PARTS and is_of_a_kind(model)
+    return model.name in MODELS and is_of_a_kind(model)
 
 
 def described(model: Model) -> dict[str, Any]:
     """What a scenario file says of a model; limits that it does not have are left out."""
     if not is_known(model):
         raise ValueError(f"vehicle: a file cannot state {model.name!r}, only {', '.join(MODELS)}")
-    values = stated(PARTS[model.name], model)
+    values = stated(part_of(model.name), model)
     return {"model": model.name} | {
         key: "forbidden" if value == math.inf else float(value) for key, value in values.items()
     }
