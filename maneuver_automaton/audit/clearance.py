@@ -61,8 +61,7 @@ def least_clearance(
     if around.still.size and not body.in_space:
         ask()
         outline, own = body.outline, body.frames
-        lengths = np.diff(own.times)
-        ways = Ways(own.series, lengths, own.speed, own.bend, own.swerve, body.offset)
+        ways = Ways(own.series, own.times[1:] - own.times[:-1], own.speed, own.bend, own.swerve, body.offset)
         doubt = body.doubt * (1.0 + outline.most_reach)
         edges = around.outline, around.index
         found = nearest_still(ways, outline, *edges, spans, doubt, enough, CONTACT)
@@ -88,8 +87,8 @@ def least_clearance(
 
 def _at(body: AuditedBody, distance: float, measured: float, element: int, share: float) -> Least:
     """What was found at a share of an element."""
-    time = body.frames.times_at(np.array([element]), np.array([share]))
-    return Least(distance, measured, float(time[0]))
+    begin, end = body.frames.times[element : element + 2].tolist()
+    return Least(distance, measured, begin + share * (end - begin))
 
 
 def _sharpened(

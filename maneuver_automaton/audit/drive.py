@@ -116,7 +116,7 @@ def driven(plan: Plan, model: Model) -> DrivenPlan:
     if not stated.lengths.size:
         return _standing(plan, model, stated)
     begin_twists = model.body_velocity(stated.states, stated.controls)
-    turns = np.abs(np.broadcast_to(begin_twists, stated.ends.shape)[:, 2]) * stated.lengths
+    turns = np.abs(begin_twists[..., 2]) * stated.lengths
     parts = np.maximum(np.ceil(turns / TURN), 1.0).astype(np.int64)
     alone = parts > 1
     for _ in range(HALVINGS):
@@ -160,8 +160,8 @@ def _integrated(start: Array, model: Model, stated: Stated, elements: _Elements)
     guess = stated.states[first] + share * (stated.end_states[first] - stated.states[first])
     controls = stated.controls[first]
     reduced = reduced_states(model, controls, elements.lengths, guess, elements.share == 0.0)
-    twists = model.body_velocity(reduced.nodes, controls[:, None])
-    twists = np.broadcast_to(twists, (first.size, N, start.size))
+    twists = np.empty((first.size, N, start.size))
+    twists[:] = model.body_velocity(reduced.nodes, controls[:, None])
     return _Integrated(reduced, twists, frames_along(start, twists, elements.lengths))
 
 

@@ -291,8 +291,8 @@ def origin_of(place: ArrayLike) -> tuple[float, float]:
     >>> origin_of([3.0, -4.0]), origin_of([1e9 + 5.0, 0.0])
     ((0.0, 0.0), (1000013824.0, 0.0))
     """
-    x, y = GRID * np.round(np.asarray(place, dtype=np.float64)[:2] / GRID) + 0.0
-    return float(x), float(y)
+    x, y = (GRID * round(float(one) / GRID) for one in np.asarray(place)[:2])
+    return x, y
 
 
 @functools.lru_cache(maxsize=8)

@@ -24,6 +24,7 @@ from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon,
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_regions, obstacle_skin
 from maneuver_automaton.collision.swept import (
     STANDING,
+    LEAST_TURN,
     GrownBody,
     Twist,
     chunks,
@@ -36,6 +37,7 @@ from maneuver_automaton.collision.swept import (
     windows,
 )
 from maneuver_automaton.groups import SE2
+from maneuver_automaton.groups.se2 import after, displacements
 
 CLOSE = 4  # steps of a course at most, around which closer solids than rectangles are laid
 ROUNDED = 1e-7  # of the length of a coast, by which its box may be off
@@ -208,7 +210,7 @@ class FclChecker:
         kinds: list[Twist] = [(x, y, turn) for x, y, turn in twists.tolist()]
 
         def posed(of: IntArray, times: Array) -> Array:
-            return (SE2(starts[of]) @ SE2.exp(times[:, None] * twists[of])).pose
+            return after(starts[of], displacements(twists[of], times))
 
         while parts.coast.size:
             ask()
@@ -371,17 +373,16 @@ def _coasted_within(starts: Array, twists: Array, durations: Array) -> tuple[Arr
 
     From each place the ways to both ends are together no longer than the coast: an ellipse.
     """
-    lasting = _once_round(twists[:, 2], durations)[:, None]
-    begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting
-    ends = (SE2(starts) @ SE2.exp(lasting * twists)).pose[:, :2]
+    lasting = _once_round(twists[:, 2], durations)
+    begins, length = starts[:, :2], np.hypot(twists[:, :1], twists[:, 1:2]) * lasting[:, None]
+    ends = after(starts, displacements(twists, lasting))[:, :2]
     half = np.sqrt(np.maximum(length**2 - (ends - begins)[:, ::-1] ** 2, 0.0)) + ROUNDED * length
     return 0.5 * (begins + ends - half), 0.5 * (begins + ends + half)
 
 
 def _once_round(turn_rates: Array, durations: Array) -> Array:
     """How long coasts last (n,) [s] until they are where they began, or end."""
-    with np.errstate(divide="ignore", over="ignore"):
-        return np.asarray(np.minimum(durations, math.tau / np.abs(turn_rates)))
+    return np.minimum(durations, math.tau / np.maximum(np.abs(turn_rates), LEAST_TURN))
 
 
 def _object(skin: Skin) -> Any:
@@ -411,7 +412,7 @@ def _touching(
     """Which of some objects (n) at poses (n, 3) touch another, and which of its triangles."""
     import fcl
 
-    collide, result_of = fcl.collide, fcl.CollisionResult
+    collide, result = fcl.collide, fcl.CollisionResult()
     request = fcl.CollisionRequest(num_max_contacts=1, enable_contact=False)
     places = np.zeros((len(poses), 3))
     places[:, :2] = poses[:, :2]
@@ -420,11 +421,11 @@ def _touching(
         for k, (one, turn, place) in enumerate(zip(ones, _turns(poses), places, strict=True)):
             one.setRotation(turn)
             one.setTranslation(place)
-            result = result_of()
             if collide(one, other, request, result):
                 hits[k] = result.contacts[0].b2
                 if len(hits) == most:
                     break
+                result = fcl.CollisionResult()
     return hits
 
 
@@ -433,5 +434,5 @@ def origin_near(place: ArrayLike) -> tuple[float, float]:
 
     The same for all places of a neighbourhood, so that what is prepared for one serves all.
     """
-    x, y = GRID * np.round(np.asarray(place, dtype=np.float64)[:2] / GRID) + 0.0
-    return float(x), float(y)
+    x, y = (GRID * round(float(one) / GRID) for one in np.asarray(place)[:2])
+    return x, y

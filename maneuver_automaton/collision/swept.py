@@ -26,6 +26,7 @@ from maneuver_automaton.groups import SE2
 
 Twist = tuple[float, float, float]  # [m/s, m/s, rad/s]
 MOST_TURN = 0.25  # [rad] of one slice
+LEAST_TURN = 1e-300  # [rad/s] so that times of turns are numbers
 MOST_STEPS = 32  # of a course in one hull
 STANDING = 1e-12  # [m] a body that moves no point further is taken to stand
 FAR = 1e9  # [m] what turns about a point further away is taken to go straight
@@ -215,9 +216,7 @@ def slice_excess(body: GrownBody, twist: Twist, duration: float) -> float:
 
 def windows(turn_rates: Array, durations: Array) -> Windows:
     """The fewest slices that cover coasts (n,) of `durations` [s], none longer than its coast."""
-    turning = np.abs(turn_rates)
-    with np.errstate(divide="ignore", over="ignore"):
-        most = np.minimum(durations, MOST_TURN / turning)
+    most = np.minimum(durations, MOST_TURN / np.maximum(np.abs(turn_rates), LEAST_TURN))
     level = 1 - np.frexp(most)[1].astype(np.int64)
     lengths = np.ldexp(1.0, -level)
     count = np.ceil(durations / lengths).astype(np.int64)

@@ -115,7 +115,8 @@ def check_plan(
             prices=tuple(one.price for one in prices),
             whole=problem.cost_of(plan) if prices else 0.0,
         )
-        last = problem.last_trim(replace(goal, pose=plan.end))
+        arrived = goal if problem.automaton.lattice is None else replace(goal, pose=plan.end)
+        last = problem.last_trim(arrived)
         ends = problem.first_trim.reduced_state, last.reduced_state  # in which it begins and ends
         audit = audit_plan(
             plan,
