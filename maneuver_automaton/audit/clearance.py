@@ -61,7 +61,8 @@ def least_clearance(
     if around.still.size and not body.in_space:
         ask()
         outline, own = body.outline, body.frames
-        ways = Ways(own.series, own.times[1:] - own.times[:-1], own.speed, own.bend, own.swerve, body.offset)
+        lengths = own.times[1:] - own.times[:-1]
+        ways = Ways(own.series, lengths, own.speed, own.bend, own.swerve, body.offset)
         doubt = body.doubt * (1.0 + outline.most_reach)
         edges = around.outline, around.index
         found = nearest_still(ways, outline, *edges, spans, doubt, enough, CONTACT)

@@ -102,10 +102,8 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
         frames[:, :2] = np.array([one.center for _, one in boxes]) - origins[numbers]
         frames[:, 2] = [one.heading for _, one in boxes]
         corners = points_of(placed(frames[:, None], seen))
-        following = np.roll(corners, -1, axis=1)
-        found.append(
-            (numbers.repeat(4), corners.ravel(), following.ravel(), np.zeros(corners.size))
-        )
+        both = corners.ravel(), corners[:, [1, 2, 3, 0]].ravel()
+        found.append((numbers.repeat(4), *both, np.zeros(corners.size)))
     if discs:
         numbers = np.array([k for k, _ in discs])
         centers = points_of(np.array([one.center for _, one in discs]) - origins[numbers])
@@ -124,8 +122,9 @@ def _outlined(solids: Sequence[Shape | OccupancyMap], origins: Array) -> tuple[O
         found.append((np.full(radius.size, k), begins, ends, radius))
     owner, begins, ends, radius = (np.concatenate(column) for column in zip(*found, strict=True))
     order = np.argsort(owner, kind="stable")
-    solid = np.unique(owner[order], return_inverse=True)[1]
-    return Outline(begins[order], ends[order], radius[order], solid), owner[order]
+    owner, another = owner[order], np.zeros(owner.size, dtype=np.int64)
+    another[1:] = owner[1:] != owner[:-1]
+    return Outline(begins[order], ends[order], radius[order], another.cumsum()), owner
 
 
 def _edges(rings: Sequence[Array]) -> tuple[Points, Points]:
@@ -358,9 +357,9 @@ def surroundings_around(
 
 def _boxed(outline: Outline, still: IntArray, heights: Array) -> EdgeBoxes:
     """Boxes around still edges; around whole solids where these have a height."""
-    both = np.stack([outline.begins[still], outline.ends[still]], axis=1)
-    ends, radius = both.view(np.float64).reshape(-1, 2, 2), outline.radius[still, None]
-    low, high = ends.min(axis=1) - radius, ends.max(axis=1) + radius
+    ends = (one[still].view(np.float64).reshape(-1, 2) for one in (outline.begins, outline.ends))
+    a, b, radius = *ends, outline.radius[still, None]
+    low, high = np.minimum(a, b) - radius, np.maximum(a, b) + radius
     whole = np.isfinite(heights[still, :1])
     if whole.any():
         solid, solids = outline.solid[still], int(outline.solid.max()) + 1

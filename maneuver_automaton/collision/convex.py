@@ -111,10 +111,8 @@ def _box_pieces(boxes: list[Box], frame: Array) -> list[tuple[Array, float]]:
 
 def solids_of(pieces: Iterable[tuple[Array, float]]) -> Solids:
     """Arrays of pieces for the kernels."""
-    rings, rounding = [], []
-    for ring, round_by in pieces:
-        rings.append(ring)
-        rounding.append(round_by)
+    every = list(pieces)
+    rings, rounding = [ring for ring, _ in every], [by for _, by in every]
     counts = np.array([len(ring) for ring in rings], dtype=np.int64)
     first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
     corners = np.concatenate([np.zeros((0, 2)), *rings])

@@ -20,11 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from maneuver_automaton._arrays import Array, IntArray, as_array
 from maneuver_automaton.collision.motion import point_speeds
 from maneuver_automaton.collision.outline import outlines_of
-from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon, Shape, box_corners
+from maneuver_automaton.collision.shapes import AnyObstacle, Box, Disc, Polygon, Shape
 from maneuver_automaton.collision.solids import Skin, body_skin, obstacle_regions, obstacle_skin
 from maneuver_automaton.collision.swept import (
-    STANDING,
     LEAST_TURN,
+    STANDING,
     GrownBody,
     Twist,
     chunks,
@@ -333,9 +333,11 @@ def _boxes_around(obstacles: Sequence[AnyObstacle]) -> Array:
             far = np.hypot(*shape.extent)
             boxes[k] = *(shape.origin[:2] - far), *(shape.origin[:2] + far)
     if rectangles:
-        corners = box_corners([one for _, one in rectangles])
-        ends = [corners.min(axis=1), corners.max(axis=1)]
-        boxes[[k for k, _ in rectangles]] = np.concatenate(ends, axis=1)
+        centers = np.concatenate([one.center for _, one in rectangles]).reshape(-1, 2)
+        sizes = np.concatenate([one.size for _, one in rectangles]).reshape(-1, 2)
+        heading = np.array([[one.heading] for _, one in rectangles])
+        far = 0.5 * (np.abs(np.cos(heading)) * sizes + np.abs(np.sin(heading)) * sizes[:, ::-1])
+        boxes[[k for k, _ in rectangles]] = np.concatenate([centers - far, centers + far], axis=1)
     if polygons:
         sizes = np.array([len(one.corners) for _, one in polygons])
         corners = np.concatenate([one.corners for _, one in polygons])

@@ -116,8 +116,7 @@ def check_plan(
             whole=problem.cost_of(plan) if prices else 0.0,
         )
         arrived = goal if problem.automaton.lattice is None else replace(goal, pose=plan.end)
-        last = problem.last_trim(arrived)
-        ends = problem.first_trim.reduced_state, last.reduced_state  # in which it begins and ends
+        ends = problem.first_trim.reduced_state, problem.last_trim(arrived).reduced_state
         audit = audit_plan(
             plan,
             goal,

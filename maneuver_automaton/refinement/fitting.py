@@ -306,10 +306,10 @@ def has_short_coasts(problem: Problem, plan: Plan) -> bool:
 
 def _short(plan: Plan) -> list[int]:
     """Trims of a plan that move for less than 20 ms and could last longer, the shortest first."""
-    longest = np.array([0.0 if trim.is_rest else trim.max_duration for trim in plan.trims])
-    times = plan.durations
-    short = (times > 0.0) & (times < np.minimum(SHORT, longest) * (1.0 - 1e-9))
-    return sorted(np.flatnonzero(short).tolist(), key=lambda k: float(times[k]))
+    times = plan.durations.tolist()
+    longest = [0.0 if one.is_rest else min(SHORT, one.max_duration) for one in plan.trims]
+    short = [k for k, one in enumerate(times) if 0.0 < one < longest[k] * (1.0 - 1e-9)]
+    return sorted(short, key=times.__getitem__)
 
 
 def _with_times(
