@@ -288,7 +288,8 @@ def plan_road(
 ) -> RoadPlanResult:
     """A plan to a goal of searches wider and wider: of the first that finds one, or of the next.
 
-    It is polished, and passes the judge. No search begins after `time_limit` [s].
+    It is polished, and passes the judge. No search begins after `time_limit` [s], but for the one
+    that says who is in the way where there is no plan.
     """
     return _widened(road_planner(scene, vehicle, settings), time_limit)
 
@@ -307,7 +308,7 @@ def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPl
             hurried = _wider(planner.hurried(), begin + limit, begin + limit, WIDTHS, loop=True)
             best = best if hurried.plan is None else hurried
     if best.plan is None:
-        best = replace(best, reason=best.reason + planner.hindrance)
+        best = replace(best, reason=best.reason + (planner.hindrance or _who_hits(planner)))
     return replace(best, search_s=time.perf_counter() - begin)
 
 
@@ -335,6 +336,22 @@ def _wider(
         if cost is not None:
             break
     return best if best.plan is not None else replace(best, reason=best.reason + driven)
+
+
+def _who_hits(planner: RoadPlanner) -> str:
+    """Whose recorded motion meets the way that is there without it, as the end of a sentence."""
+    names = {one.name for one in planner.scene.traffic if one.motion is not None}
+    if not names or stopped():
+        return ""
+    wider = planner.wider(WIDTHS[0], horizon_s=planner.last_tick * planner.tick)
+    found = _past_stops(wider.hurried().without(names), planner.start_state, 0)
+    if found is None or not found.reaches:
+        return ""
+    way = planner.plan_of(planner.start_state, found.controls[: found.lasting])
+    hit = judged(planner.scene, planner.vehicle, way).hit
+    who = f"{' and '.join(hit)} hit{'s' if len(hit) == 1 else ''} it"
+    arrival = f"a goal is reached at {planner.time_of(found.lasting):.6g} s"
+    return f"; without those who move {arrival}, on a way where {who}" if hit else ""
 
 
 def _driven(planner: RoadPlanner, deadline: float) -> tuple[RoadPlanResult, str]:

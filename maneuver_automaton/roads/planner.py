@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -164,6 +164,14 @@ class RoadPlanner:
         more = tuple(moved_obstacle(one, back, digits=DIGITS) for one in others)
         local = replace(self.local, traffic=(*self.local.traffic, *more))
         return replace(self, scene=scene, local=local, kind=tuple(others))._cleared()
+
+    def without(self, names: Collection[str]) -> RoadPlanner:
+        """A planner like this one, some of those who move not there."""
+        scene, local = (
+            replace(one, traffic=tuple(k for k in one.traffic if k.name not in names))
+            for one in (self.scene, self.local)
+        )
+        return replace(self, scene=scene, local=local)._cleared()
 
     def until(self, tick: int) -> RoadPlanner:
         """A planner like this one, all goals over at a tick at the latest."""

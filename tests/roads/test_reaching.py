@@ -24,7 +24,17 @@ from maneuver_automaton.roads import (
 )
 from tests.formats.outside import DATA, needs_data
 from tests.quickly import quick_are
-from tests.roads.files import LANES, interval, lanelet, parked, piece, problem, scene_of, square
+from tests.roads.files import (
+    LANES,
+    car,
+    interval,
+    lanelet,
+    parked,
+    piece,
+    problem,
+    scene_of,
+    square,
+)
 
 LIMIT = 300.0  # [s] that nobody waits for: searches end by themselves
 
@@ -342,6 +352,14 @@ def test_a_goal_behind_is_told(tmp_path):
     assert road_planner(scene).hindrance == (
         "; the goal is 25 m behind the start, and no lanelets lead back to it"
     )
+
+
+def test_whose_recorded_motion_hits_the_way_is_told(tmp_path):
+    slow = car(8, x=20.0, y=2.0, speed=3.0, steps=40)
+    asked = problem(x=10.0, goal=goal(place(60.0, 2.0, 10.0), time=(0, 40)))
+    result = plan_road(scene_of(tmp_path, LANES[0], slow, asked), time_limit=0.0)
+    said = "; without those who move a goal is reached at 3.8 s, on a way where car 8 hits it"
+    assert result.reason.endswith(said)
 
 
 def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
