@@ -360,6 +360,9 @@ def test_whose_recorded_motion_hits_the_way_is_told(tmp_path):
     result = plan_road(scene_of(tmp_path, LANES[0], slow, asked), time_limit=0.0)
     said = "; without those who move a goal is reached at 3.8 s, on a way where car 8 hits it"
     assert result.reason.endswith(said)
+    assert result.decision is not None
+    assert result.decision.lasting == 40  # free until the goal is over, so a drive begins with it
+    assert drive_scene(result.planner, first=result.decision).verdict.clean
 
 
 def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
