@@ -62,6 +62,23 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
     return None if "" in why else ("missed", f"no goal can be reached: {said}")
 
 
+def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]:
+    """Distances of the body to the edge of the road and to the nearest road user at the start [m]."""
+    import shapely
+
+    size = 0.5 * np.array([vehicle.length, vehicle.width])
+    body, now = _bodies(scene.start.middle[None], size), scene.start.time
+    present = [(one, *presence_of(one)) for one in scene.traffic]
+    there = [
+        one.shape if one.motion is None else one.at(now)
+        for one, begin, end in present
+        if begin <= now <= end
+    ]
+    edge = shapely.boundary(RECENT.once(drivable_area, scene.lanelets))
+    traffic = float(_away(there, body)[0]) if there else np.inf
+    return float(shapely.distance(edge, body)[0]), traffic
+
+
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
     """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen.
 
@@ -128,7 +145,7 @@ def _may_fit(
 
 
 def _away(places: Sequence[Shape] | None, points: Any) -> Array:
-    """Distances of shapely points (n,) to the nearest of some places; zeros where any will do."""
+    """Distances of shapely geometries (n,) to the nearest of some places; zeros where any will do."""
     import shapely
 
     apart = [

@@ -365,6 +365,15 @@ def test_whose_recorded_motion_hits_the_way_is_told(tmp_path):
     assert drive_scene(result.planner, first=result.decision).verdict.clean
 
 
+@pytest.mark.parametrize(
+    ("y", "beside"), [(0.825, ()), (2.0, (parked(3, x=10.0, y=3.805),))], ids=("edge", "car")
+)
+def test_who_starts_nearer_than_is_kept_drives_on(tmp_path, y, beside):
+    asked = problem(x=10.0, y=y, goal=goal(place(60.0, 4.0, 10.0, 8.0), time=(0, 60)))
+    planner = road_planner(scene_of(tmp_path, *LANES, *beside, asked))
+    assert planner.search(planner.start_state, tick=0) is not None
+
+
 def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
     asked = problem(goal=goal(place(10.0, 2.0, 4.0), time=(0, 0)))
     scene = scene_of(tmp_path, *LANES, phantom(5, (80, 4, 0, 120)), asked)
