@@ -63,7 +63,7 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
 
 
 def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]:
-    """Distances of the body to the edge of the road and to the nearest road user at the start [m]."""
+    """Distances [m] of the body at the start: to the edge of the road, to the nearest road user."""
     import shapely
 
     size = 0.5 * np.array([vehicle.length, vehicle.width])
@@ -145,7 +145,7 @@ def _may_fit(
 
 
 def _away(places: Sequence[Shape] | None, points: Any) -> Array:
-    """Distances of shapely geometries (n,) to the nearest of some places; zeros where any will do."""
+    """Distances of shapely geometries (n,) to the nearest of some places; zeros for any place."""
     import shapely
 
     apart = [
