@@ -389,9 +389,12 @@ WIDE = piece(2, 120, 145, y=(-8.0, 12.0))  # room to stand across
         (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (), "at none of its"),
         (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.5, 2.2)), (), None),
         (goal(place(130.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (WIDE,), None),
+        (goal(place(30.0, 2.0, 10.0)), (), "it is 25 m behind, and nowhere is there room"),
+        (goal(place(30.0, 2.0, 10.0)), (WIDE,), None),
+        (goal(place(55.0, 2.0, 10.0)), (), None),
     ],
 )
-def test_a_goal_across_a_narrow_road_is_told(tmp_path, asked, more, said):
+def test_a_goal_across_or_behind_on_a_narrow_road_is_told(tmp_path, asked, more, said):
     lanes = (piece(1, 0, 120, '<successor ref="2"/>'), *more)
     scene = scene_of(tmp_path, *lanes, problem(x=60.0, goal=asked))
     why = road_planner(scene).hopeless()
