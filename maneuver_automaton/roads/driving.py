@@ -250,7 +250,8 @@ class RoadPlanResult(Played):
     """A plan to a goal and the verdict on it, or why there is none."""
 
     planner: RoadPlanner
-    decision: RoadDecision | None = None  # for `drive_scene` to begin with
+    # For `drive_scene` to begin with: it leads to the goal, or free until the last one is over.
+    decision: RoadDecision | None = None
     plan: Plan | None = None  # to the goal, in the coordinates and on the clock of the scene
     verdict: RoadVerdict | None = None
     reason: str = ""  # empty if there is a plan
@@ -261,19 +262,20 @@ class RoadPlanResult(Played):
     @property
     def cost(self) -> float | None:
         """Cost of the plan, its stop left out."""
-        return None if self.decision is None else self.planner.price(self.decision)
+        decision = self.decision if self.plan is not None else None
+        return None if decision is None else self.planner.price(decision)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What the file states and is not obeyed, or was read otherwise: a sentence each."""
-        if self.decision is None:
+        if self.decision is None or self.plan is None:
             return self.planner.scene.notes
         return self.planner.notes(self.decision.states[: self.decision.lasting + 1])
 
     @property
     def stop(self) -> Plan | None:
         """The fail-safe stop after the plan, of no duration where none was found."""
-        if self.decision is None:
+        if self.decision is None or self.plan is None:
             return None
         n, decision = self.decision.lasting, self.decision
         return self.planner.plan_of(decision.states[n], decision.controls[n:], tick=n)
@@ -288,7 +290,8 @@ def plan_road(
 ) -> RoadPlanResult:
     """A plan to a goal of searches wider and wider: of the first that finds one, or of the next.
 
-    It is polished, and passes the judge. No search begins after `time_limit` [s].
+    It is polished, and passes the judge. No search begins after `time_limit` [s], but for the one
+    that says who is in the way where there is no plan.
     """
     return _widened(road_planner(scene, vehicle, settings), time_limit)
 
@@ -307,7 +310,7 @@ def _widened(planner: RoadPlanner, limit: float, *, loop: bool = True) -> RoadPl
             hurried = _wider(planner.hurried(), begin + limit, begin + limit, WIDTHS, loop=True)
             best = best if hurried.plan is None else hurried
     if best.plan is None:
-        best = replace(best, reason=best.reason + planner.hindrance)
+        best = replace(best, reason=best.reason + (planner.hindrance or _who_hits(planner)))
     return replace(best, search_s=time.perf_counter() - begin)
 
 
@@ -337,6 +340,22 @@ def _wider(
     return best if best.plan is not None else replace(best, reason=best.reason + driven)
 
 
+def _who_hits(planner: RoadPlanner) -> str:
+    """Whose recorded motion meets the way that is there without it, as the end of a sentence."""
+    names = {one.name for one in planner.scene.traffic if one.motion is not None}
+    if not names or stopped():
+        return ""
+    wider = planner.wider(WIDTHS[-2], horizon_s=planner.last_tick * planner.tick)
+    found = _past_stops(wider.without(names), planner.start_state, 0)
+    if found is None or not found.reaches:
+        return ""
+    way = planner.plan_of(planner.start_state, found.controls[: found.lasting])
+    hit = judged(planner.scene, planner.vehicle, way).hit
+    who = f"{' and '.join(hit)} hit{'s' if len(hit) == 1 else ''} it"
+    arrival = f"a goal is reached at {planner.time_of(found.lasting):.6g} s"
+    return f"; without those who move {arrival}, on a way where {who}" if hit else ""
+
+
 def _driven(planner: RoadPlanner, deadline: float) -> tuple[RoadPlanResult, str]:
     """What the closed loop drives, as a plan; else how it ends, in words that follow others."""
     driver = Driver(planner, None)
@@ -361,7 +380,8 @@ def _searched(planner: RoadPlanner) -> RoadPlanResult:
             f"no goal is reached until {planner.time_of(planner.last_tick):.6g} s by any of the"
             f" words searched, {planner.settings.width} at a time{_how_near(planner, found)}"
         )
-        return RoadPlanResult(planner=planner, reason=reason)
+        lasts = found is not None and found.lasting >= planner.last_tick
+        return RoadPlanResult(planner=planner, decision=found if lasts else None, reason=reason)
     return _judged(planner, found)
 
 
@@ -408,7 +428,7 @@ def _how_near(planner: RoadPlanner, found: RoadDecision | None) -> str:
     why = nearest_miss(planner.local.goals, planner.vehicle, times, found.states[ticks])
     lasts = planner.time_of(found.lasting)
     waits = planner.waits(found.states[found.lasting], tick=found.lasting)
-    return f"; the one that leads furthest, until {lasts:.6g} s, was {why}{waits}"
+    return f"; the one that leads furthest ends at {lasts:.6g} s; {why}{waits}"
 
 
 def plan_before(planner: RoadPlanner, *, time_limit: float = 10.0) -> RoadPlanResult | None:

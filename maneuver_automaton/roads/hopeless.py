@@ -1,12 +1,13 @@
 """What lets every drive from a start fail, told before any search: each answer is a proof.
 
-The start itself, a goal's time, speed and distance, road users who shut a goal off, and a place
-where the body fits at no heading of the goal. What is not proven is searched for.
+The start itself, a goal's time, speed and distance, road users who shut a goal off, a place where
+the body fits at no heading of the goal, and a goal behind. What is not proven is searched for.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -62,6 +63,23 @@ def hopeless(scene: RoadScene, vehicle: RoadVehicle, there: Plan) -> tuple[str, 
     return None if "" in why else ("missed", f"no goal can be reached: {said}")
 
 
+def kept_at_start(scene: RoadScene, vehicle: RoadVehicle) -> tuple[float, float]:
+    """Distances [m] of the body at the start: to the edge of the road, to the nearest road user."""
+    import shapely
+
+    size = 0.5 * np.array([vehicle.length, vehicle.width])
+    body, now = _bodies(scene.start.middle[None], size), scene.start.time
+    present = [(one, *presence_of(one)) for one in scene.traffic]
+    there = [
+        one.shape if one.motion is None else one.at(now)
+        for one, begin, end in present
+        if begin <= now <= end
+    ]
+    edge = shapely.boundary(RECENT.once(drivable_area, scene.lanelets))
+    traffic = float(_away(there, body)[0]) if there else np.inf
+    return float(shapely.distance(edge, body)[0]), traffic
+
+
 def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, road: Any) -> str:
     """Why a goal cannot be reached, whatever is driven; empty if that cannot be seen.
 
@@ -86,11 +104,37 @@ def _never_reached(goal: GoalRegion, scene: RoadScene, vehicle: RoadVehicle, roa
     fastest = min(abs(start.speed) + 0.5 * model.max_acceleration * lasts, max(top, -slowest))
     if away > (most := fastest * lasts):
         return f"it is {away:.3g} m away, and until it is over one drives {most:.3g} m at most"
+    if slowest >= 0.0 and (behind := _behind(goal, start.middle, road, vehicle, most)):
+        return behind
     if goal.places is not None and goal.heading is not None:
         area = RECENT.once(drivable_area, scene.lanelets)
         if not _may_fit(goal.places, goal.heading, shapely.buffer(area, PROVEN), vehicle):
             return "at none of its headings is the road there wide enough for the body"
     return ""
+
+
+def _behind(goal: GoalRegion, middle: Array, road: Any, vehicle: RoadVehicle, most: float) -> str:
+    """Why who drives `most` forwards [m] never gets back to a goal; empty if that cannot be seen.
+
+    Before its heading is across that of the start, its rear axle has moved aside by its least
+    radius, and ahead of that is its front. Without it, the rear axle is never behind where it was.
+    """
+    import shapely
+
+    back = max(vehicle.ahead, 0.0)
+    corners = np.array([[-back, -FAR], [FAR, -FAR], [FAR, FAR], [-back, FAR]])
+    away = goal.away_from(shapely.Polygon(SE2(middle).act(corners)))
+    if away <= 0.0 or vehicle.length < vehicle.width:
+        return ""
+    here = shapely.Point(middle[:2])
+    around = shapely.buffer(here, WIDER * (min(most, FAR) + 2.0 * vehicle.length))
+    parts = shapely.get_parts(shapely.intersection(road, around))
+    places = shapely.get_coordinates(parts[shapely.distance(parts, here) <= TOUCHES])
+    aside = SE2(middle).inverse().act(places)[:, 1]
+    tightest = vehicle.model.wheelbase / math.tan(vehicle.model.max_steering)
+    if np.ptp(aside) >= tightest + vehicle.ahead + 0.5 * (vehicle.length - vehicle.width):
+        return ""
+    return f"it is {away + back:.3g} m behind, and nowhere is there room to turn around"
 
 
 def _may_fit(
@@ -128,7 +172,7 @@ def _may_fit(
 
 
 def _away(places: Sequence[Shape] | None, points: Any) -> Array:
-    """Distances of shapely points (n,) to the nearest of some places; zeros where any will do."""
+    """Distances of shapely geometries (n,) to the nearest of some places; zeros for any place."""
     import shapely
 
     apart = [

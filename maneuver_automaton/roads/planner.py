@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -27,7 +27,7 @@ from maneuver_automaton.roads.arrays import (
     HorizonTask,
     RoadArrays,
 )
-from maneuver_automaton.roads.hopeless import hopeless
+from maneuver_automaton.roads.hopeless import hopeless, kept_at_start
 from maneuver_automaton.roads.plans import (
     AT_REST,
     ROUND,
@@ -164,6 +164,14 @@ class RoadPlanner:
         more = tuple(moved_obstacle(one, back, digits=DIGITS) for one in others)
         local = replace(self.local, traffic=(*self.local.traffic, *more))
         return replace(self, scene=scene, local=local, kind=tuple(others))._cleared()
+
+    def without(self, names: Collection[str]) -> RoadPlanner:
+        """A planner like this one, some of those who move not there."""
+        scene, local = (
+            replace(one, traffic=tuple(k for k in one.traffic if k.name not in names))
+            for one in (self.scene, self.local)
+        )
+        return replace(self, scene=scene, local=local)._cleared()
 
     def until(self, tick: int) -> RoadPlanner:
         """A planner like this one, all goals over at a tick at the latest."""
@@ -459,7 +467,8 @@ def road_planner(
     scene: RoadScene, vehicle: RoadVehicle | None = None, settings: RoadSettings | None = None
 ) -> RoadPlanner:
     """Everything for driving on a scene, made once."""
-    vehicle, settings = vehicle or RoadVehicle(), settings or RoadSettings()
+    vehicle = vehicle or RoadVehicle()
+    settings = _fitting(settings or RoadSettings(), scene, vehicle)
     tick = tick_of(scene.step)
     wanted = [one.speed for one in scene.goals if one.speed is not None]
     fastest = math.ceil(max(scene.start.speed, *(low for low, _ in wanted), settings.top_speed))
@@ -502,6 +511,16 @@ def road_planner(
         room=beam_arrays(settings, library),
         barriers=closed,
     )
+
+
+def _fitting(settings: RoadSettings, scene: RoadScene, vehicle: RoadVehicle) -> RoadSettings:
+    """Settings whose distances are half of what the start keeps, where that keeps less."""
+    edge, traffic = kept_at_start(scene, vehicle)
+    if edge < settings.off_edge_m:
+        settings = replace(settings, off_edge_m=0.5 * edge)
+    if traffic < settings.off_traffic_m:
+        settings = replace(settings, off_traffic_m=0.5 * traffic)
+    return settings
 
 
 def _last_tick(goals: GoalArrays, settings: RoadSettings, tick: float) -> int:

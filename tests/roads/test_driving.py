@@ -306,7 +306,7 @@ def test_no_plan_says_why(tmp_path):
     assert result.plan is None
     assert result.reason == (
         "no goal is reached until 0.5 s by any of the words searched, 100 at a time; the one that "
-        "leads furthest, until 0.5 s, was nearest to it at 0.5 s: 1.57 m away"
+        "leads furthest ends at 0.5 s; nearest to it at 0.5 s: 1.57 m away"
     )
 
 

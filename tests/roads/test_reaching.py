@@ -24,7 +24,17 @@ from maneuver_automaton.roads import (
 )
 from tests.formats.outside import DATA, needs_data
 from tests.quickly import quick_are
-from tests.roads.files import LANES, interval, lanelet, parked, piece, problem, scene_of, square
+from tests.roads.files import (
+    LANES,
+    car,
+    interval,
+    lanelet,
+    parked,
+    piece,
+    problem,
+    scene_of,
+    square,
+)
 
 LIMIT = 300.0  # [s] that nobody waits for: searches end by themselves
 
@@ -344,6 +354,26 @@ def test_a_goal_behind_is_told(tmp_path):
     )
 
 
+def test_whose_recorded_motion_hits_the_way_is_told(tmp_path):
+    slow = car(8, x=20.0, y=2.0, speed=3.0, steps=40)
+    asked = problem(x=10.0, goal=goal(place(60.0, 2.0, 10.0), time=(0, 40)))
+    result = plan_road(scene_of(tmp_path, LANES[0], slow, asked), time_limit=0.0)
+    said = "; without those who move a goal is reached at 3.8 s, on a way where car 8 hits it"
+    assert result.reason.endswith(said)
+    assert result.decision is not None
+    assert result.decision.lasting == 40  # free until the goal is over, so a drive begins with it
+    assert drive_scene(result.planner, first=result.decision).verdict.clean
+
+
+@pytest.mark.parametrize(
+    ("y", "beside"), [(0.825, ()), (2.0, (parked(3, x=10.0, y=3.805),))], ids=("edge", "car")
+)
+def test_who_starts_nearer_than_is_kept_drives_on(tmp_path, y, beside):
+    asked = problem(x=10.0, y=y, goal=goal(place(60.0, 4.0, 10.0, 8.0), time=(0, 60)))
+    planner = road_planner(scene_of(tmp_path, *LANES, *beside, asked))
+    assert planner.search(planner.start_state, tick=0) is not None
+
+
 def test_a_goal_at_the_start_that_is_over_at_once_is_met(tmp_path):
     asked = problem(goal=goal(place(10.0, 2.0, 4.0), time=(0, 0)))
     scene = scene_of(tmp_path, *LANES, phantom(5, (80, 4, 0, 120)), asked)
@@ -359,9 +389,12 @@ WIDE = piece(2, 120, 145, y=(-8.0, 12.0))  # room to stand across
         (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (), "at none of its"),
         (goal(place(90.0, 2.0, 9.0), interval("orientation", 0.5, 2.2)), (), None),
         (goal(place(130.0, 2.0, 9.0), interval("orientation", 0.9, 2.2)), (WIDE,), None),
+        (goal(place(30.0, 2.0, 10.0)), (), "it is 25 m behind, and nowhere is there room"),
+        (goal(place(30.0, 2.0, 10.0)), (WIDE,), None),
+        (goal(place(55.0, 2.0, 10.0)), (), None),
     ],
 )
-def test_a_goal_across_a_narrow_road_is_told(tmp_path, asked, more, said):
+def test_a_goal_across_or_behind_on_a_narrow_road_is_told(tmp_path, asked, more, said):
     lanes = (piece(1, 0, 120, '<successor ref="2"/>'), *more)
     scene = scene_of(tmp_path, *lanes, problem(x=60.0, goal=asked))
     why = road_planner(scene).hopeless()
