@@ -198,7 +198,7 @@ class _FleetSearch:
             self.whole += [(group, how) for group in groups if 2 <= len(group) <= MOST_OF[how]]
         rest = [k for group in groups for k in group if k not in self.held]
         # Who does not switch at will holds a first plan, which nothing has improved yet.
-        self.whole += [((k,), "in turn") for k in rest if not self.vehicles[k].at_will]
+        self.whole += [((k,), "in turn") for k in rest if not self.vehicles[k].ways]
         if not rest:
             self.order = sorted(able)
             return
@@ -342,7 +342,7 @@ class _FleetSearch:
         if not suits or (how, *sorted(group), now) in self.asked:
             how = "in turn"
         asked = (how, *(group if how == "in turn" else sorted(group)), now)
-        if longer and asked in self.asked and any(self.vehicles[k].at_will for k in group):
+        if longer and asked in self.asked and any(self.vehicles[k].ways for k in group):
             how = "with time"  # their words were improved but at once
             asked = (how, *group, now)
         if asked in self.asked:

@@ -190,7 +190,7 @@ class _Ramp:
 def _ramp(problem: Problem) -> _Ramp:
     """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
     model, cost = problem.automaton.model, terms_of(problem.cost)
-    if not (follows_paths(model) and problem.has_inertia and problem.rests_at_both_ends):
+    if not (follows_paths(model) and problem.rests_at_both_ends):
         return _Ramp()
     twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
     if cost is None or not cost.time or (twists[:, 0] == 0.0).any():

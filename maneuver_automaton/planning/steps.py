@@ -311,7 +311,7 @@ def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:
 def _why_unlinked(problem: Problem) -> str:
     """Why no word of the library may lead to a goal, by its trims alone; empty if some may."""
     automaton = problem.automaton
-    if not problem.has_inertia or problem.has_states:
+    if problem.has_states:
         return ""
     start, lasts = problem.first_trim, [problem.last_trim(goal) for goal in problem.goals]
     index = automaton.index_of

@@ -134,11 +134,11 @@ def lattice_library(
 ) -> LatticeLibrary:
     """The part of a lattice search that is the same for every start, goal and map.
 
-    Trims that lead to none of the goals of these numbers are left out: their speeds would make the
-    estimates of cost too low. A vehicle that switches at will can use all of them.
+    Trims that lead to none of the goals of these numbers, if any, are left out: their speeds would
+    make the estimates of cost too low. Where trims are switched at will, all lead there.
     """
     automaton = problem.automaton
-    if automaton.is_kinematic:
+    if not goals:
         return _library_on(problem.setting, automaton, prepared)
     first = automaton.index_of(problem.first_trim.name)
     lasts = {automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals}

@@ -39,7 +39,7 @@ class PricedTrims(NamedTuple):
     library: Library
     wide: bool  # whether the vehicle turns by driving circles only, however wide
     per_turn: float | None  # cost of the cheapest full turn; None: it takes length scales
-    rest: int | None  # index in the automaton of the cheapest rest
+    rest: int | None  # index in the automaton of the cheapest rest, if it pads a fixed time
     rest_rate: float  # taken off all rates, since rest pads a fixed time
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
     at_will: bool  # whether plans begin and end in any trim
@@ -131,13 +131,15 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
     Where maneuvers do, prices of switches and changes of direction are left to whoever compares
     plans.
     """
+    rest = None
     if library.automaton.is_kinematic:
+        rest = library.automaton.rest
         library = replace(library, arrays=_with_prices(library.arrays, cost))
     return PricedTrims(
         library=library,
         wide=False,
         per_turn=None,
-        rest=library.automaton.rest,
+        rest=rest,
         rest_rate=0.0,
         interval=(library.arrays.tried.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
         at_will=False,
