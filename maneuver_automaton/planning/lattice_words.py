@@ -149,10 +149,10 @@ class LatticeWords(PlanningStep):
         goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
         if begun is not None:
             ends = Ends(begun.call.arrays.seen[:, :3].copy(), begun.call.arrays.clear.copy())
-        query = lattice_query(problem, goals, prepared=prepared, ends=ends)
-        known = query.library.at_will
+        query = self.query = lattice_query(problem, goals, prepared=prepared, ends=ends)
+        known = self.finds_plans
         self.table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
-        self.query = query = query if known else late_at_first(query)
+        query = self.query = query if known else late_at_first(query)
         self.found, self.words, self.spent = found, [], 0
         limit = self.limit = found.for_first.stage(share)
         self.alone, ended.finds_plans = not found.plans, known

@@ -147,7 +147,7 @@ def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
 def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
     """The call of queries like this one; None where its kernel does not look at all of them."""
     bounds, automaton = problem.bounds, problem.automaton
-    if not automaton.is_kinematic or automaton.lattice is not None or problem.start.size != 3:
+    if not automaton.switches_in_plane or automaton.lattice is not None:
         return None
     if problem.parts or problem.moves or problem.zones or (bounds.x is None) != (bounds.y is None):
         return None

@@ -73,7 +73,11 @@ class LatticeLibrary:
     rest: int | None  # index in the automaton of the rest that pads
     rest_rate: float
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
-    at_will: bool  # whether plans begin and end in any trim, and may end with a turn on the spot
+
+    @property
+    def at_will(self) -> bool:
+        """Whether plans begin and end in any trim, and may end with a turn on the spot."""
+        return self.priced.automaton.switches_in_plane
 
     @property
     def trims(self) -> IntArray:
@@ -177,7 +181,7 @@ def _library(
     limited: bool,
     choice: Chosen | None = None,
 ) -> LatticeLibrary:
-    if automaton.is_kinematic and automaton.model.group.dof == 3:
+    if automaton.switches_in_plane:
         trims = trims_at_will(
             automaton,
             cost,
@@ -262,7 +266,6 @@ def library_of_trims(
         rest=priced.rest,
         rest_rate=priced.rest_rate,
         interval=priced.interval,
-        at_will=priced.at_will,
     )
 
 

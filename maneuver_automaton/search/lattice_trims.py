@@ -42,7 +42,6 @@ class PricedTrims(NamedTuple):
     rest: int | None  # index in the automaton of the cheapest rest, if it pads a fixed time
     rest_rate: float  # taken off all rates, since rest pads a fixed time
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
-    at_will: bool  # whether plans begin and end in any trim
 
 
 class Chosen(NamedTuple):
@@ -114,15 +113,14 @@ def trims_at_will(
         rest=known.rest,
         rest_rate=known.rest_rate if pads else 0.0,
         interval=(0.0, math.inf),
-        at_will=True,
     )
 
 
 def stands_for_more(problem: Problem) -> bool:
     """Whether a few trims stand for all where trims are switched at will in the plane."""
     automaton = problem.automaton
-    planar = automaton.is_kinematic and automaton.model.group.dof == 3
-    return planar and len(moving_trims(automaton, problem.cost).trims) > MOST_TRIMS
+    letters = moving_trims(automaton, problem.cost).trims if automaton.switches_in_plane else ()
+    return len(letters) > MOST_TRIMS
 
 
 def trims_of(library: Library, cost: StageCost) -> PricedTrims:
@@ -142,7 +140,6 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
         rest=rest,
         rest_rate=0.0,
         interval=(library.arrays.tried.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
-        at_will=False,
     )
 
 
