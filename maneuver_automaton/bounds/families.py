@@ -11,7 +11,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.models import Car, CarWithTrailer, Model
+from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.limits import rest_rate
@@ -84,10 +84,10 @@ def _at_the_limits(model: Model) -> Automaton | None:
     """Trims of a kinematic vehicle that reach all poses of one with inertia; None if not known."""
     if follows_paths(model):
         return extreme_automaton(model)  # type: ignore[arg-type]
-    if not isinstance(model, CarWithTrailer):
+    car = getattr(model, "kinematic", None)  # whatever it pulls
+    if car is None:
         return None
-    car = Car(wheelbase=model.wheelbase, max_steering=model.max_steering)  # whatever it pulls
-    angles = (-model.max_steering, 0.0, model.max_steering)
+    angles = (-car.max_steering, 0.0, car.max_steering)
     speeds = [speed for speed in model.control_limits[0].tolist() if speed]
     controls = {f"{speed:g}, {angle:g}": (speed, angle) for speed in speeds for angle in angles}
     return Automaton.of_controls(car, controls)
@@ -95,8 +95,7 @@ def _at_the_limits(model: Model) -> Automaton | None:
 
 def besides(problem: Problem) -> float:
     """Cost of every plan that does not depend on its path: of resting for a fixed time."""
-    rest = rest_rate(problem) if not problem.has_inertia else None
-    return 0.0 if rest is None else rest * (problem.horizon.time or 0.0)
+    return (rest_rate(problem) or 0.0) * (problem.horizon.time or 0.0)
 
 
 def _families(per_cost: Array, *, gears: bool) -> Families:

@@ -24,6 +24,7 @@ from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.search._kernels_nodes import EMPTY
 from maneuver_automaton.search.arrays import LatticeArrays, Scene
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.words.library import NO_TRIM
 
 CELL = 0.25  # of the search, in turning radii
 HEADINGS = 24
@@ -208,7 +209,7 @@ def _plan(
     while search.links[node, kernels.PARENT] >= 0:
         rows.append(node)
         node = int(search.links[node, kernels.PARENT])
-    word = [] if automaton.is_kinematic else [automaton.trims[library.trims[task.trim]]]
+    word = [] if query.start_trim == NO_TRIM else [automaton.trims[library.trims[task.trim]]]
     times, between = [0.0] * len(word), list[Maneuver | None]()
     for row in reversed(rows):
         edge = int(search.links[row, kernels.EDGE])
