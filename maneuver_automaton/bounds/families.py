@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -84,13 +85,11 @@ def _at_the_limits(model: Model) -> Automaton | None:
     """Trims of a kinematic vehicle that reach all poses of one with inertia; None if not known."""
     if follows_paths(model):
         return extreme_automaton(model)  # type: ignore[arg-type]
-    car = getattr(model, "kinematic", None)  # whatever it pulls
-    if car is None:
+    kinematic, limits = getattr(model, "kinematic", None), model.control_limits
+    if kinematic is None or not np.isfinite(limits).all():
         return None
-    angles = (-car.max_steering, 0.0, car.max_steering)
-    speeds = [speed for speed in model.control_limits[0].tolist() if speed]
-    controls = {f"{speed:g}, {angle:g}": (speed, angle) for speed in speeds for angle in angles}
-    return Automaton.of_controls(car, controls)
+    levels = [sorted({low, high, min(max(0.0, low), high)}) for low, high in limits.tolist()]
+    return Automaton.of_controls(kinematic, {str(one): one for one in product(*levels)})
 
 
 def besides(problem: Problem) -> float:

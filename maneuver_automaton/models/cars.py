@@ -265,7 +265,7 @@ class CarWithTrailer(Vehicle):
 
     @property
     def kinematic(self) -> Car:
-        """The car whose poses are those of the one that pulls."""
+        """The car that pulls, alone: it has the same controls and twists."""
         return Car(wheelbase=self.wheelbase, max_steering=self.max_steering)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
@@ -373,7 +373,7 @@ class TractorWithTrailers(Vehicle):
 
     @property
     def kinematic(self) -> Car:
-        """The car whose poses are those of the one that pulls."""
+        """The car that pulls, alone: it has the same controls and twists."""
         return Car(wheelbase=self.wheelbase, max_steering=self.max_steering)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
