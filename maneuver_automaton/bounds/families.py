@@ -12,7 +12,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.models import Model
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.limits import rest_rate
@@ -67,9 +66,7 @@ def motions_of(problem: Problem) -> Motions | None:
         price = cost.direction_change if cost else 0.0  # at least that
         if (rest := rest_rate(problem)) is not None:
             rates = rates - rest
-    elif (
-        cost and (cost.time or cost.length) and (simpler := _at_the_limits(problem.automaton.model))
-    ):
+    elif cost and (cost.time or cost.length) and (simpler := _at_the_limits(problem.automaton)):
         twists, price = simpler.body_velocities[:, :3], 0.0
         rates = Cost(time=cost.time, length=cost.length).rates(simpler.controls, twists)
     else:
@@ -81,10 +78,11 @@ def motions_of(problem: Problem) -> Motions | None:
     return Motions(families=families, price=price, besides=besides(problem))
 
 
-def _at_the_limits(model: Model) -> Automaton | None:
+def _at_the_limits(automaton: Automaton) -> Automaton | None:
     """Trims of a kinematic vehicle that reach all poses of one with inertia; None if not known."""
+    model = automaton.model
     if follows_paths(model):
-        return extreme_automaton(model)  # type: ignore[arg-type]
+        return extreme_automaton(automaton)
     kinematic, limits = getattr(model, "kinematic", None), model.control_limits
     if kinematic is None or not np.isfinite(limits).all():
         return None

@@ -181,7 +181,7 @@ def _ramp(problem: Problem) -> _Ramp:
     model, cost = problem.automaton.model, terms_of(problem.cost)
     if not (follows_paths(model) and problem.rests_at_both_ends):
         return _Ramp()
-    twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
+    twists = extreme_automaton(problem.automaton).body_velocities
     if cost is None or not cost.time or (twists[:, 0] == 0.0).any():
         return _Ramp()
     fastest = float(np.abs(twists[:, 0]).max())
