@@ -90,7 +90,10 @@ def proven_factor(
     met = _worst(goals / scale, met, max_trims, shortest, reach)
     proven, looked = 1.0, 0
     finished = max_trims >= MOST_TRIMS
-    corners, size = _first_boxes(reach)
+    across, around = math.ceil(reach / FIRST), math.ceil(2.0 * math.pi / FIRST)
+    size = np.array([reach / across, reach / across, 2.0 * math.pi / around])
+    corners = np.array(list(product(range(across), range(across), range(around)))) * size
+    corners = _inside(corners - np.array([0.0, 0.0, math.pi]), reach)  # a quarter of the goals
     while not finished:
         open_corners, open_ratios = [], []
         for low in np.array_split(corners, 1 + len(corners) // AT_ONCE):
@@ -172,16 +175,6 @@ def _least(kinds: Iterator[Family], max_trims: int) -> tuple[Array, Array]:
         else:
             long = np.minimum(long, family.lower())
     return short, np.broadcast_to(long, short.shape)
-
-
-def _first_boxes(reach: float) -> tuple[Array, Array]:
-    """Lower corners (n, 3) of boxes that cover a quarter of the goals, and their size (3,)."""
-    across = math.ceil(reach / FIRST)
-    around = math.ceil(2.0 * math.pi / FIRST)
-    size = np.array([reach / across, reach / across, 2.0 * math.pi / around])
-    places = (range(across), range(across), range(around))
-    corners = np.array(list(product(*places))) * size - np.array([0.0, 0.0, math.pi])
-    return _inside(corners, reach), size
 
 
 def _inside(corners: Array, reach: float) -> Array:

@@ -161,7 +161,12 @@ class _FleetSearch:
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
         prepare_vehicles(self.vehicles)
-        self._plan_alone()
+        tasks = [PoolTask((one.number,), {}, "alone") for one in self.vehicles]
+        for _ in self.pool.each(tasks, self.budget.stage(ALONE_SHARE)):
+            pass
+        for one in self.vehicles:
+            if one.alone is None:
+                self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
         alone = self.budget.elapsed
         able = [one.number for one in self.vehicles if one.number not in self.reasons]
         self._plan_together(able, orders, max_rounds)
@@ -174,15 +179,6 @@ class _FleetSearch:
         timing = {"alone": alone, "first_plan": first, "search": searched}
         timing["audit"] = self.budget.elapsed - searched
         return replace(result, timing_s=timing)
-
-    def _plan_alone(self) -> None:
-        """The way of each by itself."""
-        tasks = [PoolTask((one.number,), {}, "alone") for one in self.vehicles]
-        for _ in self.pool.each(tasks, self.budget.stage(ALONE_SHARE)):
-            pass
-        for one in self.vehicles:
-            if one.alone is None:
-                self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
 
     def _plan_together(self, able: Sequence[int], orders: int, max_rounds: int | None) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
