@@ -358,11 +358,6 @@ class Automaton(Drawn):
         limited = any(trim.max_duration < np.inf for trim in self.trims)
         return not (self.trim_classes.any() or self.maneuvers or limited)
 
-    @property
-    def switches_in_plane(self) -> bool:
-        """Whether its trims can be combined at will, and move the vehicle in a plane."""
-        return self.is_kinematic and self.model.group.dof == 3
-
     def graph(self) -> Any:
         """The automaton as a ``networkx.MultiDiGraph``: trims as nodes, all maneuvers as edges.
 

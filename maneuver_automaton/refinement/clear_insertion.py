@@ -118,10 +118,7 @@ class Whole:
 
 
 def _dense(query: LatticeQuery) -> LatticeQuery | None:
-    """The query with trims in more directions; None where both of two trims are worth one between.
-
-    That one saves a switch, or is more than a limit leaves room for.
-    """
+    """The query with trims in more directions; None where one trim is worth no more than two."""
     prices = query.library.arrays.library
     priced = prices.switch > 0.0 or prices.direction_change > 0.0
     limited = query.most_trims > 0 or query.least_coast > 0.0

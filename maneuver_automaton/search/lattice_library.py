@@ -32,6 +32,7 @@ from maneuver_automaton.search.lattice_trims import (
     Chosen,
     PricedTrims,
     priced_library,
+    switched_in_plane,
     trims_at_will,
     trims_of,
 )
@@ -77,7 +78,7 @@ class LatticeLibrary:
     @property
     def at_will(self) -> bool:
         """Whether plans begin and end in any trim, and may end with a turn on the spot."""
-        return self.priced.automaton.switches_in_plane
+        return switched_in_plane(self.priced.automaton)
 
     @property
     def trims(self) -> IntArray:
@@ -181,7 +182,7 @@ def _library(
     limited: bool,
     choice: Chosen | None = None,
 ) -> LatticeLibrary:
-    if automaton.switches_in_plane:
+    if switched_in_plane(automaton):
         trims = trims_at_will(
             automaton,
             cost,

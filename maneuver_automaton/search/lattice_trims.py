@@ -116,10 +116,15 @@ def trims_at_will(
     )
 
 
+def switched_in_plane(automaton: Automaton) -> bool:
+    """Whether trims are combined at will, and move the vehicle in a plane."""
+    return automaton.is_kinematic and automaton.model.group.dof == 3
+
+
 def stands_for_more(problem: Problem) -> bool:
     """Whether a few trims stand for all where trims are switched at will in the plane."""
     automaton = problem.automaton
-    letters = moving_trims(automaton, problem.cost).trims if automaton.switches_in_plane else ()
+    letters = moving_trims(automaton, problem.cost).trims if switched_in_plane(automaton) else ()
     return len(letters) > MOST_TRIMS
 
 
