@@ -277,7 +277,7 @@ class Automaton(Drawn):
 
     @cached_property
     def translated(self) -> OnlyTranslated | None:
-        """The model, if translations alone move it; None otherwise. To ask a Protocol takes long."""
+        """The model, if translations alone move it; None otherwise. Asked once: it takes long."""
         return self.model if isinstance(self.model, OnlyTranslated) else None
 
     @cached_property
