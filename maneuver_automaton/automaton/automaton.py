@@ -277,10 +277,7 @@ class Automaton(Drawn):
 
     @cached_property
     def translated(self) -> OnlyTranslated | None:
-        """The model, if translations alone move it; None otherwise. Asked for once: it takes long.
-
-        To ask whether a value obeys a Protocol looks at each of its attributes.
-        """
+        """The model, if translations alone move it; None otherwise. Asked once: it takes long."""
         return self.model if isinstance(self.model, OnlyTranslated) else None
 
     @cached_property

@@ -102,16 +102,17 @@ def _piece(primitive: Primitive, duration: float, library: Automaton) -> Piece:
             "duration_s": duration,
         }
         known = library[primitive.name] if primitive.name in library.trim_names else None
+        if not library.is_kinematic:
+            if known is None:
+                entry["body_velocity"] = primitive.body_velocity.tolist()
+                entry["reduced_state"] = primitive.reduced_state.tolist()
         # At will, a trim at another pace is made of its control; one that noise moves is not.
-        disturbed = (
+        elif (
             known is not None
             and np.array_equal(primitive.control, known.control)
             and not np.array_equal(primitive.body_velocity, known.body_velocity)
-        )
-        if disturbed if library.is_kinematic else known is None:
+        ):
             entry["body_velocity"] = primitive.body_velocity.tolist()
-        if not library.is_kinematic and known is None:
-            entry["reduced_state"] = primitive.reduced_state.tolist()
         return entry
     entry = {
         "kind": "maneuver",

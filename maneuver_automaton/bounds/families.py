@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost, terms_of
-from maneuver_automaton.models import Car, CarWithTrailer, Model
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.limits import rest_rate
@@ -66,9 +66,7 @@ def motions_of(problem: Problem) -> Motions | None:
         price = cost.direction_change if cost else 0.0  # at least that
         if (rest := rest_rate(problem)) is not None:
             rates = rates - rest
-    elif (
-        cost and (cost.time or cost.length) and (simpler := _at_the_limits(problem.automaton.model))
-    ):
+    elif cost and (cost.time or cost.length) and (simpler := _at_the_limits(problem.automaton)):
         twists, price = simpler.body_velocities[:, :3], 0.0
         rates = Cost(time=cost.time, length=cost.length).rates(simpler.controls, twists)
     else:
@@ -80,23 +78,21 @@ def motions_of(problem: Problem) -> Motions | None:
     return Motions(families=families, price=price, besides=besides(problem))
 
 
-def _at_the_limits(model: Model) -> Automaton | None:
+def _at_the_limits(automaton: Automaton) -> Automaton | None:
     """Trims of a kinematic vehicle that reach all poses of one with inertia; None if not known."""
+    model = automaton.model
     if follows_paths(model):
-        return extreme_automaton(model)  # type: ignore[arg-type]
-    if not isinstance(model, CarWithTrailer):
+        return extreme_automaton(automaton)
+    kinematic, limits = getattr(model, "kinematic", None), model.control_limits
+    if kinematic is None or not np.isfinite(limits).all():
         return None
-    car = Car(wheelbase=model.wheelbase, max_steering=model.max_steering)  # whatever it pulls
-    angles = (-model.max_steering, 0.0, model.max_steering)
-    speeds = [speed for speed in model.control_limits[0].tolist() if speed]
-    controls = {f"{speed:g}, {angle:g}": (speed, angle) for speed in speeds for angle in angles}
-    return Automaton.of_controls(car, controls)
+    levels = [sorted({low, high, min(max(0.0, low), high)}) for low, high in limits.tolist()]
+    return Automaton.of_controls(kinematic, {str(one): one for one in product(*levels)})
 
 
 def besides(problem: Problem) -> float:
     """Cost of every plan that does not depend on its path: of resting for a fixed time."""
-    rest = rest_rate(problem) if not problem.has_inertia else None
-    return 0.0 if rest is None else rest * (problem.horizon.time or 0.0)
+    return (rest_rate(problem) or 0.0) * (problem.horizon.time or 0.0)
 
 
 def _families(per_cost: Array, *, gears: bool) -> Families:

@@ -240,13 +240,8 @@ class LookOptions:
     style: str = "screen"
 
     def __post_init__(self) -> None:
-        if self.is_stated:
+        if self.size is not None or self.style != "screen":
             self.look()  # Matplotlib is needed anyway, and a wrong size is told before planning
-
-    @property
-    def is_stated(self) -> bool:
-        """Whether pictures are to have another size or style than they have of themselves."""
-        return self.size is not None or self.style != "screen"
 
     def look(self, name: str = "") -> Look:
         """The look of a picture of the scenario `name`; raises InvalidScenario."""

@@ -31,7 +31,8 @@ STEPS = 100  # of a loop, where neither file nor option says
 def planned(job: Job, scenario: Scenario) -> JobResult:
     """Plan the problem of a file."""
     budgets, quiet = job.options.budgets, job.options.quiet
-    limit, shown = budgets.time_limit or scenario.time_limit_s, SoFar.of_gap(budgets.gap)
+    limit = budgets.time_limit or scenario.time_limit_s
+    shown = SoFar(watch=Watch(gap=-math.inf if budgets.gap is None else budgets.gap))
     live = not quiet and has_terminal()
     try:
         with waiting(f"planning, at most {limit:g} s", quiet=quiet, more=lambda: shown.text):
@@ -75,11 +76,6 @@ class SoFar:
 
     watch: Watch
     best: PlanResult | None = None
-
-    @classmethod
-    def of_gap(cls, gap: float | None) -> SoFar:
-        """Nothing yet of a search that ends with a `gap`, if one is stated."""
-        return cls(watch=Watch(gap=-math.inf if gap is None else gap))
 
     def better(self, result: PlanResult) -> None:
         """Take a plan that is better than the one before, and passed all checks."""

@@ -219,10 +219,9 @@ class FclChecker:
                 _sliced(self._body, kinds[k], level)
                 for k, level in zip(of.tolist(), parts.level.tolist(), strict=True)
             ]
-            objects = [solid.object for solid in solids]
-            hits = _touching(objects, posed(of, parts.begins), laid.static)
+            hits = _touching([solid for solid, _ in solids], posed(of, parts.begins), laid.static)
             for row, triangle in hits.items():  # in order: the first is the first coast's
-                if solids[row].excess <= 0.5 * self.proven and (not first or of[row] < first[0]):
+                if solids[row][1] <= 0.5 * self.proven and (not first or of[row] < first[0]):
                     first = int(of[row]), int(laid.owners[triangle])
             sooner = [row for row in hits if not first or of[row] < first[0]]
             if not sooner:
@@ -289,13 +288,6 @@ class _Ground:
         return laid
 
 
-class _Sliced(NamedTuple):
-    """Solid that a body sweeps in one slice."""
-
-    object: Any
-    excess: float  # [m]
-
-
 _BOX = body_skin([np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])]).triangles
 
 
@@ -355,11 +347,12 @@ def _standing(body: GrownBody) -> Any:
 
 
 @functools.lru_cache(maxsize=1024)
-def _sliced(body: GrownBody, twist: Twist, level: int) -> _Sliced:
+def _sliced(body: GrownBody, twist: Twist, level: int) -> tuple[Any, float]:
+    """Solid that a body sweeps in one slice, and its excess [m]."""
     duration, pieces = math.ldexp(1.0, -level), cut_where_it_pivots(body, twist)
     step = duration * np.array([twist])
     hulls = swept_hulls(pieces, np.concatenate([np.zeros((1, 3)), SE2.exp(step).pose]), step)
-    return _Sliced(_object(body_skin(hulls)), slice_excess(pieces, twist, duration))
+    return _object(body_skin(hulls)), slice_excess(pieces, twist, duration)
 
 
 def _box_skin(ring: Array) -> Skin:

@@ -86,18 +86,21 @@ def proven_factor(
     """
     scale = np.array([turning_radius, turning_radius, 1.0])
     reach, shortest = radius / turning_radius, least / turning_radius
-    met = _Met(ratio=1.0, goal=np.array([min(reach, 1.0), 0.0, 0.0]))
+    met: tuple[float, Array] = 1.0, np.array([min(reach, 1.0), 0.0, 0.0])  # greatest ratio, where
     met = _worst(goals / scale, met, max_trims, shortest, reach)
     proven, looked = 1.0, 0
     finished = max_trims >= MOST_TRIMS
-    corners, size = _first_boxes(reach)
+    across, around = math.ceil(reach / FIRST), math.ceil(2.0 * math.pi / FIRST)
+    size = np.array([reach / across, reach / across, 2.0 * math.pi / around])
+    corners = np.array(list(product(range(across), range(across), range(around)))) * size
+    corners = _inside(corners - np.array([0.0, 0.0, math.pi]), reach)  # a quarter of the goals
     while not finished:
         open_corners, open_ratios = [], []
         for low in np.array_split(corners, 1 + len(corners) // AT_ONCE):
             ratios = _box_ratios(low, size, max_trims, shortest)
             met = _worst(low + 0.5 * size, met, max_trims, shortest, reach)
             looked += len(low)
-            is_open = ratios > met.ratio + tolerance
+            is_open = ratios > met[0] + tolerance
             proven = max(proven, float(ratios[~is_open].max(initial=1.0)))
             open_corners.append(low[is_open])
             open_ratios.append(ratios[is_open])
@@ -115,20 +118,12 @@ def proven_factor(
         turning_radius=turning_radius,
         radius=radius,
         least=least,
-        factor=max(proven, met.ratio),
-        sampled=met.ratio,
-        worst=met.goal * scale,
+        factor=max(proven, met[0]),
+        sampled=met[0],
+        worst=met[1] * scale,
         boxes=looked,
         finished=finished,
     )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Met:
-    """The greatest ratio met, and at which goal."""
-
-    ratio: float
-    goal: Array
 
 
 def factors_at(goals: Array, *, turning_radius: float, max_trims: int, least: float) -> Array:
@@ -140,15 +135,17 @@ def factors_at(goals: Array, *, turning_radius: float, max_trims: int, least: fl
     return np.where(counts, short / np.where(counts, shortest, 1.0), np.nan)
 
 
-def _worst(goals: Array, met: _Met, max_trims: int, least: float, reach: float) -> _Met:
-    """What was met, or what is worse among goals (n, 3)."""
+def _worst(
+    goals: Array, met: tuple[float, Array], max_trims: int, least: float, reach: float
+) -> tuple[float, Array]:
+    """The greatest ratio met, and at which goal, or what is worse among goals (n, 3)."""
     ratios = factors_at(goals, turning_radius=1.0, max_trims=max_trims, least=least)
     counts = np.isfinite(ratios) & (np.hypot(goals[:, 0], goals[:, 1]) <= reach)
     ratios = np.where(counts, ratios, 1.0)
     k = int(ratios.argmax()) if len(ratios) else -1
-    if k < 0 or not ratios[k] > met.ratio:
+    if k < 0 or not ratios[k] > met[0]:
         return met
-    return _Met(ratio=float(ratios[k]), goal=goals[k])
+    return float(ratios[k]), goals[k]
 
 
 def _box_ratios(low: Array, size: Array, max_trims: int, least: float) -> Array:
@@ -178,16 +175,6 @@ def _least(kinds: Iterator[Family], max_trims: int) -> tuple[Array, Array]:
         else:
             long = np.minimum(long, family.lower())
     return short, np.broadcast_to(long, short.shape)
-
-
-def _first_boxes(reach: float) -> tuple[Array, Array]:
-    """Lower corners (n, 3) of boxes that cover a quarter of the goals, and their size (3,)."""
-    across = math.ceil(reach / FIRST)
-    around = math.ceil(2.0 * math.pi / FIRST)
-    size = np.array([reach / across, reach / across, 2.0 * math.pi / around])
-    places = (range(across), range(across), range(around))
-    corners = np.array(list(product(*places))) * size - np.array([0.0, 0.0, math.pi])
-    return _inside(corners, reach), size
 
 
 def _inside(corners: Array, reach: float) -> Array:

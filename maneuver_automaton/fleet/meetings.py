@@ -148,17 +148,12 @@ def components(numbers: Sequence[int], found: Sequence[Meeting]) -> list[tuple[i
     return sorted(groups, key=lambda group: (-len(group), group))
 
 
-class Swept(NamedTuple):
-    """Boxes that hold a vehicle's bodies, one for each slot of time."""
-
-    first: int  # number of the first slot; before, it is in its box too
-    boxes: Array  # (n, 4) least x, y, greatest x, y [m]; it stays in the last one
-    leaves: bool  # whether it is gone after the last one
-
-
 @functools.lru_cache(maxsize=8192)
-def swept(course: FleetCourse) -> Swept:
+def swept(course: FleetCourse) -> tuple[int, Array, bool]:
     """Boxes around all that a course sweeps in each slot of time, from its begin on.
+
+    The first slot's number, boxes (n, 4) of least x, y, greatest x, y [m], and whether it is gone
+    after the last one. Before the first slot it is in its box too, and else it stays in the last.
 
     Between two times on a path of length L, whose ends are a distance d apart, no point is farther
     than ``sqrt(L^2 - d^2) / 2`` from the box around the ends.
@@ -176,7 +171,7 @@ def swept(course: FleetCourse) -> Swept:
         own[:, 2:] += reach
         np.minimum(boxes[:, :2], own[:, :2], out=boxes[:, :2])
         np.maximum(boxes[:, 2:], own[:, 2:], out=boxes[:, 2:])
-    return Swept(first, boxes, course.until < math.inf)
+    return first, boxes, course.until < math.inf
 
 
 def _boxes(way: Motion, first: int, count: int) -> Array:

@@ -161,7 +161,12 @@ class _FleetSearch:
     def run(self, orders: int, max_rounds: int | None) -> FleetResult:
         """The whole search, and the checks of what it found."""
         prepare_vehicles(self.vehicles)
-        self._plan_alone()
+        tasks = [PoolTask((one.number,), {}, "alone") for one in self.vehicles]
+        for _ in self.pool.each(tasks, self.budget.stage(ALONE_SHARE)):
+            pass
+        for one in self.vehicles:
+            if one.alone is None:
+                self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
         alone = self.budget.elapsed
         able = [one.number for one in self.vehicles if one.number not in self.reasons]
         self._plan_together(able, orders, max_rounds)
@@ -174,15 +179,6 @@ class _FleetSearch:
         timing = {"alone": alone, "first_plan": first, "search": searched}
         timing["audit"] = self.budget.elapsed - searched
         return replace(result, timing_s=timing)
-
-    def _plan_alone(self) -> None:
-        """The way of each by itself."""
-        tasks = [PoolTask((one.number,), {}, "alone") for one in self.vehicles]
-        for _ in self.pool.each(tasks, self.budget.stage(ALONE_SHARE)):
-            pass
-        for one in self.vehicles:
-            if one.alone is None:
-                self.reasons[one.number] = f"it has no path even alone: {one.why_none}"
 
     def _plan_together(self, able: Sequence[int], orders: int, max_rounds: int | None) -> None:
         """Plans that keep apart: those alone where nobody meets, the others one after another."""
@@ -198,7 +194,7 @@ class _FleetSearch:
             self.whole += [(group, how) for group in groups if 2 <= len(group) <= MOST_OF[how]]
         rest = [k for group in groups for k in group if k not in self.held]
         # Who does not switch at will holds a first plan, which nothing has improved yet.
-        self.whole += [((k,), "in turn") for k in rest if not self.vehicles[k].at_will]
+        self.whole += [((k,), "in turn") for k in rest if not self.vehicles[k].ways]
         if not rest:
             self.order = sorted(able)
             return
@@ -342,7 +338,7 @@ class _FleetSearch:
         if not suits or (how, *sorted(group), now) in self.asked:
             how = "in turn"
         asked = (how, *(group if how == "in turn" else sorted(group)), now)
-        if longer and asked in self.asked and any(self.vehicles[k].at_will for k in group):
+        if longer and asked in self.asked and any(self.vehicles[k].ways for k in group):
             how = "with time"  # their words were improved but at once
             asked = (how, *group, now)
         if asked in self.asked:

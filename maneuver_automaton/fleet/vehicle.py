@@ -192,7 +192,8 @@ class FleetMember:
     alone: OwnPlan | None = None  # its plan by itself
     bound: LowerBound | None = None  # no plan of it costs less
     why_none: str = ""  # why it has no plan by itself
-    ways: list[Word] = field(default_factory=list)  # alone, the cheapest first
+    # Alone, the cheapest first; none where its plans are no words of the lattice in a plane.
+    ways: list[Word] = field(default_factory=list)
     aside: Word | None = None  # a way that first makes room for others
     standing: FleetCourse = field(init=False)  # at its start, for ever
     expansions: int = 0
@@ -206,13 +207,6 @@ class FleetMember:
         shapes = (problem.footprint or POINT, *problem.parts.values())
         motions = tuple(Motion([problem.start_time], [pose]) for pose in poses)
         self.standing = FleetCourse(shapes, motions, grown=self.grown, levels=levels_of(problem))
-
-    @functools.cached_property
-    def at_will(self) -> bool:
-        """Whether it switches at will in a plane, so that its plans are words of the lattice."""
-        searched = replace(self.problem.search, method="lattice")
-        steers = uses_lattice(replace(self.problem, search=searched))
-        return steers and not self.problem.has_inertia and self.problem.start.size == 3
 
     def course_of(self, plan: Plan) -> FleetCourse:
         """Its bodies in time if it drives a plan."""
@@ -243,10 +237,11 @@ class FleetMember:
 
     def plan_alone(self, budget: Budget, *, bounded: bool = True, hurried: bool = False) -> None:
         """Find its way, and a few others beside it, past static obstacles; `hurried`: as found."""
-        blocked = blocked_ends(self.aimed)
+        blocked, searched = blocked_ends(self.aimed), replace(self.problem.search, method="lattice")
+        steers = uses_lattice(replace(self.problem, search=searched))
         if blocked is not None:
             self.why_none = blocked.reason
-        elif self.at_will:
+        elif steers and not self.problem.has_inertia and self.problem.start.size == 3:
             self._plan_words(budget, bounded=bounded, hurried=hurried)
         else:
             result = self._planned(self.problem, budget, improve=False)
@@ -272,7 +267,7 @@ class FleetMember:
         """Better ways past past obstacles, and others beside them."""
         if self.ways and (self.problem.obstacles or self.problem.place_costs):
             self._keep_ways(self._query(self.aimed), self.ways[0], budget, WITH_TIME)
-        elif not self.at_will and self.alone is not None:
+        elif not self.ways and self.alone is not None:
             better = self._found(self._planned(self.problem, budget, improve=True))
             if better is not None and better.cost < self.alone.cost:
                 self.alone = better
@@ -328,7 +323,7 @@ class FleetMember:
         if not others:
             return self.alone if self.alone is not None and self.alone.cost < known else None
         problem = replace(self.problem, obstacles=(*self.problem.obstacles, *others))
-        if not self.at_will:
+        if not self.ways:
             # No search among moving obstacles sees at once that one of them stays at the goal.
             if not self._aims(self._past_the_arrived(others)):
                 return None
@@ -389,14 +384,14 @@ class FleetMember:
         start, trim = self.problem.start, None
         if before is not None:
             start = before.plan.end
-            trim = None if self.at_will else self.problem.last_trim(goals[0]).name
+            trim = self.problem.last_trim(goals[0]).name
         past = self.problem.starting_at(start, time=begin, goals=goals, trim=trim)
         past = replace(past, obstacles=(*self.problem.obstacles, *self.beside(others)))
         aims = ((0, aim),) if aim is not None else self._aims(past)
         past = replace(past, goals=tuple(goal for _, goal in aims) or goals)
         if not aims or blocked_ends(past) is not None:
             return None
-        if not self.at_will:
+        if not self.ways:
             most = max(most, LONG)
             return self._found(self._planned(past, budget, improve=False, most=most))
         query = self._query(past)
@@ -422,7 +417,7 @@ class FleetMember:
         plan = replace(leg.plan, start_time=begin)
         if begin > at and automaton.rest is not None:
             rest = plan.trims[0] if plan.trims else self.problem.first_trim
-            rest = automaton.trims[automaton.rest] if self.at_will or not rest.is_rest else rest
+            rest = rest if rest.is_rest else automaton.trims[automaton.rest]
             plan = followed_by(
                 Plan(plan.start, (rest,), durations=[begin - at], start_time=at), plan
             )
@@ -433,7 +428,7 @@ class FleetMember:
     def keep_aside(self, found: OwnPlan) -> None:
         """Keep a way on which it makes room for others, to drive it at other times."""
         plan, exact = found.plan, not (self.problem.goals[0].tolerance_m or len(self.aims) > 1)
-        if self.at_will and exact and not self.problem.goals[0].tolerance_rad:
+        if self.ways and exact and not self.problem.goals[0].tolerance_rad:
             word = word_of_plan(self.problem.automaton, plan)
             assert word is not None
             moving = [k for k, trim in enumerate(plan.trims) if not trim.is_rest]

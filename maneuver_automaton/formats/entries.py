@@ -135,9 +135,7 @@ def made(kind: type[T], row: Mapping[str, Any], form: Any, /, **given: Any) -> T
     return kind(**given)
 
 
-@functools.cache
-def _types_of(kind: Any) -> dict[str, Any]:
-    return get_type_hints(kind)
+_types_of = functools.cache(get_type_hints)
 
 
 def _first(key: Key, value: Any) -> str | None:

@@ -10,7 +10,6 @@ a heading that is drawn from a fixed seed.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
@@ -53,13 +52,7 @@ KEYS: Mapping[str, int] = {  # and how many numbers follow each
 }
 
 
-@dataclass(frozen=True, slots=True)
-class _CfgWord:
-    text: str
-    line: int
-
-
-_Header: TypeAlias = Mapping[str, list[_CfgWord]]  # the numbers after each key
+_Header: TypeAlias = Mapping[str, list[tuple[str, int]]]  # words after each key, and their lines
 
 
 def is_sbpl(path: Path) -> bool:
@@ -77,17 +70,17 @@ def read_sbpl(path: Path) -> tuple[Statement, ...]:
         if key not in header:
             with_size = " beside cellsize(meters)" if CELL in header and suffix in key else ""
             raise InvalidScenario(f"{path}: the key {key[:-1]!r} is missing{with_size}")
-    columns, rows = (whole(w.text, at=f"{path}:{w.line}: {SIZE[:-1]}") for w in header[SIZE])
-    check_size(columns, rows, at=f"{path}:{header[SIZE][0].line}: {SIZE[:-1]}")
+    columns, rows = (whole(word, at=f"{path}:{k}: {SIZE[:-1]}") for word, k in header[SIZE])
+    check_size(columns, rows, at=f"{path}:{header[SIZE][0][1]}: {SIZE[:-1]}")
     costs = _costs(path, lines, begin, columns * rows)
     numbers = {
-        key: [finite(word.text, at=f"{path}:{word.line}: {key[:-1]}") for word in words]
+        key: [finite(word, at=f"{path}:{k}: {key[:-1]}") for word, k in words]
         for key, words in header.items()
         if key != SIZE
     }
     cell = float(numbers[CELL][0]) if CELL in numbers else 1.0
     if CELL in numbers:
-        check_cell(cell, at=f"{path}:{header[CELL][0].line}: {CELL[:-1]}")
+        check_cell(cell, at=f"{path}:{header[CELL][0][1]}: {CELL[:-1]}")
     blocked = costs.reshape(rows, columns) >= numbers["obsthresh:"][0]
     cells = OccupancyMap(blocked, resolution=cell, name=path.name)
     ends = [_end(path, header, numbers, what, cells) for what in ("start", "end")]
@@ -106,13 +99,13 @@ def read_sbpl(path: Path) -> tuple[Statement, ...]:
 
 def _header(path: Path, lines: list[str]) -> tuple[_Header, int]:
     """The numbers of each key, and how many lines stand before that of the cells."""
-    header: dict[str, list[_CfgWord]] = {}
+    header: dict[str, list[tuple[str, int]]] = {}
     place = ("", 0)  # the key that is being read, and its line
     for k, line in enumerate(lines):
         for text in line.split():
             key, number = place
             if not text.endswith(":") and key:
-                header[key].append(_CfgWord(text, k + 1))
+                header[key].append((text, k + 1))
                 continue
             if key and len(header[key]) != KEYS[key]:
                 raise InvalidScenario(
@@ -163,9 +156,9 @@ def _end(
     key = f"{what}{CELLS}"
     rows, columns = cells.blocked.shape
     middle = []
-    for word, size in zip(header[key], (columns, rows), strict=True):
-        at = f"{path}:{word.line}: {key[:-1]}"
-        value = whole(word.text, at=at)
+    for (word, line), size in zip(header[key], (columns, rows), strict=True):
+        at = f"{path}:{line}: {key[:-1]}"
+        value = whole(word, at=at)
         if value >= size:
             raise InvalidScenario(f"{at}: got {value}, need 0 to {size - 1}, a cell of the map")
         middle.append(value + 0.5)

@@ -11,7 +11,6 @@ Trans. Intelligent Vehicles 8(1), and the files of its benchmark.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,12 +28,6 @@ HEAD = ("x0", "y0", "theta0", "xf", "yf", "thetaf", "n")
 _FIRST = re.compile(r"\s*[-+]?[.0-9]")
 
 
-@dataclass(frozen=True, slots=True)
-class _Value:
-    token: str
-    at: str
-
-
 def is_tpcap(path: Path) -> bool:
     """Whether a file begins like a case: with a number, not with the head of a table."""
     with open_input(path) as stream:
@@ -48,21 +41,22 @@ def read_tpcap(path: Path) -> tuple[Statement, ...]:
         raise InvalidScenario(
             f"{path}: got {len(values)} numbers, need at least {len(HEAD)}: {', '.join(HEAD)}"
         )
-    poses = np.array([finite(value.token, at=value.at) for value in values[:6]])
+    poses = np.array([finite(token, at=at) for token, at in values[:6]])
     for k in (2, 5):
         if abs(poses[k]) > MOST_HEADING:
             raise InvalidScenario(
-                f"{values[k].at} ({HEAD[k]}): got {poses[k]:g}, need at most {MOST_HEADING:g} rad"
+                f"{values[k][1]} ({HEAD[k]}): got {poses[k]:g}, need at most {MOST_HEADING:g} rad"
             )
-    n = whole(values[6].token, at=f"{values[6].at} (number of obstacles)")
+    token, place = values[6]
+    n = whole(token, at=f"{place} (number of obstacles)")
     if n > len(values) - 7:
         raise InvalidScenario(
-            f"{values[6].at}: got {n} obstacles, but {len(values) - 7} numbers follow; "
+            f"{place}: got {n} obstacles, but {len(values) - 7} numbers follow; "
             "need the number of corners of each"
         )
     counts = [
-        whole(value.token, at=f"{value.at} (corners of obstacle {k + 1})", least=3)
-        for k, value in enumerate(values[7 : 7 + n])
+        whole(token, at=f"{at} (corners of obstacle {k + 1})", least=3)
+        for k, (token, at) in enumerate(values[7 : 7 + n])
     ]
     corners = values[7 + n :]
     if len(corners) != 2 * sum(counts):
@@ -81,29 +75,29 @@ def read_tpcap(path: Path) -> tuple[Statement, ...]:
     )
 
 
-def _values(path: Path) -> list[_Value]:
-    """All numbers, whatever the rows; a comma may stand at the end of each."""
-    values: list[_Value] = []
+def _values(path: Path) -> list[tuple[str, str]]:
+    """All numbers, whatever the rows, and where each is; a comma may stand at the end of each."""
+    values: list[tuple[str, str]] = []
     for k, line in enumerate(lines_of(read_text(path, what="a case of TPCAP"))):
         words = line.strip().removesuffix(",").split(",")
         if words == [""]:
             continue
         at = f"{path}:{k + 1}: value"
-        values += [_Value(word, f"{at} {len(values) + i + 1}") for i, word in enumerate(words)]
+        values += [(word, f"{at} {len(values) + i + 1}") for i, word in enumerate(words)]
     return values
 
 
-def _obstacles(corners: list[_Value], counts: list[int]) -> list[Obstacle]:
+def _obstacles(corners: list[tuple[str, str]], counts: list[int]) -> list[Obstacle]:
     obstacles, done = [], 0
     for k, count in enumerate(counts):
         part = corners[done : done + 2 * count]
         done += 2 * count
-        ring: Array = np.array([finite(v.token, at=v.at) for v in part]).reshape(-1, 2)
+        ring: Array = np.array([finite(token, at=at) for token, at in part]).reshape(-1, 2)
         name = f"obstacle {k + 1}"
         try:
             obstacles.append(Obstacle(simple_polygon(ring), name=name))
         except ValueError as error:
             if isinstance(error, InvalidScenario):
                 raise
-            raise InvalidScenario(f"{part[0].at}: {name}: {error}") from error
+            raise InvalidScenario(f"{part[0][1]}: {name}: {error}") from error
     return obstacles

@@ -263,6 +263,11 @@ class CarWithTrailer(Vehicle):
     reduced_names: ClassVar[tuple[str, ...]] = ("hitch",)
     part_names: ClassVar[tuple[str, ...]] = ("trailer",)
 
+    @property
+    def kinematic(self) -> Car:
+        """The car that pulls, alone: it has the same controls and twists."""
+        return Car(wheelbase=self.wheelbase, max_steering=self.max_steering)
+
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""
         return u[0], 0.0, u[0] * np.tan(u[1]) / self.wheelbase
@@ -365,6 +370,11 @@ class TractorWithTrailers(Vehicle):
         """From each hitch to the axle of its trailer [m], one for each trailer."""
         lengths = (self.hitch_length, self.hitch_length_2, self.hitch_length_3)
         return tuple(length for length in lengths if length is not None)
+
+    @property
+    def kinematic(self) -> Car:
+        """The car that pulls, alone: it has the same controls and twists."""
+        return Car(wheelbase=self.wheelbase, max_steering=self.max_steering)
 
     def velocity(self, z: Components, u: Components, /) -> tuple[Any, ...]:
         """Components of the twist: (speed, 0, speed tan(steering) / wheelbase)."""

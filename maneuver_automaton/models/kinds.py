@@ -5,45 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from maneuver_automaton.models.axles import (
-    ArticulatedVehicle,
-    FourWheelSteeringCar,
-    RearSteeredCar,
-)
-from maneuver_automaton.models.cars import (
-    AcceleratingCar,
-    Car,
-    CarWithTrailer,
-    SecondOrderCar,
-    TractorWithTrailers,
-)
-from maneuver_automaton.models.dynamic import Helicopter, Hovercraft, SingleTrack
+from maneuver_automaton.models import axles, cars, dynamic, robots
 from maneuver_automaton.models.model import Model
-from maneuver_automaton.models.robots import (
-    LatticeBody,
-    Omnidirectional,
-    SecondOrderUnicycle,
-    Unicycle,
-)
 
 KINDS: Mapping[str, Any] = {
     kind.name: kind
     for kind in (
-        Unicycle,
-        Car,
-        SecondOrderUnicycle,
-        SecondOrderCar,
-        CarWithTrailer,
-        SingleTrack,
-        Hovercraft,
-        Helicopter,
-        AcceleratingCar,
-        LatticeBody,
-        Omnidirectional,
-        RearSteeredCar,
-        FourWheelSteeringCar,
-        ArticulatedVehicle,
-        TractorWithTrailers,
+        robots.Unicycle,
+        cars.Car,
+        robots.SecondOrderUnicycle,
+        cars.SecondOrderCar,
+        cars.CarWithTrailer,
+        dynamic.SingleTrack,
+        dynamic.Hovercraft,
+        dynamic.Helicopter,
+        cars.AcceleratingCar,
+        robots.LatticeBody,
+        robots.Omnidirectional,
+        axles.RearSteeredCar,
+        axles.FourWheelSteeringCar,
+        axles.ArticulatedVehicle,
+        cars.TractorWithTrailers,
     )
 }
 

@@ -31,7 +31,7 @@ def blocked_ends(problem: Problem) -> PlanResult | None:
     reason, notes = outside(problem.start, problem.bounds), tuple[str, ...]()
     sure = [False] * (1 + len(problem.goals))  # proven free by the kernels, all in one call
     if problem.obstacles and not (problem.parts or problem.start.size > 3 or problem.moves):
-        aside = ends_of(problem).clearances.tolist()
+        aside = ends_of(problem)[1].tolist()
         sure = [one > problem.margin + CLEARLY for one in aside]
     if reason:
         reason = f"the start is outside the bounds: {reason}"

@@ -10,7 +10,6 @@ import enum
 import functools
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -289,9 +288,9 @@ def _what_hits(
             return ""
         here = checker.pose_hit(plan.start[:3])
         return "" if here is None else f"obstacle {layer.numbers[here]} is hit at the start"
-    coasts = _coasts_within_reach(plan, layer, problem)
-    hit = checker.motions_hit(coasts.start, coasts.twist, coasts.duration, ask=lambda: _ask(budget))
-    number = len(plan.primitives) if hit is None else int(coasts.number[hit[0]])
+    coasts, *motions = _coasts_within_reach(plan, layer, problem)
+    hit = checker.motions_hit(*motions, ask=lambda: _ask(budget))
+    number = len(plan.primitives) if hit is None else int(coasts[hit[0]])
     numbers, courses, missing = _courses_within_reach(plan, layer, problem, before=number)
     sooner = checker.courses_hit(courses, ask=lambda: _ask(budget))
     if sooner is not None:
@@ -323,17 +322,13 @@ def _courses_within_reach(
     return numbers, courses, ""
 
 
-class _Coasts(NamedTuple):
-    """Trims of a plan, or parts of them, from first to last."""
+def _coasts_within_reach(
+    plan: Plan, layer: Layer, problem: Problem
+) -> tuple[IntArray, Array, Array, Array]:
+    """The parts of trims in which the altitude is within the margin of a layer.
 
-    number: IntArray  # (m,) of the primitive
-    start: Array  # (m, 3)
-    twist: Array  # (m, 3)
-    duration: Array  # (m,) [s]
-
-
-def _coasts_within_reach(plan: Plan, layer: Layer, problem: Problem) -> _Coasts:
-    """The parts of trims in which the altitude is within the margin of a layer."""
+    Numbers of their primitives (m,), starts (m, 3), twists (m, 3) and durations (m,) [s].
+    """
     trims = [(k, one) for k, one in enumerate(plan.primitives) if isinstance(one, Trim)]
     number = np.array([k for k, _ in trims], dtype=np.int64)
     velocity = np.array([one.body_velocity for _, one in trims]).reshape(-1, plan.start.size)
@@ -355,7 +350,7 @@ def _coasts_within_reach(plan: Plan, layer: Layer, problem: Problem) -> _Coasts:
         first, last = first[kept], last[kept]
         group = group_of(plan.start.size)
         start = (group(start) @ group.exp(first[:, None] * velocity)).pose
-    return _Coasts(number, start[:, :3], velocity[:, :3], last - first)
+    return number, start[:, :3], velocity[:, :3], last - first
 
 
 def _rows_within_reach(

@@ -46,7 +46,6 @@ from maneuver_automaton.search.lattice_library import lattice_library
 from maneuver_automaton.search.lattice_pass import plan_of_word, with_cost
 from maneuver_automaton.search.lattice_query import LEAST_MARGIN, LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import stands_for_more
-from maneuver_automaton.search.scene import Ends
 from maneuver_automaton.search.waiting import with_waits
 from maneuver_automaton.words.word import Word, with_price
 
@@ -148,11 +147,11 @@ class LatticeWords(PlanningStep):
         begun, ends = ended.begun, None
         goals = goals_left(problem) if begun is None else tuple(range(len(problem.goals)))
         if begun is not None:
-            ends = Ends(begun.call.arrays.seen[:, :3].copy(), begun.call.arrays.clear.copy())
-        query = lattice_query(problem, goals, prepared=prepared, ends=ends)
-        known = query.library.at_will
+            ends = begun.call.arrays.seen[:, :3].copy(), begun.call.arrays.clear.copy()
+        query = self.query = lattice_query(problem, goals, prepared=prepared, ends=ends)
+        known = self.finds_plans
         self.table = cost_to_go_table(problem, prepared=prepared) if known else NO_TABLE
-        self.query = query = query if known else late_at_first(query)
+        query = self.query = query if known else late_at_first(query)
         self.found, self.words, self.spent = found, [], 0
         limit = self.limit = found.for_first.stage(share)
         self.alone, ended.finds_plans = not found.plans, known

@@ -109,8 +109,6 @@ def _frames_take_symbols(model: Model) -> bool:
 def left_out(*problems: Problem) -> tuple[str, ...]:
     """What plans of some problems do without that they should have, and why: a sentence each."""
     for one in problems:
-        if not one.has_inertia:
-            continue
         why = why_not_polished(one)
         if why and why in (why_no_casadi(), NUMBERS_ALONE):
             return (f"plans are not polished, and may cost much more: {why}",)

@@ -33,22 +33,10 @@ WORK_PER_EXPANSION = 5_000  # steps times cells of the proof where expansions ar
 LOOK = 0.02  # [s] between two looks at the proof once the search is over
 
 
-@dataclass(slots=True, eq=False)
-class KeptBounds:
-    """The last functions that were proven for the same goals, costs and body on one map."""
+def kept_bounds(problem: Problem, workspace: Workspace) -> deque[CostToGo] | None:
+    """The last functions that were proven for the same goals, costs and body on a planner's map.
 
-    functions: deque[CostToGo] = field(default_factory=lambda: deque(maxlen=MOST))
-
-    def bound(self, problem: Problem) -> float:
-        """The best bound from the start of a problem, 0 if nothing is known of it."""
-        found = (one.anywhere(problem.start[:3]) for one in self.functions)
-        return max(found, default=0.0)
-
-
-def kept_bounds(problem: Problem, workspace: Workspace) -> KeptBounds | None:
-    """Those of a planner, for the goals of a problem; None for callers that hold no planner.
-
-    A call on its own does the same work at every call.
+    None for callers that hold no planner: a call on its own does the same work at every call.
     """
     if workspace.prepared is RECENT:
         return None
@@ -61,7 +49,7 @@ def kept_bounds(problem: Problem, workspace: Workspace) -> KeptBounds | None:
     given = (problem.automaton, problem.cost, lasting_obstacles(problem), problem.footprint)
     limits = (problem.margin, problem.bounds.x, problem.bounds.y)
     key = aims, given, limits, problem.horizon.time is not None
-    return kept_with(workspace.prepared, key, KeptBounds)
+    return kept_with(workspace.prepared, key, lambda: deque[CostToGo](maxlen=MOST))
 
 
 @dataclass(slots=True, eq=False)
@@ -72,7 +60,7 @@ class Proving:
     budget: Budget
     watch: Watch
     max_work: int | None = None  # steps times cells
-    kept: KeptBounds | None = None  # of other starts
+    kept: deque[CostToGo] | None = None  # proven of other starts
     best: LowerBound = field(default_factory=lambda: LowerBound(value=0.0, kind="distance"))
     history: list[tuple[float, float]] = field(default_factory=list)  # seconds, value
     work: int = 0
@@ -85,7 +73,8 @@ class Proving:
         """
         self._better(known_bound(self.problem))
         if self.kept is not None:
-            value = in_costs(self.problem, self.kept.bound(self.problem))
+            here = (one.anywhere(self.problem.start[:3]) for one in self.kept)
+            value = in_costs(self.problem, max(here, default=0.0))
             self._better(LowerBound(value=value, kind="cells"))
         while after_a_plan and self.watch.cost == math.inf:
             if self._over():
@@ -100,7 +89,7 @@ class Proving:
             if proof.function is not None:  # for poses on the way, and for other starts
                 self.functions.append(proof.function)
                 if self.kept is not None:
-                    self.kept.functions.append(proof.function)
+                    self.kept.append(proof.function)
             kind = "incumbent" if proof.optimal and proof.value >= self.watch.cost else "cells"
             self._better(LowerBound(value=proof.value, kind=kind))
             if self._over():
@@ -190,9 +179,9 @@ class _Ramp:
 def _ramp(problem: Problem) -> _Ramp:
     """Of a vehicle that turns only as it drives; nothing for others, whose turns need none."""
     model, cost = problem.automaton.model, terms_of(problem.cost)
-    if not (follows_paths(model) and problem.has_inertia and problem.rests_at_both_ends):
+    if not (follows_paths(model) and problem.rests_at_both_ends):
         return _Ramp()
-    twists = extreme_automaton(model).body_velocities  # type: ignore[arg-type]
+    twists = extreme_automaton(problem.automaton).body_velocities
     if cost is None or not cost.time or (twists[:, 0] == 0.0).any():
         return _Ramp()
     fastest = float(np.abs(twists[:, 0]).max())
@@ -206,7 +195,7 @@ def plan_to_gap(
     budget: Budget,
     watch: Watch,
     *,
-    kept: KeptBounds | None = None,
+    kept: deque[CostToGo] | None = None,
 ) -> PlanResult:
     """The answer of a search, with what is proven of it.
 

@@ -156,7 +156,10 @@ def search_steps(problem: Problem) -> Steps:
     steps: list[PlanningStep] = [NearlyMet(), Checks()]
     if along:
         steps.append(AlongPaths(polish))
-    if linked and (not searched or (method == "auto" and _suits_words(problem))):
+    rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
+    alone_in_time = problem.horizon.time is not None and not rests  # words alone meet the time
+    first_words = method == "auto" and (not problem.obstacles or alone_in_time)
+    if linked and (first_words or not searched):
         steps.append(LinkedWords())
     on_nodes = automaton.lattice is not None and not automaton.body_velocities.any() and searched
     if only_maneuvers_turn(automaton) and not on_nodes:  # a sequence ends at a node by chance
@@ -186,12 +189,6 @@ def _may_be_a_graph(problem: Problem) -> bool:
     # A graph is searched to a proof, for which the prices of places are not exact enough.
     searched = problem.search.method in ("auto", "lattice") and not problem.place_costs
     return problem.automaton.lattice is not None and searched
-
-
-def _suits_words(problem: Problem) -> bool:
-    """Whether words may be searched first: nothing is in the way, or they alone meet the time."""
-    rests = problem.first_trim.is_rest or problem.last_trim(problem.goals[0]).is_rest
-    return not problem.obstacles or (problem.horizon.time is not None and not rests)
 
 
 def uses_lattice(problem: Problem) -> bool:
@@ -311,7 +308,7 @@ def _why_none(found: Incumbents) -> tuple[PlanStatus, str]:
 def _why_unlinked(problem: Problem) -> str:
     """Why no word of the library may lead to a goal, by its trims alone; empty if some may."""
     automaton = problem.automaton
-    if not problem.has_inertia or problem.has_states:
+    if problem.has_states:
         return ""
     start, lasts = problem.first_trim, [problem.last_trim(goal) for goal in problem.goals]
     index = automaton.index_of

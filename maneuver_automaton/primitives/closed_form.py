@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -310,17 +310,8 @@ def ramp_of(
     )
 
 
-class _Swing(NamedTuple):
-    """A rest, and how one component of its reduced state goes up and back to zero."""
-
-    name: str
-    rest: Trim
-    component: int
-    ramp: Ramp
-
-
-def _swing(model: Model, rest: Trim, length: float, component: str) -> _Swing:
-    """The one whose integral is `length` [m, or rad]."""
+def _swing(model: Model, rest: Trim, length: float, component: str) -> Ramp:
+    """How a component of the reduced state goes up from a rest and back, over `length` in all."""
     check_limited_rates(model)
     if not rest.is_rest:
         raise NotATrim(f"trim {rest.name!r}: moves with {rest.body_velocity.tolist()}, need a rest")
@@ -339,13 +330,12 @@ def _swing(model: Model, rest: Trim, length: float, component: str) -> _Swing:
     moving = rest.reduced_state.copy()
     moving[k] = most
     pace = min(1.0, pace_within(model, model.body_velocity(moving, rest.control)))
-    ramp = ramp_of(
+    return ramp_of(
         length,
         max_speed=float(most) * pace,
         acceleration=float(up),
         deceleration=float(down),
     )
-    return _Swing(f"{rest.name}, {component} over {length:.6g}", rest, k, ramp)
 
 
 def from_rest(
@@ -375,29 +365,29 @@ def from_rest(
     >>> back.displacement.round(12).tolist(), back.duration
     ([-10.0, 0.0, 0.0], 6.5)
     """
-    swings = [_swing(model, rest, length, component) for rest in rests for length in lengths]
-    if not swings:
+    asked = [(rest, length) for rest in rests for length in lengths]
+    if not asked:
         return ()
-    ramps = [swing.ramp for swing in swings]
+    ramps = [_swing(model, rest, length, component) for rest, length in asked]
     durations = np.array([[ramp.speed_up, ramp.cruise, ramp.brake] for ramp in ramps])
-    control = np.zeros((len(swings), 3, len(model.control_names)))
-    for row, swing in zip(control, swings, strict=True):
-        up, down = swing.ramp.speed_up, swing.ramp.brake
-        row[:, swing.component] = [swing.ramp.peak / up, 0.0, -swing.ramp.peak / down]
+    control, driven = np.zeros((len(asked), 3, len(model.control_names))), model.reduced_names
+    for row, ramp in zip(control, ramps, strict=True):
+        rates = [ramp.peak / ramp.speed_up, 0.0, -ramp.peak / ramp.brake]
+        row[:, driven.index(component)] = rates
     courses = drive_all(
         model,
-        [swing.rest.reduced_state for swing in swings],
+        [rest.reduced_state for rest, _ in asked],
         control=control,
         durations=durations,
     )
     return tuple(
         Maneuver.along(
             course,
-            name=swing.name,
-            source=swing.rest.name,
-            target=swing.rest.name,
+            name=f"{rest.name}, {component} over {length:.6g}",
+            source=rest.name,
+            target=rest.name,
         )
-        for swing, course in zip(swings, courses, strict=True)
+        for (rest, length), course in zip(asked, courses, strict=True)
     )
 
 

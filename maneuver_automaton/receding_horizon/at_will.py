@@ -48,8 +48,6 @@ PACES = 5  # costlier plans, which may be cheaper at another pace
 class InFreeSpace(StepSearch):
     """Exhaustive words, or insertion, whatever the library suits."""
 
-    knows_all = True
-
     def is_free(self, plan: Plan) -> bool:
         """Nothing is hit in free space."""
         return True

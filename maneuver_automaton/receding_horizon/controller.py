@@ -312,8 +312,7 @@ class RecedingHorizon:
         same = is_rest_of(plan, now.rest)
         decision = _decision(chosen, now, same=same)
         bound = self._bound(chosen, search, now)
-        known = decision.leads or (search.knows_all and not here.via)
-        value = chosen.cost if known else bound
+        value = chosen.cost if decision.leads else bound
         applied = min(delta, plan.duration) if plan.duration > NOTHING else delta
         whole = chosen.cost if plan is chosen.plan and decision.leads else None
         step = Step(

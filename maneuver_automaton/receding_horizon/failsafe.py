@@ -24,6 +24,7 @@ from maneuver_automaton.receding_horizon.settings import Settings
 from maneuver_automaton.search._kernels_nodes import EMPTY
 from maneuver_automaton.search.arrays import LatticeArrays, Scene
 from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
+from maneuver_automaton.words.library import NO_TRIM
 
 CELL = 0.25  # of the search, in turning radii
 HEADINGS = 24
@@ -79,12 +80,12 @@ def search_fail_safe(
     >>> found.complete, found.plan.word[-1], bool(abs(found.plan.end[0] - 2.0) > 1.0)
     (True, 'rest', True)
     """
-    at, rest = problem.start_time, problem.automaton.rest
     query = lattice_query(_to_rest(problem), (0,))
-    if query.library.at_will and rest is not None and not problem.moves:
+    at, rest = problem.start_time, query.automaton.rest
+    if rest is not None and query.library.number_of[rest] < 0 and not problem.moves:
         # where nothing moves rest is no edge of the lattice, and free for ever if it is now
         free = stands_free(problem, problem.start, time=at, duration=until - at) > 0.0
-        trims = (problem.automaton.trims[rest],)
+        trims = (query.automaton.trims[rest],)
         stood = Plan(problem.start, trims, durations=[until - at], start_time=at)
         return FailSafe(plan=stood, free_until=until if free else at, complete=free, expansions=0)
     task, scene = _task(query, until), _scene(query)
@@ -101,7 +102,7 @@ def search_fail_safe(
     free_until = float(search.nodes[node, kernels.SAFE])
     complete, plan = bool(state[kernels.FOUND] >= 0), _plan(query, task, search, node)
     return FailSafe(
-        plan=_soonest(problem, plan) if complete and query.library.at_will else plan,
+        plan=_soonest(problem, plan) if complete else plan,
         free_until=free_until,
         complete=complete,
         expansions=int(state[kernels.EXPANSIONS]),
@@ -111,7 +112,7 @@ def search_fail_safe(
 def _soonest(problem: Problem, plan: Plan) -> Plan:
     """The plan, whose last coast before it rests is as short as is safe."""
     n = len(plan.trims)
-    if problem.parts or n < 2 or not plan.trims[-1].is_rest:
+    if problem.parts or any(plan.maneuvers) or n < 2 or not plan.trims[-1].is_rest:
         return plan
     until, least, most = plan.start_time + plan.duration, 0.0, float(plan.durations[-2])
     for _ in range(HALVINGS):
@@ -208,7 +209,7 @@ def _plan(
     while search.links[node, kernels.PARENT] >= 0:
         rows.append(node)
         node = int(search.links[node, kernels.PARENT])
-    word = [] if automaton.is_kinematic else [automaton.trims[library.trims[task.trim]]]
+    word = [] if query.start_trim == NO_TRIM else [automaton.trims[library.trims[task.trim]]]
     times, between = [0.0] * len(word), list[Maneuver | None]()
     for row in reversed(rows):
         edge = int(search.links[row, kernels.EDGE])

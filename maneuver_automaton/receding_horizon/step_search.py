@@ -45,7 +45,6 @@ class StepSearch:
     `cheaper`, `otherwise`, `why_none` and `fail_safe`.
     """
 
-    knows_all = False  # whether there is no plan, in whatever time, where none is found
     improves = False  # whether it starts from the plan that is kept, so that any safe one will do
 
     def __init__(self, now: Situation) -> None:

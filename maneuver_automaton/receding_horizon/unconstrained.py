@@ -243,11 +243,6 @@ class UnconstrainedProblem:
         there = (SE2(self.goal).inverse() @ SE2(as_array("pose", poses, last=3))).pose
         return np.concatenate([there[..., :2], wrapped(there[..., 2:])], axis=-1)
 
-    @property
-    def least_trim(self) -> int:
-        """Index of the trim whose control costs least: rest, where there is one."""
-        return int(np.argmin(self.cost.control_rates(self.automaton.controls)))
-
     @cached_property
     def tables(self) -> kernels.IntervalTables:
         """Displacements and costs of an interval of each trim, for the kernels."""
@@ -418,7 +413,8 @@ def simulate_unconstrained(
 def shifted(problem: UnconstrainedProblem, plan: HorizonPlan) -> IntArray:
     """The rest of a sequence after its applied intervals, filled up with the cheapest trim (n,)."""
     applied = problem.horizon.applied
-    fill = np.full(applied, problem.least_trim, dtype=np.int64)
+    cheapest = np.argmin(problem.cost.control_rates(problem.automaton.controls))  # rest, if any
+    fill = np.full(applied, cheapest, dtype=np.int64)
     return np.concatenate([plan.trims[applied:], fill])
 
 

@@ -93,8 +93,7 @@ class Whole:
         """
         if word is not self.origin:
             known, self.origin = self.cheaper_than(word), word
-            if self.dense is None and _saves_trims(self.query):
-                self.dense = _dense(self.query)
+            self.dense = self.dense or _dense(self.query)
             short = word if self.dense is None else shorten(self.dense, word)
             begun = min(word, short, key=lambda one: one.cost)
             if begun.cost < known.cost:
@@ -118,16 +117,13 @@ class Whole:
                 yield better
 
 
-def _saves_trims(query: LatticeQuery) -> bool:
-    """Whether one trim between two is worth more than both, as it saves a switch."""
+def _dense(query: LatticeQuery) -> LatticeQuery | None:
+    """The query with trims in more directions; None where one trim is worth no more than two."""
     prices = query.library.arrays.library
     priced = prices.switch > 0.0 or prices.direction_change > 0.0
     limited = query.most_trims > 0 or query.least_coast > 0.0
-    return (priced or limited) and not math.isfinite(query.most_time)
-
-
-def _dense(query: LatticeQuery) -> LatticeQuery:
-    """The query with trims in more directions."""
+    if not (priced or limited) or math.isfinite(query.most_time):
+        return None
     held, known = query.library.trims, moving_trims(query.problem.automaton, query.problem.cost)
     rows = coarse_trims(known.twists, known.rates, directions=DENSE)
     words = np.union1d(known.trims[rows], np.intersect1d(held, known.trims))

@@ -131,8 +131,7 @@ def nearly_met(problem: Problem) -> Iterator[tuple[Plan, int]]:
                 asked = [(pose, [trim]) for trim in joined for pose in _passed(start, goal, trim)]
             for pose, trims in asked:
                 for word, times in _short_words(problem, pose, trims):
-                    switches = () if automaton.is_kinematic else (None,) * (len(word) - 1)
-                    plan = Plan(start, word, durations=times, maneuvers=switches, start_time=clock)
+                    plan = Plan(start, word, durations=times, start_time=clock)
                     found.append((plan, index))
     yield from sorted(found, key=lambda one: problem.cost_of(one[0]))
 

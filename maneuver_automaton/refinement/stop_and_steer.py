@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from maneuver_automaton._arrays import Array
+from maneuver_automaton._kept import kept_by_first
 from maneuver_automaton.automaton import Automaton, Plan, Primitive
 from maneuver_automaton.costs import Cost
 from maneuver_automaton.models import Model
@@ -178,7 +179,7 @@ def kinematic_problem(problem: Problem, *, switch: float = SWITCH_SHARE) -> Prob
     to change its reduced state from one limit to the other.
     """
     model = problem.automaton.model
-    automaton = extreme_automaton(model)  # type: ignore[arg-type]
+    automaton = extreme_automaton(problem.automaton)
     slowest = float(np.max(np.ptp(model.reduced_limits, axis=1) / model.control_limits[:, 1]))
     return simpler_problem(problem, automaton, cost=Cost(time=1.0, switch=switch * slowest))
 
@@ -212,8 +213,10 @@ def simpler_problem(problem: Problem, automaton: Automaton, *, cost: Cost) -> Pr
     )
 
 
-def extreme_automaton(model: StopsAndSteers) -> Automaton:
+@kept_by_first
+def extreme_automaton(automaton: Automaton) -> Automaton:
     """Trims of the kinematic vehicle at the limits of the reduced state, and between at zero."""
+    model: StopsAndSteers = automaton.model  # type: ignore[assignment]
     axes = [_levels(low, high) for low, high in model.reduced_limits]
     kinematic = model.kinematic
     states = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))

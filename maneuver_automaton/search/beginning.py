@@ -41,6 +41,7 @@ from maneuver_automaton.search.lattice_task import (
     numbers_of_cells,
     task_of,
 )
+from maneuver_automaton.search.lattice_trims import switched_in_plane
 from maneuver_automaton.search.scene import CLEARLY, pad_around
 
 SPARE = 1.5  # times the cells of the first query, of which there is memory
@@ -147,7 +148,7 @@ def end(problem: Problem, begun: Begun, prepared: Prepared) -> None:
 def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
     """The call of queries like this one; None where its kernel does not look at all of them."""
     bounds, automaton = problem.bounds, problem.automaton
-    if not automaton.is_kinematic or automaton.lattice is not None or problem.start.size != 3:
+    if not switched_in_plane(automaton) or automaton.lattice is not None:
         return None
     if problem.parts or problem.moves or problem.zones or (bounds.x is None) != (bounds.y is None):
         return None

@@ -32,6 +32,7 @@ from maneuver_automaton.search.lattice_trims import (
     Chosen,
     PricedTrims,
     priced_library,
+    switched_in_plane,
     trims_at_will,
     trims_of,
 )
@@ -73,7 +74,11 @@ class LatticeLibrary:
     rest: int | None  # index in the automaton of the rest that pads
     rest_rate: float
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
-    at_will: bool  # whether plans begin and end in any trim, and may end with a turn on the spot
+
+    @property
+    def at_will(self) -> bool:
+        """Whether plans begin and end in any trim, and may end with a turn on the spot."""
+        return switched_in_plane(self.priced.automaton)
 
     @property
     def trims(self) -> IntArray:
@@ -134,11 +139,11 @@ def lattice_library(
 ) -> LatticeLibrary:
     """The part of a lattice search that is the same for every start, goal and map.
 
-    Trims that lead to none of the goals of these numbers are left out: their speeds would make the
-    estimates of cost too low. A vehicle that switches at will can use all of them.
+    Trims that lead to none of the goals of these numbers, if any, are left out: their speeds would
+    make the estimates of cost too low. Where trims are switched at will, all lead there.
     """
     automaton = problem.automaton
-    if automaton.is_kinematic:
+    if not goals:
         return _library_on(problem.setting, automaton, prepared)
     first = automaton.index_of(problem.first_trim.name)
     lasts = {automaton.index_of(problem.last_trim(problem.goals[k]).name) for k in goals}
@@ -177,7 +182,7 @@ def _library(
     limited: bool,
     choice: Chosen | None = None,
 ) -> LatticeLibrary:
-    if automaton.is_kinematic and automaton.model.group.dof == 3:
+    if switched_in_plane(automaton):
         trims = trims_at_will(
             automaton,
             cost,
@@ -262,7 +267,6 @@ def library_of_trims(
         rest=priced.rest,
         rest_rate=priced.rest_rate,
         interval=priced.interval,
-        at_will=priced.at_will,
     )
 
 

@@ -266,7 +266,7 @@ def plan_of_word(query: LatticeQuery, word: Word) -> Plan:
         start_time=problem.start_time,
     )
     fixed, rest = problem.horizon.time, query.library.rest
-    if not query.automaton.is_kinematic or fixed is None or rest is None:
+    if fixed is None or rest is None:
         return plan
     if not plan.duration < fixed:
         return plan

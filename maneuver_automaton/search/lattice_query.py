@@ -26,7 +26,6 @@ from maneuver_automaton.search.lattice_goals import poses_aimed_at
 from maneuver_automaton.search.lattice_library import LatticeLibrary, lattice_library
 from maneuver_automaton.search.place_arrays import least_prices
 from maneuver_automaton.search.scene import (
-    Ends,
     Worlds,
     ends_of,
     scene_of,
@@ -160,14 +159,14 @@ def lattice_query(
     *,
     prepared: Prepared = RECENT,
     library: LatticeLibrary | None = None,
-    ends: Ends | None = None,
+    ends: tuple[Array, Array] | None = None,
 ) -> LatticeQuery:
     """The query of a search from the start of a problem to the goals of these numbers.
 
     A vehicle that switches at will begins and ends in any trim. Unless it does so in a plane,
     several headings are asked for where any will do: best times then let the heading go. A fixed
     time is a longest one, since rest fills it. A `library` takes the place of the usual one; `ends`
-    of a vehicle in the plane are not looked at again.
+    of a vehicle in the plane, as in `ends_of`, are not looked at again.
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
@@ -212,11 +211,10 @@ class _Ends(NamedTuple):
     level: float = 0.0  # [m] altitude from which others are counted
 
 
-def _ends_in_plane(problem: Problem, goals: Sequence[int], known: Ends) -> _Ends:
+def _ends_in_plane(problem: Problem, goals: Sequence[int], known: tuple[Array, Array]) -> _Ends:
     """The ends of a vehicle that switches at will in a plane, which were looked at before."""
     seen = np.zeros((1 + len(problem.goals), 4))
-    seen[:, :3] = known.poses
-    clear = known.clearances - problem.margin
+    seen[:, :3], clear = known[0], known[1] - problem.margin
     if len(goals) < len(problem.goals):
         kept = [0, *(1 + k for k in goals)]
         seen, clear = seen[kept], clear[kept]

@@ -39,10 +39,9 @@ class PricedTrims(NamedTuple):
     library: Library
     wide: bool  # whether the vehicle turns by driving circles only, however wide
     per_turn: float | None  # cost of the cheapest full turn; None: it takes length scales
-    rest: int | None  # index in the automaton of the cheapest rest
+    rest: int | None  # index in the automaton of the cheapest rest, if it pads a fixed time
     rest_rate: float  # taken off all rates, since rest pads a fixed time
     interval: tuple[float, float]  # least expansions, for each goal, and most, between connections
-    at_will: bool  # whether plans begin and end in any trim
 
 
 class Chosen(NamedTuple):
@@ -114,15 +113,19 @@ def trims_at_will(
         rest=known.rest,
         rest_rate=known.rest_rate if pads else 0.0,
         interval=(0.0, math.inf),
-        at_will=True,
     )
+
+
+def switched_in_plane(automaton: Automaton) -> bool:
+    """Whether trims are combined at will, and move the vehicle in a plane."""
+    return automaton.is_kinematic and automaton.model.group.dof == 3
 
 
 def stands_for_more(problem: Problem) -> bool:
     """Whether a few trims stand for all where trims are switched at will in the plane."""
     automaton = problem.automaton
-    planar = automaton.is_kinematic and automaton.model.group.dof == 3
-    return planar and len(moving_trims(automaton, problem.cost).trims) > MOST_TRIMS
+    letters = moving_trims(automaton, problem.cost).trims if switched_in_plane(automaton) else ()
+    return len(letters) > MOST_TRIMS
 
 
 def trims_of(library: Library, cost: StageCost) -> PricedTrims:
@@ -131,16 +134,17 @@ def trims_of(library: Library, cost: StageCost) -> PricedTrims:
     Where maneuvers do, prices of switches and changes of direction are left to whoever compares
     plans.
     """
+    rest = None
     if library.automaton.is_kinematic:
+        rest = library.automaton.rest
         library = replace(library, arrays=_with_prices(library.arrays, cost))
     return PricedTrims(
         library=library,
         wide=False,
         per_turn=None,
-        rest=library.automaton.rest,
+        rest=rest,
         rest_rate=0.0,
         interval=(library.arrays.tried.n_few / WORDS_AN_EXPANSION, MOST_INTERVAL),
-        at_will=False,
     )
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -127,12 +127,8 @@ def improve_linked_words(
             break
 
 
-class _Change(NamedTuple):
-    """Another word, with times to start from."""
-
-    price: float  # estimate of its cost
-    trims: tuple[int, ...]
-    times: Array
+# Another word: an estimate of its cost, its trims, and times to start from.
+_Change: TypeAlias = tuple[float, tuple[int, ...], Array]
 
 
 @dataclass(slots=True, eq=False)
@@ -162,21 +158,21 @@ class _Climb:
 
     def _better(self, word: TimedWord, seen: set[tuple[int, ...]]) -> TimedWord | None:
         """The best of the first changes that gain."""
-        changes = sorted(self._changes(word), key=lambda one: (one.price, one.trims))
+        changes = sorted(self._changes(word), key=lambda one: one[:2])
         best: TimedWord | None = None
         tried = 0
-        for change in changes[:MOST_TRIES]:
+        for _, trims, times in changes[:MOST_TRIES]:
             if self.is_over():
                 break
-            if change.trims in seen:
+            if trims in seen:
                 continue
-            seen.add(change.trims)
+            seen.add(trims)
             least = word.cost if best is None else best.cost
-            if self.setup.fixed(change.trims)[0] >= least:
+            if self.setup.fixed(trims)[0] >= least:
                 continue
             tried += 1
             self.solved += 1
-            other = self.setup.solved(change.trims, [change.times])
+            other = self.setup.solved(trims, [times])
             if other is not None and other.cost < least - GAIN * (1.0 + least):
                 best = other
             if best is not None and tried >= CHUNK:
@@ -198,7 +194,7 @@ class _Climb:
                 trims = word.trims[:k] + word.trims[k + few :]
                 times = np.delete(word.durations, slice(k, k + few))
                 if trims and not (0 < k < len(trims) and trims[k - 1] == trims[k]):
-                    yield _Change(-math.inf, trims, times)
+                    yield -math.inf, trims, times
 
 
 class _Prices:
@@ -264,7 +260,7 @@ class _Prices:
         times = np.concatenate([word.durations[:first], [lasting], word.durations[after:]])
         for trim, price in zip(chosen.tolist(), prices.tolist(), strict=True):
             if price < math.inf:
-                yield _Change(price, (*head, trim, *tail), times)
+                yield price, (*head, trim, *tail), times
 
     def split(self, k: int, lasting: float) -> Iterator[_Change]:
         """Any trim for `lasting` seconds in the midst of trim `k` of the word."""
@@ -278,7 +274,7 @@ class _Prices:
         for trim, price in zip(chosen.tolist(), prices.tolist(), strict=True):
             if price < math.inf:
                 trims = (*word.trims[:k], host, trim, host, *word.trims[k + 1 :])
-                yield _Change(price, trims, times)
+                yield price, trims, times
 
     def _priced(
         self,

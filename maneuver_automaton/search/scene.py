@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,19 +50,16 @@ class Worlds:
     flat: LayerArrays | None  # they as arrays, where heights do not matter
 
 
-class Ends(NamedTuple):
-    """Start and goals of a problem in the plane, as the world around its body sees them."""
-
-    poses: Array  # (1 + n, 3) seen from the world's frame [m, m, rad]
-    clearances: Array  # (1 + n,) to what stands there, a lower bound as in `clearances` [m]
-
-
 @kept_by_first
-def ends_of(problem: Problem) -> Ends:
-    """Start and goals of a problem in the plane; nothing of it moves, and no part is carried."""
+def ends_of(problem: Problem) -> tuple[Array, Array]:
+    """Start and goals of a problem in the plane; nothing of it moves, and no part is carried.
+
+    Poses (1 + n, 3) seen from the world's frame [m, m, rad], and clearances (1 + n,) [m] to what
+    stands there, lower bounds as in `clearances`.
+    """
     world = world_around(problem)
     poses = world.into(np.array([problem.start, *(goal.pose for goal in problem.goals)]))
-    return Ends(poses, clearances(world, poses))
+    return poses, clearances(world, poses)
 
 
 def world_around(problem: Problem) -> World:

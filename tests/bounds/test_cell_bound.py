@@ -183,10 +183,12 @@ def test_bad_limits_are_refused(more, message):
 
 @pytest.mark.exhaustive
 @pytest.mark.slow
-def test_a_trailer_moves_at_most_as_the_car_that_pulls_it():
-    car = ma.CarWithTrailer(
-        wheelbase=2.8, hitch_length=3.0, max_steering=0.6, max_speed=2.0, min_speed=-1.0
-    )
+@pytest.mark.parametrize("kind", [ma.CarWithTrailer, ma.TractorWithTrailers])
+def test_a_trailer_moves_at_most_as_the_car_that_pulls_it(kind):
+    car = kind(
+        wheelbase=2.8, hitch_length=3.0, max_steering=0.6, max_speed=2.0, min_speed=-1.0,
+        max_hitch=1.2,
+    )  # fmt: skip
     straight = ma.Automaton.of_model(car, {"speed": [2.0, 0.0, -1.0], "steering": [0.0]})
     problem = ma.Problem(
         straight, [0, 0, 0], [15.0, 1.0, 0.3], cost=ma.Cost(time=1.0), obstacles=WALL,

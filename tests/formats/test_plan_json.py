@@ -231,7 +231,7 @@ def test_the_plan_comes_back(tmp_path_factory, pieces, start):
 
 def test_a_plan_with_maneuvers_comes_back(tmp_path):
     """Stop and steer along a path: strokes, coasts and turns of the wheel at rest."""
-    kinematic = extreme_automaton(CAR)
+    kinematic = extreme_automaton(resting(CAR))
     trims = [kinematic.trims[k] for k in (0, 1, 5)]
     path = Plan([1.0, 2.0, 0.5], trims, durations=[1.0, 6.0, 0.25])
     plan = stop_and_steer(CAR, path, first=rest_of(CAR), last=rest_of(CAR))

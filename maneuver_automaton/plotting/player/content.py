@@ -236,20 +236,16 @@ def _motion(
         heights = poses[:, 3:] + np.array(mover.problem.body_height)
     entry = motion_entry(track, local, numbers)
     entry["poses"][-1] = local.poses(np.asarray(mover.end))  # what pushed it at the end included
-    leave = recording.world.fleeting
-    curves = [_curve(one) for one in recording.curves if _is_value(one, recording, mover)]
+    leave, alone = recording.world.fleeting, len(recording.movers) == 1
+    own = (one for one in recording.curves if one.mover == mover.name and (alone or one.mover))
+    values = [_curve(one) for one in own if one.label == "value"]
     return {
         **entry,
-        "curves": curve_entries(track, mover) + [{"label": "value", **one} for one in curves],
+        "curves": curve_entries(track, mover) + [{"label": "value", **one} for one in values],
         "clearance": clearance_entry(times, bodies, around, heights=heights, leave=leave),
         "parts": parts,
         "cost": mover.cost,
     }
-
-
-def _is_value(curve: Curve, recording: Recording, mover: Mover) -> bool:
-    alone = len(recording.movers) == 1
-    return curve.label == "value" and (alone or bool(curve.mover)) and curve.mover == mover.name
 
 
 def _curve(curve: Curve) -> dict[str, list[float]]:
