@@ -65,6 +65,11 @@ def settled(values: Array) -> Array:
     return np.asarray(np.round(values, DIGITS) + 0.0)
 
 
+def settled_state(state: Sequence[float | None]) -> tuple[float | None, ...]:
+    """The same of a state, of which None is free."""
+    return tuple(None if value is None else float(settled(np.array(value))) for value in state)
+
+
 class MovingSolid(NamedTuple):
     """A convex solid that moves."""
 
@@ -227,11 +232,7 @@ class MotionEnds(NamedTuple):
     @property
     def settled(self) -> MotionEnds:
         """The same without the last digits."""
-        start, end = (
-            tuple(None if v is None else float(settled(np.array(v))) for v in state)
-            for state in (self.start, self.end)
-        )
-        return self._replace(start=start, end=end)
+        return self._replace(start=settled_state(self.start), end=settled_state(self.end))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
