@@ -317,8 +317,11 @@ def solve_from(
     if program.scene.movers:  # they are where the motion meets them, to first order
         corners, _ = _corners(program, point, apart)
         last = program.size - 1
-        near = duration * np.array([1.0 - WITHIN, 1.0 + WITHIN])
-        bounds[last] = np.clip(near, *bounds[last])
+        near = np.array([1.0 - WITHIN, 1.0 + WITHIN])
+        bounds[last] = np.clip(duration * near, *bounds[last])
+        if program.paced:
+            paces = slice(state.size + control.shape[1] - 1, last, control.shape[1])
+            bounds[paces] = np.clip(control[:, -1:] * near, *bounds[paces].T[..., None])
     if math.isfinite(trust):
         n_x = state.shape[1]
         for axis in (0, 1):

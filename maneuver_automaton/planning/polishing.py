@@ -439,8 +439,7 @@ def polish_on_the_way(
     likes. A place that may be chosen stays.
     """
     problem, before = found.problem, found.cost
-    waits = problem.moves and any(via.stay_s for via in problem.via)
-    if waits or budget.is_over or why_not_polished(problem):
+    if budget.is_over or why_not_polished(problem):
         return False
     for plan, goal_index in guesses:
         try:
@@ -491,8 +490,12 @@ def _polished_through(
         via.append((node, (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
     stage_cost = price.stage_cost(known)
     work = iterations_within(budget)
+    standing = [
+        (node, problem.via[one.number - 1].stay_s)
+        for one, node in zip(passed, nodes[1:-1].tolist(), strict=True)
+    ]
     motions = polish_through(
-        task, guess, via, stage_cost=stage_cost, most_iterations=work, budget=budget
+        task, guess, via, stays=standing, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
     if isinstance(motions, str):
         return None
