@@ -176,14 +176,15 @@ class Via:
         return replace(self, pose=pose, gate=None if self.gate is None else self.gate - by)
 
 
-def instants_met(via: Via, times: Array, pose_at: Callable[[Array], Array]) -> list[float]:
-    """Times [s] at which poses meet a pose on the way: of `times` (n,), and the nearest between.
+def instants_met(
+    via: Via, times: Array, poses: Array, pose_at: Callable[[Array], Array]
+) -> list[float]:
+    """Times [s] at which it is met: of `times` (n,), which have `poses`, and the nearest between.
 
     The distance and turn are least at an instant in the midst of three times, or both ends of a
     span are no further off than it leads: around these, times are made finer until nothing is left
     between them. Past a pose where a turn is about to end, both may go on falling.
     """
-    poses = pose_at(times)
     off, change = np.add(*via.offs(poses)), np.abs(np.diff(poses, axis=0)).sum(axis=1)
     found = times[off <= MET].tolist()
     padded, between = np.concatenate([[np.inf], off, [np.inf]]), off > MET
@@ -218,10 +219,10 @@ def passages(
 ) -> list[float | None]:
     """When [s] each pose on the way is passed, as early as can be; None: it is missed."""
     found: list[float | None] = []
-    earliest = -math.inf
+    earliest, poses = -math.inf, pose_at(times)
     for via in vias:
         at = None
-        for time in instants_met(via, times, pose_at):
+        for time in instants_met(via, times, poses, pose_at):
             if time < earliest - MET or (via.stop and not rests(time)):
                 continue
             last = time + via.stay_s
