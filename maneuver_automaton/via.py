@@ -181,9 +181,8 @@ def instants_met(
 ) -> list[float]:
     """Times [s] at which it is met: of `times` (n,), which have `poses`, and the nearest between.
 
-    The distance and turn are least at an instant in the midst of three times, or both ends of a
-    span are no further off than it leads: around these, times are made finer until nothing is left
-    between them. Past a pose where a turn is about to end, both may go on falling.
+    Times are made finer around an instant of three at which distance and turn are least, and where
+    both ends of a span are no further off than it leads: they may fall further, past a pose.
     """
     off, change = np.add(*via.offs(poses)), np.abs(np.diff(poses, axis=0)).sum(axis=1)
     found = times[off <= MET].tolist()
