@@ -478,9 +478,11 @@ def _polished_through(
     if np.diff(nodes).min() < 1:
         return None
     guess = guess_at(course, np.interp(np.arange(count + 1), nodes, times))
-    via, dof, rest = list[NodeOnTheWay](), known.start.size, problem.automaton.rest or 0
+    via, standing = list[NodeOnTheWay](), list[tuple[int, float]]()
+    dof, rest = known.start.size, problem.automaton.rest or 0
     for one, node in zip(passed, nodes[1:-1].tolist(), strict=True):
         state, asked = guess.state[node], problem.via[one.number - 1]
+        standing.append((node, asked.stay_s))
         if asked.stay_s:  # the wheels may be turned where it stops for no time
             state = np.append(state[:dof], problem.automaton.trims[rest].reduced_state)
         pose = (one.pose if asked.radius > 0.0 else asked.pose).tolist()
@@ -490,10 +492,6 @@ def _polished_through(
         via.append((node, (*seen[:dof], *(state[dof:].tolist() if asked.stop else free))))
     stage_cost = price.stage_cost(known)
     work = iterations_within(budget)
-    standing = [
-        (node, problem.via[one.number - 1].stay_s)
-        for one, node in zip(passed, nodes[1:-1].tolist(), strict=True)
-    ]
     motions = polish_through(
         task, guess, via, stays=standing, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
