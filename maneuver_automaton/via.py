@@ -15,6 +15,7 @@ from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import check_heading, check_size
 from maneuver_automaton.groups import LieGroup
 
+LONGER = 1.1  # a way, than the line between its ends
 MET = 1e-9  # [m, rad] from a pose on the way, beyond its tolerance, as of goals
 FINER = 8  # parts of a stretch of time in which a nearest instant is sought, again and again
 FINEST = 1e-14  # of the time of a plan, at which that ends
@@ -175,22 +176,27 @@ class Via:
         return replace(self, pose=pose, gate=None if self.gate is None else self.gate - by)
 
 
-def instants_met(via: Via, times: Array, pose_at: Callable[[Array], Array]) -> list[float]:
-    """Times [s] at which poses meet a pose on the way: of `times` (n,), and the nearest between.
+def instants_met(
+    via: Via, times: Array, poses: Array, pose_at: Callable[[Array], Array]
+) -> list[float]:
+    """Times [s] at which it is met: of `times` (n,), which have `poses`, and the nearest between.
 
-    The distance and turn are least at an instant in the midst of three times; around it the times
-    are made finer until nothing is left between them.
+    Times are made finer around an instant of three at which distance and turn are least, and where
+    both ends of a span are no further off than it leads: they may fall further, past a pose.
     """
-    off = np.add(*via.offs(pose_at(times)))
+    off, change = np.add(*via.offs(poses)), np.abs(np.diff(poses, axis=0)).sum(axis=1)
     found = times[off <= MET].tolist()
-    padded = np.concatenate([[np.inf], off, [np.inf]])
-    lowest = (padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]) & (off > MET)
+    padded, between = np.concatenate([[np.inf], off, [np.inf]]), off > MET
+    lowest = (padded[1:-1] <= padded[:-2]) & (padded[1:-1] <= padded[2:]) & between
+    lowest &= off < 2.0 * change.max(initial=0.0)
+    spanned = (off[:-1] + off[1:] <= LONGER * change) & between[:-1] & between[1:]
+    spanned &= ~(lowest[:-1] | lowest[1:])
+    last = len(times) - 1
+    spans = [(max(k - 1, 0), min(k + 1, last)) for k in np.flatnonzero(lowest).tolist()]
+    spans += [(k, k + 1) for k in np.flatnonzero(spanned).tolist()]
     scale = FINEST * (1.0 + float(np.abs(times).max(initial=0.0)))
-    steps = np.diff(times)
-    for k in np.flatnonzero(lowest & (off < 2.0 * _reach(times, pose_at))).tolist():
-        low, high = times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)]
-        if not len(steps):
-            continue
+    for first, second in spans:
+        low, high = times[first], times[second]
         while high - low > scale:
             fine = np.linspace(low, high, 2 * FINER + 1)
             off_fine = np.add(*via.offs(pose_at(fine)))
@@ -200,12 +206,6 @@ def instants_met(via: Via, times: Array, pose_at: Callable[[Array], Array]) -> l
                 break
             low, high = fine[max(least - 1, 0)], fine[min(least + 1, 2 * FINER)]
     return sorted(found)
-
-
-def _reach(times: Array, pose_at: Callable[[Array], Array]) -> float:
-    """The greatest change of a pose between neighbouring times, distance and turn [m, rad]."""
-    steps = np.abs(np.diff(pose_at(times), axis=0))
-    return float(steps.sum(axis=1).max(initial=0.0))
 
 
 def passages(
@@ -218,10 +218,10 @@ def passages(
 ) -> list[float | None]:
     """When [s] each pose on the way is passed, as early as can be; None: it is missed."""
     found: list[float | None] = []
-    earliest = -math.inf
+    earliest, poses = -math.inf, pose_at(times)
     for via in vias:
         at = None
-        for time in instants_met(via, times, pose_at):
+        for time in instants_met(via, times, poses, pose_at):
             if time < earliest - MET or (via.stop and not rests(time)):
                 continue
             last = time + via.stay_s

@@ -51,6 +51,7 @@ from maneuver_automaton.optimal_control.scene import (
     PolishSettings,
     SolverAnswer,
     settled,
+    settled_state,
 )
 from maneuver_automaton.optimal_control.separation import Parting, held_near, pairs_near, parted
 from maneuver_automaton.optimal_control.transcription import unpacked
@@ -316,8 +317,11 @@ def solve_from(
     if program.scene.movers:  # they are where the motion meets them, to first order
         corners, _ = _corners(program, point, apart)
         last = program.size - 1
-        near = duration * np.array([1.0 - WITHIN, 1.0 + WITHIN])
-        bounds[last] = np.clip(near, *bounds[last])
+        near = np.array([1.0 - WITHIN, 1.0 + WITHIN])
+        bounds[last] = np.clip(duration * near, *bounds[last])
+        if program.paced:
+            paces = slice(state.size + control.shape[1] - 1, last, control.shape[1])
+            bounds[paces] = np.clip(control[:, -1:] * near, *bounds[paces].T[..., None])
     if math.isfinite(trust):
         n_x = state.shape[1]
         for axis in (0, 1):
@@ -479,6 +483,7 @@ def polish(
         If CasADi is not installed.
     """
     began, ends = budget.elapsed, ends.settled
+    via = [(node, settled_state(state)) for node, state in via]
     point = _point_of(guess, len(guess.control) if gears is None else len(gears))
     program = program_of(model, ends, scene, settings, stage_cost, gears, point, via)
     ahead = settings.ahead * _fastest(point)
@@ -489,7 +494,7 @@ def polish(
     if fixed_planes and apart.depth(program, point) > TOO_DEEP * reach:
         why = "the guess is too deep inside obstacles for fixed planes"
         return _polished(point, _nothing(why), budget.elapsed - began)
-    price = PRICE * guess.duration / reach if elastic else math.inf
+    price = PRICE * float(point.durations.sum()) / reach if elastic else math.inf
     best, total = point, _nothing("lines were missing to the end")
     solver: Solver | None = None
     needed = 0.0  # [s] to build a program that was not built

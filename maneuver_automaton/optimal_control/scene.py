@@ -65,6 +65,11 @@ def settled(values: Array) -> Array:
     return np.asarray(np.round(values, DIGITS) + 0.0)
 
 
+def settled_state(state: Sequence[float | None]) -> tuple[float | None, ...]:
+    """The same of a state, of which None is free."""
+    return tuple(None if value is None else float(settled(np.array(value))) for value in state)
+
+
 class MovingSolid(NamedTuple):
     """A convex solid that moves."""
 
@@ -89,28 +94,37 @@ class ObstaclePieces(NamedTuple):
 
 
 def pieces_during(
-    still: Sequence[Solid], movers: Sequence[MovingSolid], durations: Array
+    still: Sequence[Solid],
+    movers: Sequence[MovingSolid],
+    durations: Array,
+    stays: Sequence[tuple[int, float]] = (),
 ) -> ObstaclePieces:
     """What stands still, and what moves in each interval of a motion of `durations` (n,) [s].
+
+    Before it stays at a node for some time, what passes meanwhile belongs to the last interval.
 
     Corners of what moves are those at the begin of the interval, then those at its end: their hull
     is the piece.
     """
     solids, intervals, shifts = list(still), [np.full(len(still), ALWAYS)], []
     ends = np.cumsum([0.0, *durations.tolist()])
+    late = np.zeros(len(ends))
+    for node, seconds in stays:
+        late[node:] += seconds
+    clock = ends + late
     most = 2 * max((len(one.corners) for one in movers), default=0)
     for one in movers:
         first, last = one.there
-        begin, end = np.clip(ends[:-1], first, last), np.clip(ends[1:], first, last)
+        begin, end = np.clip(clock[:-1], first, last), np.clip(clock[1:], first, last)
         both = settled(np.concatenate([_corners(one, begin), _corners(one, end)], axis=1))
         # Of a clipped time nothing shifts.
         shares = np.stack([ends[:-1], ends[1:]], axis=1) / max(ends[-1], NEARBY)
-        shares *= np.stack([begin == ends[:-1], end == ends[1:]], axis=1)
+        shares *= np.stack([begin == clock[:-1], end == clock[1:]], axis=1)
         rates = np.concatenate([_rates(one, begin), _rates(one, end)], axis=1)
         rates *= np.repeat(shares, len(one.corners), axis=1)[..., None]
         bulges = one.rounding + settled(_bulges(one, begin, end))
         solids += list(zip(both, bulges.tolist(), strict=True))
-        there = (ends[:-1] <= last) & (ends[1:] >= first)
+        there = (clock[:-1] <= last) & (clock[1:] >= first)
         intervals.append(np.where(there, np.arange(len(durations)), NEVER))
         pad = most - rates.shape[1]
         shifts.append(np.pad(settled(rates), ((0, 0), (0, pad), (0, 0))))
@@ -197,6 +211,7 @@ class PolishScene:
     walls: tuple[tuple[float, float, float], ...] = ()  # (a, b, c): a x + b y <= c
     guards: tuple[Guard, ...] = ()
     places: PlacesAt | None = None
+    stays: tuple[tuple[int, float], ...] = ()  # nodes at which it stands between, how long [s]
 
     @property
     def body(self) -> list[Solid]:
@@ -210,7 +225,7 @@ class PolishScene:
 
 @functools.lru_cache(maxsize=8)  # a round asks for the same ones several times
 def _pieces_during(scene: PolishScene, durations: bytes) -> ObstaclePieces:
-    return pieces_during(scene.pieces, scene.movers, np.frombuffer(durations))
+    return pieces_during(scene.pieces, scene.movers, np.frombuffer(durations), scene.stays)
 
 
 NodeOnTheWay = tuple[int, tuple[float | None, ...]]
@@ -227,11 +242,7 @@ class MotionEnds(NamedTuple):
     @property
     def settled(self) -> MotionEnds:
         """The same without the last digits."""
-        start, end = (
-            tuple(None if v is None else float(settled(np.array(v))) for v in state)
-            for state in (self.start, self.end)
-        )
-        return self._replace(start=start, end=end)
+        return self._replace(start=settled_state(self.start), end=settled_state(self.end))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

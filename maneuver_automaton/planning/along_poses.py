@@ -44,6 +44,7 @@ from maneuver_automaton.planning.polishing import polish_on_the_way
 from maneuver_automaton.planning.result import Answer, LowerBound, PlanResult, PlanStatus
 from maneuver_automaton.problem import Goal, Problem, Via
 
+LEAST_WORK = 3  # expansions that a leg counts for at least: one by words takes none
 LEG_SHARE = 0.2  # of the time left, for a leg that is planned for the first time
 IMPROVED = 0.15  # of the time, for arrivals that are better by estimates
 SEARCHED = 0.4  # of the time, for the search over arrivals
@@ -211,7 +212,7 @@ class _Legs:
         part = budget if more else budget.part(LEG_SHARE, at_least=LEAST_TIME)
         part = replace(part, shows=None, watch=None, expansions=most)
         result = self.answer(question, part, self.found.workspace, alternatives=0)
-        self.spent += result.counts.get("expansions", 0)
+        self.spent += max(result.counts.get("expansions", 0), LEAST_WORK)
         self.found.counts.update(result.counts)
         if known is None or known.cost is None or (result.cost or math.inf) < known.cost:
             self.known[key] = result

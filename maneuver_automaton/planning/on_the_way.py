@@ -141,7 +141,7 @@ class _Seen:
         """How a pose on the way is passed from a time on, or what is known of it already."""
         found, near = before, via.shifted(self.origin)
         left = via.stay_s if found is None else found.stay_left
-        for time in instants_met(near, self.times, self.pose_at):
+        for time in instants_met(near, self.times, self.pose_at(self.times), self.pose_at):
             if time < since - MET or (via.stop and not self.may_stop(time)):
                 continue
             stood = min(max(self.standing(time), 0.0), left)

@@ -437,8 +437,7 @@ def polish_on_the_way(
     likes. A place that may be chosen stays.
     """
     problem, before = found.problem, found.cost
-    waits = problem.moves and any(via.stay_s for via in problem.via)
-    if waits or budget.is_over or why_not_polished(problem):
+    if budget.is_over or why_not_polished(problem):
         return False
     for plan, goal_index in guesses:
         try:
@@ -477,9 +476,11 @@ def _polished_through(
     if np.diff(nodes).min() < 1:
         return None
     guess = guess_at(course, np.interp(np.arange(count + 1), nodes, times))
-    via, dof, rest = list[NodeOnTheWay](), known.start.size, problem.automaton.rest or 0
+    via, standing = list[NodeOnTheWay](), list[tuple[int, float]]()
+    dof, rest = known.start.size, problem.automaton.rest or 0
     for one, node in zip(passed, nodes[1:-1].tolist(), strict=True):
         state, asked = guess.state[node], problem.via[one.number - 1]
+        standing.append((node, asked.stay_s))
         if asked.stay_s:  # the wheels may be turned where it stops for no time
             state = np.append(state[:dof], problem.automaton.trims[rest].reduced_state)
         pose = (one.pose if asked.radius > 0.0 else asked.pose).tolist()
@@ -490,7 +491,7 @@ def _polished_through(
     stage_cost = price.stage_cost(known)
     work = iterations_within(budget)
     motions = polish_through(
-        task, guess, via, stage_cost=stage_cost, most_iterations=work, budget=budget
+        task, guess, via, stays=standing, stage_cost=stage_cost, most_iterations=work, budget=budget
     )
     if isinstance(motions, str):
         return None

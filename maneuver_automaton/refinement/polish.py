@@ -225,6 +225,7 @@ def polish_through(
     guess: Guess,
     via: Sequence[NodeOnTheWay],
     *,
+    stays: Sequence[tuple[int, float]] = (),
     stage_cost: RunningCost | None = None,
     budget: Budget = UNLIMITED,
     most_iterations: int | None = None,
@@ -232,14 +233,16 @@ def polish_through(
     """Exact motions through poses on the way that a guess leads to; why there is none, if so.
 
     One follows the other where a reduced state on the way is given, one leads past all others.
-    Nothing may move. `guess`: seen from the start, with nodes at the poses on the way; `via`: these
-    in order, with pose and reduced state seen from the start; None is free.
+    `guess`: seen from the start, with nodes at the poses on the way; `via`: these in order, with
+    pose and reduced state seen from the start; None is free. `stays`: nodes at which it stands
+    between two of the motions, and how long [s], which what moves goes on for.
     """
     ends, why = task.ends(float(guess.state[-1, 2])), ""
+    scene = replace(task.scene, stays=tuple(stays))
     most = min(most_iterations or USUAL.max_iterations, USUAL.max_iterations)
     for room in (1.0, ROOM):  # more of it where closing broke a limit
         some = replace(USUAL, tightening=room * USUAL.tightening, max_iterations=most)
-        found = polish(task.model, ends, task.scene, guess, stage_cost=stage_cost, settings=some,
+        found = polish(task.model, ends, scene, guess, stage_cost=stage_cost, settings=some,
                        via=via, budget=budget)  # fmt: skip
         if not found.is_feasible:
             return found.reason

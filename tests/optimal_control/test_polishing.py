@@ -10,10 +10,13 @@ from maneuver_automaton.models import CarWithTrailer, SecondOrderUnicycle
 from maneuver_automaton.optimal_control import Guess, SolveStatus
 from maneuver_automaton.optimal_control.polishing import polish
 from maneuver_automaton.optimal_control.scene import (
+    NEVER,
     BodyPart,
     MotionEnds,
+    MovingSolid,
     PolishScene,
     PolishSettings,
+    pieces_during,
 )
 from tests.reference_dynamics import trailer_pose
 
@@ -167,7 +170,7 @@ def test_a_solve_that_is_cut_short_hands_on_its_best_iterate() -> None:
     assert whole.objective <= cut.objective < 1.001 * whole.objective
 
 
-def test_the_last_digits_of_a_guess_and_of_the_ends_change_nothing() -> None:
+def test_the_last_digits_of_a_guess_of_the_ends_and_on_the_way_change_nothing() -> None:
     """They are all that a moved problem differs by, and a solver's way may depend on them."""
     box = SQUARE * [1.0, 0.6] + [2.0, 0.0]
     scene = PolishScene(parts=(BODY,), pieces=((box, 0.0),))
@@ -177,7 +180,24 @@ def test_the_last_digits_of_a_guess_and_of_the_ends_change_nothing() -> None:
         control=one.control + noise.uniform(-1e-13, 1e-13, one.control.shape),
         duration=one.duration * (1.0 + 1e-15),
     )
-    first = polish(ROBOT, at_rest(4.0), scene, one)
-    second = polish(ROBOT, at_rest(4.0 * (1.0 + 1e-15), 1e-14), scene, other)
+    via = [[(20, (2.0, y, None, None, None))] for y in (0.7, 0.7 + 1e-15)]
+    first = polish(ROBOT, at_rest(4.0), scene, one, via=via[0])
+    second = polish(ROBOT, at_rest(4.0 * (1.0 + 1e-15), 1e-14), scene, other, via=via[1])
+    assert first.state[20, :2] == pytest.approx([2.0, 0.7], abs=1e-6)
     np.testing.assert_array_equal(first.state, second.state)
     assert first.iterations == second.iterations
+
+
+def test_what_moves_goes_on_while_a_motion_stays() -> None:
+    """One metre a second, over two seconds with a stay of three between them."""
+
+    def poses(times: np.ndarray) -> np.ndarray:
+        return np.stack([times, 0.0 * times, 0.0 * times], axis=1)
+
+    mover = MovingSolid(np.zeros((1, 2)), 0.1, poses, (0.0, 4.5))
+    swept = pieces_during((), (mover,), np.ones(2), stays=[(1, 3.0)])
+    along = [corners[:, 0].tolist() for corners, _ in swept.solids]
+    assert along == [[0.0, 4.0], [4.0, 4.5]]
+    assert swept.interval.tolist() == [0, 1]
+    gone = pieces_during((), (mover,), np.ones(2), stays=[(1, 4.0)])
+    assert gone.interval.tolist() == [0, NEVER]

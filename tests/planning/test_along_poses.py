@@ -216,6 +216,15 @@ def test_a_plan_that_misses_is_refused():
     assert ma.verify(replace(back, order="free"), straight).passed
 
 
+@pytest.mark.parametrize("last", [0.0202, 0.013])
+def test_a_pose_just_before_the_end_of_a_turn_is_passed(last):
+    """Then it turns back: how far it is off, place and turn together, may go on falling."""
+    trims = [ROBOT[name] for name in ("ahead", "right", "left", "ahead")]
+    plan = ma.Plan(START, trims, durations=[1.0, 1.0 + last, last, 1.7])
+    problem = ma.Problem(ROBOT, START, plan.end, via=[plan.pose_at(2.0)])
+    assert ma.verify(problem, plan).passed
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
