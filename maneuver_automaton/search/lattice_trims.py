@@ -203,7 +203,6 @@ CORNER, MOST_CORNERS = 0.9, 20  # the same in the own direction of each trim, an
 LOOKS = 720  # directions in which the trims that pay are looked for
 SAME_PATH = 1e-12  # of the cosine between two twists that lead along one path
 PACES, STEPS = 8, 128  # prices of time that double, and how many are tried on either side
-NO_TRIMS = np.zeros(0, dtype=np.int64)
 PAYS = 1e-6  # relative price above the least one that counts as the least
 
 
@@ -225,8 +224,7 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     for angle in np.arange(directions) * (2.0 * math.pi / directions):
         off = np.abs(np.remainder(angles - angle + math.pi, 2.0 * math.pi) - math.pi)
         off[sizes == 0.0] = math.inf
-        nearest = float(off.min())
-        near = np.flatnonzero(off <= max(nearest, NEAR)) if nearest <= within else NO_TRIMS
+        near = np.flatnonzero(off <= min(max(float(off.min()), NEAR), within))
         covered = plane @ np.array([math.cos(angle), math.sin(angle)])
         chosen += _cheapest(along, near, rates[along], covered, off)
     drives = (plane[:, 0] != 0.0) & (plane[:, 1] != 0.0)
