@@ -18,21 +18,24 @@ REAL = "biuf"  # kinds of NumPy's types that are real numbers
 FEW = 16  # numbers that are looked at faster one by one
 
 
+def as_times(name: str, value: ArrayLike) -> Array:
+    """Times [s] at which something is asked for, of any shape, as `as_array` reads numbers.
+
+    They may be infinite, long before a motion and long after it, but are numbers.
+    """
+    times = _as_floats(name, value)
+    if np.isnan(times).any():
+        raise ValueError(f"{name}: got nan, need numbers")
+    return times
+
+
 def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None) -> Array:
     """`value` as finite float64 with `last` components in its last axis; `name` is for messages.
 
     Real numbers of any type, no text and no dates, and of any shape where `last` is None. The array
     is in the order of C, and `value` itself if it is one.
     """
-    try:
-        known = np.asarray(value)
-        if known.dtype.kind == "O":
-            known = np.array([_float(one) for one in known.flat]).reshape(known.shape)
-        if known.dtype.kind not in REAL:
-            raise TypeError
-        array = np.asarray(known, dtype=np.float64, order="C")
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{name}: got {reprlib.repr(value)}, need numbers") from error
+    array = _as_floats(name, value)
     if last is not None:
         admitted = (last,) if isinstance(last, int) else tuple(last)
         if array.ndim == 0 or array.shape[-1] not in admitted:
@@ -43,6 +46,18 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
         bad = array[~np.isfinite(array)].flat[0]
         raise ValueError(f"{name}: got {bad}, need finite numbers")
     return array
+
+
+def _as_floats(name: str, value: ArrayLike) -> Array:
+    try:
+        known = np.asarray(value)
+        if known.dtype.kind == "O":
+            known = np.array([_float(one) for one in known.flat]).reshape(known.shape)
+        if known.dtype.kind not in REAL:
+            raise TypeError
+        return np.asarray(known, dtype=np.float64, order="C")
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ValueError(f"{name}: got {reprlib.repr(value)}, need numbers") from error
 
 
 def freeze(instance: Any, name: str, *, last: int | Sequence[int] | None = None) -> None:

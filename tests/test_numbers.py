@@ -282,3 +282,23 @@ def test_arguments_are_numbers_of_any_type_and_nothing_else(name):
     for wrong in (str(value), [value], 1j):
         with pytest.raises(ValueError, match=r": got .*, need a (whole )?number"):
             ask(wrong)
+
+
+TIMES: dict[str, Callable[[Any], Any]] = {
+    "plan": PLAN.pose_at,
+    "controls": PLAN.control_at,
+    "motion": ma.Motion([0, 2], [[0, 0, 0], [2, 0, 0]]).at,
+    "motion of a plan": ma.Motion.of_plan(PLAN).at,
+    "mover": lambda v: ma.recording(ma.verify(FREE, PLAN)).movers[0].pose_at(v),
+    "coast": lambda v: PLAN.trims[0].coast(ma.SE2([0, 0, 0]), v).pose,
+}
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_times_are_numbers_of_any_type_and_nothing_else(name):
+    ask = TIMES[name]
+    for kind in NUMBERS:
+        np.testing.assert_array_equal(ask(kind(1)), ask(1.0))
+    for wrong in ("1", b"1", 1j, None, ["1"], np.datetime64("2020-01-01"), np.nan):
+        with pytest.raises(ValueError, match=r"(time|duration): got .*, need (finite )?numbers"):
+            ask(wrong)
