@@ -17,6 +17,7 @@ import maneuver_automaton as ma
 from maneuver_automaton import analysis
 from maneuver_automaton._kernel_cache import KernelCache, _is_listed
 from maneuver_automaton.receding_horizon import RecedingHorizon
+from maneuver_automaton.recording import recording_of
 
 NUMBERS = (int, float, np.int32, np.int64, np.float32, np.float64, Fraction, Decimal, np.array)
 ARRAYS: tuple[Callable[[Any], Any], ...] = (
@@ -289,7 +290,7 @@ TIMES: dict[str, Callable[[Any], Any]] = {
     "controls": PLAN.control_at,
     "motion": ma.Motion([0, 2], [[0, 0, 0], [2, 0, 0]]).at,
     "motion of a plan": ma.Motion.of_plan(PLAN).at,
-    "mover": lambda v: ma.recording(ma.verify(FREE, PLAN)).movers[0].pose_at(v),
+    "mover": lambda v: recording_of(ma.plan(FREE, time_limit=60)).movers[0].pose_at(v),
     "coast": lambda v: PLAN.trims[0].coast(ma.SE2([0, 0, 0]), v).pose,
 }
 

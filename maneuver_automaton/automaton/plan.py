@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_array, as_number, as_times, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
 from maneuver_automaton.automaton.plan_arrays import PlanArrays, plan_arrays
@@ -331,7 +331,7 @@ class Plan(Played):
 
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at `time` (...,) [s]; held before the start and after the end."""
-        times = as_times("time", time)
+        times = as_array("time", time, infinite=True)
         if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         if not (times.ndim or any(self.maneuvers)):  # one time, of trims alone: plain numbers
@@ -355,7 +355,7 @@ class Plan(Played):
         """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of what begins."""
         if not self.primitives:
             raise ValueError("plan: an empty word has no control")
-        times = as_times("time", time)
+        times = as_array("time", time, infinite=True)
         samples = self.sample()
         if any(self.maneuvers):
             after = np.searchsorted(samples.time[1:-1], times, side="right")

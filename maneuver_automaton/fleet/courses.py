@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_times, freeze
+from maneuver_automaton._arrays import Array, freeze
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision.motion import Motion
 from maneuver_automaton.collision.shapes import Box, Disc, Obstacle, Polygon, Shape
@@ -104,7 +104,7 @@ class Levels:
 
     def at(self, time: ArrayLike) -> Array:
         """Altitudes (...,) at `time` (...,) [s]."""
-        return np.asarray(np.interp(as_times("time", time), self.time, self.altitude))
+        return np.asarray(np.interp(np.asarray(time), self.time, self.altitude))
 
 
 def levels_of(problem: Problem, plan: Plan | None = None) -> Levels | None:
