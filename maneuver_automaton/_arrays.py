@@ -18,11 +18,13 @@ REAL = "biuf"  # kinds of NumPy's types that are real numbers
 FEW = 16  # numbers that are looked at faster one by one
 
 
-def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None) -> Array:
+def as_array(
+    name: str, value: ArrayLike, *, last: int | Sequence[int] | None = None, infinite: bool = False
+) -> Array:
     """`value` as finite float64 with `last` components in its last axis; `name` is for messages.
 
     Real numbers of any type, no text and no dates, and of any shape where `last` is None. The array
-    is in the order of C, and `value` itself if it is one.
+    is in the order of C, and `value` itself if it is one. `infinite`: times may be so.
     """
     try:
         known = np.asarray(value)
@@ -38,9 +40,10 @@ def as_array(name: str, value: ArrayLike, *, last: int | Sequence[int] | None = 
         if array.ndim == 0 or array.shape[-1] not in admitted:
             need = " or ".join(str(n) for n in admitted)
             raise ValueError(f"{name}: got shape {array.shape}, need {need} components last")
-    few = array.size <= FEW
-    if not (all(map(math.isfinite, array.ravel().tolist())) if few else np.isfinite(array).all()):
-        bad = array[~np.isfinite(array)].flat[0]
+    held = array[~np.isinf(array)] if infinite else array
+    few = held.size <= FEW
+    if not (all(map(math.isfinite, held.ravel().tolist())) if few else np.isfinite(held).all()):
+        bad = held[~np.isfinite(held)].flat[0]
         raise ValueError(f"{name}: got {bad}, need finite numbers")
     return array
 
@@ -97,10 +100,6 @@ def _int(value: Any) -> int:
     return number
 
 
-def _floats(values: Any) -> tuple[float, ...]:
-    return tuple(map(_float, values))
-
-
 def as_number(name: str, value: Any) -> float:
     """A number that is handed in, as Python's own, whatever type it is written in."""
     return float(_read(name, value, "float"))
@@ -115,8 +114,8 @@ NUMBERS: dict[str, tuple[Callable[[Any], Any], str]] = {
     "float": (_float, "a number"),
     "int": (_int, "a whole number"),
     "bool": (lambda value: bool((0, 1).index(_int(value))), "True or False"),
-    "tuple[float, float]": (_floats, "two numbers"),
-    "tuple[float, ...]": (_floats, "numbers"),
+    "tuple[float, float]": (lambda values: tuple(map(_float, values)), "two numbers"),
+    "tuple[float, ...]": (lambda values: tuple(map(_float, values)), "numbers"),
 }
 
 

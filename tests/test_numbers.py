@@ -17,6 +17,7 @@ import maneuver_automaton as ma
 from maneuver_automaton import analysis
 from maneuver_automaton._kernel_cache import KernelCache, _is_listed
 from maneuver_automaton.receding_horizon import RecedingHorizon
+from maneuver_automaton.recording import recording_of
 
 NUMBERS = (int, float, np.int32, np.int64, np.float32, np.float64, Fraction, Decimal, np.array)
 ARRAYS: tuple[Callable[[Any], Any], ...] = (
@@ -281,4 +282,24 @@ def test_arguments_are_numbers_of_any_type_and_nothing_else(name):
             assert ask(kind(value)) == expected, kind
     for wrong in (str(value), [value], 1j):
         with pytest.raises(ValueError, match=r": got .*, need a (whole )?number"):
+            ask(wrong)
+
+
+TIMES: dict[str, Callable[[Any], Any]] = {
+    "plan": PLAN.pose_at,
+    "controls": PLAN.control_at,
+    "motion": ma.Motion([0, 2], [[0, 0, 0], [2, 0, 0]]).at,
+    "motion of a plan": ma.Motion.of_plan(PLAN).at,
+    "mover": lambda v: recording_of(ma.plan(FREE, time_limit=60)).movers[0].pose_at(v),
+    "coast": lambda v: PLAN.trims[0].coast(ma.SE2([0, 0, 0]), v).pose,
+}
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_times_are_numbers_of_any_type_and_nothing_else(name):
+    ask = TIMES[name]
+    for kind in NUMBERS:
+        np.testing.assert_array_equal(ask(kind(1)), ask(1.0))
+    for wrong in ("1", b"1", 1j, None, ["1"], np.datetime64("2020-01-01"), np.nan):
+        with pytest.raises(ValueError, match=r"(time|duration): got .*, need (finite )?numbers"):
             ask(wrong)

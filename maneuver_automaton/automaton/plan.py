@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, as_number, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, as_number, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._display import Played
 from maneuver_automaton.automaton.plan_arrays import PlanArrays, plan_arrays
@@ -175,7 +175,7 @@ class Plan(Played):
             word.append(trim)
             lasting.append(duration)
 
-        for primitive, duration in zip(primitives, np.asarray(durations, float), strict=True):
+        for primitive, duration in zip(primitives, as_array("durations", durations), strict=True):
             if isinstance(primitive, Trim):
                 put(primitive, float(duration))
                 continue
@@ -231,7 +231,7 @@ class Plan(Played):
         >>> plan.begun_at([0.0, 5.0, np.pi], start_time=1.0).end.round(9).tolist()
         [-2.0, 5.0, 3.141592654]
         """
-        other = replace(self, start=np.asarray(start, dtype=np.float64), start_time=start_time)
+        other = replace(self, start=as_array("start", start), start_time=start_time)
         for name in ("_pieces", "_steps", "_twists", "primitives", "primitive_durations"):
             if name in vars(self) and other.start.size == self.start.size:
                 vars(other)[name] = vars(self)[name]
@@ -331,7 +331,7 @@ class Plan(Played):
 
     def pose_at(self, time: ArrayLike) -> Array:
         """Poses (..., dof) at `time` (...,) [s]; held before the start and after the end."""
-        times = np.asarray(time, dtype=np.float64)
+        times = as_array("time", time, infinite=True)
         if not self.primitives:
             return np.broadcast_to(self.start, (*times.shape, self.start.size)).copy()
         if not (times.ndim or any(self.maneuvers)):  # one time, of trims alone: plain numbers
@@ -355,7 +355,7 @@ class Plan(Played):
         """Controls (..., n_u) at `time` (...,) [s]; at a switch, that of what begins."""
         if not self.primitives:
             raise ValueError("plan: an empty word has no control")
-        times = np.asarray(time, dtype=np.float64)
+        times = as_array("time", time, infinite=True)
         samples = self.sample()
         if any(self.maneuvers):
             after = np.searchsorted(samples.time[1:-1], times, side="right")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from maneuver_automaton._arrays import Array, IntArray, freeze, wrapped
+from maneuver_automaton._arrays import Array, IntArray, as_array, freeze, wrapped
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import FASTEST, FASTEST_TURN, check_size
 from maneuver_automaton.groups import SE2, LieGroup
@@ -178,7 +178,7 @@ class Motion:
 
     def at(self, time: ArrayLike) -> Array:
         """Poses (..., 3) at `time` (...,) [s]."""
-        times = np.asarray(time, dtype=np.float64)
+        times = as_array("time", time, infinite=True)
         if self.twist is None or self.time.size == 1:
             columns = [np.interp(times, self.time, self.pose[:, k]) for k in range(3)]
             return np.stack(columns, axis=-1)

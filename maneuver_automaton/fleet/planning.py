@@ -34,7 +34,7 @@ from maneuver_automaton.fleet.vehicle import (
     prepare_vehicles,
     vehicles_of,
 )
-from maneuver_automaton.fleet.verdict import verified
+from maneuver_automaton.fleet.verdict import STANDS, verified
 from maneuver_automaton.fleet.workers import How, PoolTask, WorkerPool
 
 Objective = Literal["sum", "last"]
@@ -420,7 +420,8 @@ class _FleetSearch:
         met = meetings(courses, keep=self.fleet.margin, among=[k])
         rows = []
         for one in met:
-            other = self.vehicles[one.other_than(k)].name
+            j = one.other_than(k)
+            other = self.vehicles[j].name + ("" if j in self.held else STANDS)
             x, y = alone.plan.pose_at(max(one.time, alone.plan.start_time))[:2]
             rows.append(f"{other} at {one.time:.4g} s near ({x:.4g}, {y:.4g})")
         spent = f" within {self.budget.seconds:.4g} s" if self.budget.is_over else ""

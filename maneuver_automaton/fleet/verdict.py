@@ -37,6 +37,7 @@ IN_SPACE = UserModel(
     control_names=("speed", "lateral_speed", "turn_rate", "climb"),
     velocity=lambda z, u: u,
 )
+STANDS = " (which has no plan itself, and stands)"
 
 
 def verified(
@@ -72,6 +73,7 @@ def verified(
         name = max(driven, key=lambda one: (passed[names.index(one)].quiet_after, one))
         other = row.pair[0] if name == row.pair[1] else row.pair[1]
         x, y = passed[names.index(name)].motions[0].at(row.time_s)[:2]
+        other += "" if other in driving else STANDS
         why[name] = (
             f"its plan comes within {max(row.distance_m, 0.0):.3g} m of {other} "
             f"at {row.time_s:.4g} s near ({x:.4g}, {y:.4g})"

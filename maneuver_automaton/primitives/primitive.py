@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze, plain_numbers
+from maneuver_automaton._arrays import Array, as_array, freeze, plain_numbers
 from maneuver_automaton._brief import brief
 from maneuver_automaton._limits import FASTEST, FASTEST_SPIN
 from maneuver_automaton.groups import LieGroup, group_of
@@ -48,7 +48,7 @@ class Trajectory:
         Between samples the error is that of a constant twist: an eighth of the change of the body
         velocity times the spacing.
         """
-        times = np.asarray(time, dtype=np.float64)
+        times = as_array("time", time, infinite=True)
         group = group_of(self.pose.shape[1])
         if self.time.size == 1:
             return np.broadcast_to(self.pose[0], (*times.shape, self.pose.shape[1])).copy()
@@ -122,7 +122,7 @@ class Trim:
 
     def coast(self, start: Pose, duration: ArrayLike) -> Pose:
         """Poses after coasting from `start` for `duration` (...,) [s]."""
-        return start @ start.exp(np.multiply.outer(np.asarray(duration), self.body_velocity))
+        return start @ start.exp(as_array("duration", duration)[..., None] * self.body_velocity)
 
 
 CLOSED = 1e-9  # [m, rad, s] between what a maneuver states and where its course ends

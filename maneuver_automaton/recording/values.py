@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from maneuver_automaton._arrays import Array, freeze
+from maneuver_automaton._arrays import Array, as_array, freeze
 from maneuver_automaton._brief import brief
 from maneuver_automaton.automaton import Plan
 from maneuver_automaton.automaton.cutting import carried
@@ -200,7 +200,7 @@ class Mover:
 
     def pose_at(self, time: ArrayLike, /) -> Array:
         """Poses (..., dof) at times (...,) [s], held before the begin and after the end."""
-        times = np.asarray(time, dtype=np.float64)
+        times = as_array("time", time, infinite=True)
         flat = times.ravel()
         begins = np.array([one.start_time for one in self.pieces])
         which = np.maximum(np.searchsorted(begins, flat, side="right") - 1, 0)

@@ -12,7 +12,7 @@ a small library, and know nothing of the words found here, whose trims they lack
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -31,7 +31,6 @@ from maneuver_automaton.search.lattice_query import LatticeQuery, lattice_query
 from maneuver_automaton.search.lattice_trims import (
     Chosen,
     at_two_paces,
-    coarse_trims,
     paced_trims,
     paying_trims,
     stands_for_more,
@@ -46,7 +45,6 @@ PATIENCE = 300  # attempts in a row that may gain nothing
 FIRST, FIRST_LIMITED = 4, 1  # new searches before its first turn
 SHARE = 25  # attempts for each new search so far ...
 LEAST = 100  # ... and at least
-DENSE = 16  # directions of the trims of shortcuts
 LONGEST = 24  # trims of one section
 ROOM = 4  # more, while trims are inserted
 ROUNDS = 6  # insertions into one section, at most
@@ -57,15 +55,11 @@ SHORTEST = 0.02  # share of a word that the shortest section is
 SPREAD = 0.2  # [length scales] that a via-point moves at most, along each axis
 
 
-Shorten = Callable[[LatticeQuery, Word], Word]
-
-
 @dataclass(slots=True, eq=False)
 class Whole:
     """The cheapest word so far that uses any trim of a large library, and how it got there."""
 
     query: LatticeQuery
-    dense: LatticeQuery | None = None  # with more trims, for shortcuts
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(SEED))
     best: Word | None = None
     origin: Word | None = None  # the word of the searches that it comes from
@@ -85,21 +79,13 @@ class Whole:
         """The cheaper of the best word and another one."""
         return self.best if self.best is not None and self.best.cost < word.cost else word
 
-    def gains(self, word: Word, *, step: int, budget: Budget, shorten: Shorten) -> Iterator[Word]:
+    def gains(self, word: Word, *, step: int, budget: Budget) -> Iterator[Word]:
         """Words, each cheaper than all before, after so many new searches.
 
-        It goes on from `word` if that is new, shortened with denser trims where these pay, and from
-        where it stood otherwise.
+        It goes on from `word` if that is new, and from where it stood otherwise.
         """
         if word is not self.origin:
-            known, self.origin = self.cheaper_than(word), word
-            self.dense = self.dense or _dense(self.query)
-            short = word if self.dense is None else shorten(self.dense, word)
-            begun = min(word, short, key=lambda one: one.cost)
-            if begun.cost < known.cost:
-                self.best = begun
-                yield begun
-            self.work, self.idle = _Work(self.query, begun), 0
+            self.origin, self.work, self.idle = word, _Work(self.query, word), 0
         work = self.work
         if work is None or not work.can_change:
             return
@@ -115,19 +101,6 @@ class Whole:
             if better.cost < self.cheaper_than(word).cost:
                 self.best = better
                 yield better
-
-
-def _dense(query: LatticeQuery) -> LatticeQuery | None:
-    """The query with trims in more directions; None where one trim is worth no more than two."""
-    prices = query.library.arrays.library
-    priced = prices.switch > 0.0 or prices.direction_change > 0.0
-    limited = query.most_trims > 0 or query.least_coast > 0.0
-    if not (priced or limited) or math.isfinite(query.most_time):
-        return None
-    held, known = query.library.trims, moving_trims(query.problem.automaton, query.problem.cost)
-    rows = coarse_trims(known.twists, known.rates, directions=DENSE)
-    words = np.union1d(known.trims[rows], np.intersect1d(held, known.trims))
-    return with_trims(query, Chosen(tuple(words.tolist())))
 
 
 def has_paces(query: LatticeQuery) -> bool:

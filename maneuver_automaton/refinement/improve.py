@@ -125,8 +125,6 @@ MOST_CHUNK = 16384  # expansions between two looks at the word of a search
 SEED = 20_09  # of the random draws
 MOST_OTHERS = 50  # words kept beside the best
 DRAWN = 400  # attempts whose random numbers are drawn at once
-DENSE_SLICE = 200  # attempts with many trims, each of which takes longer
-OTHER_TRIMS = Restart(Resolution(), SLICE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -281,15 +279,9 @@ class WordSearch:
     def _with_every_trim(self, whole: Whole, step: int) -> Iterator[Word]:
         """Words that any trims of a large library have made cheaper: attempts, no expansions."""
         if not self.budget.is_over:
-            shorten = self._shortened_with
             before = whole.attempts
-            yield from whole.gains(self.best, step=step, budget=self.budget, shorten=shorten)
+            yield from whole.gains(self.best, step=step, budget=self.budget)
             self.attempts += whole.attempts - before
-
-    def _shortened_with(self, query: LatticeQuery, word: Word) -> Word:
-        """The word shortened with the trims of another query, the draws of this one left alone."""
-        other = replace(self, query=query, rng=np.random.default_rng(SEED), attempts=0)
-        return other._shortened(word, OTHER_TRIMS, DENSE_SLICE)
 
     def _searched_again(self, restart: Restart, grids: tuple[DistanceGrid, ...]) -> Iterator[Word]:
         """Words found by a new search that is pruned by the best, and made shorter."""

@@ -20,6 +20,7 @@ from maneuver_automaton.refinement.arrays import (
 from maneuver_automaton.search.lattice_pass import with_cost
 from maneuver_automaton.search.lattice_query import LatticeQuery
 from maneuver_automaton.search.lattice_task import TRIES, limits_of
+from maneuver_automaton.search.lattice_trims import MOST_TRIMS
 from maneuver_automaton.words.library import SWITCH, scratch_of
 from maneuver_automaton.words.word import Word, word_of_steps
 
@@ -128,8 +129,12 @@ def improve_task(query: LatticeQuery, word: Word) -> ImproveTask:
     steps = np.hypot(edges.displacement[:, 0], edges.displacement[:, 1])
     covers = steps > 0.0  # a maneuver may cover ground for less than any trim
     least = float((edges.cost[covers] / steps[covers]).min(initial=math.inf))
+    # Of many trims a few of the cheapest words do nearly the same, and meet the same obstacle.
+    tried = library.arrays.library.tried
+    all_of_them = library.at_will and len(library.trims) > MOST_TRIMS
+    tries = len(tried.words) if all_of_them else TRIES
     return ImproveTask(
-        tries=TRIES,
+        tries=tries,
         limits=limits_of(query),
         given_ends=query.start_trim >= 0,
         per_metre=min(float(library.per_metre), least),

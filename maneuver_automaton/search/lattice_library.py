@@ -16,7 +16,7 @@ from maneuver_automaton.automaton.validation import part_between
 from maneuver_automaton.collision import Shape
 from maneuver_automaton.collision.advancement import swept_areas
 from maneuver_automaton.collision.body import Body, body_of
-from maneuver_automaton.costs import StageCost
+from maneuver_automaton.costs import StageCost, terms_of
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.primitives import Maneuver
 from maneuver_automaton.problem import Problem
@@ -163,11 +163,14 @@ def library_with(problem: Problem, choice: Chosen) -> LatticeLibrary:
 
 def _asked(
     problem: Problem,
-) -> tuple[StageCost, tuple[Shape, ...], Carried, bool, bool, float, bool]:
+) -> tuple[StageCost, tuple[Shape, ...], Carried, bool, bool, float, bool, bool]:
     """What a library depends on beside its automaton, as `_library` takes it."""
-    carried, horizon = tuple(problem.parts.items()), problem.horizon
-    fixed, limited = horizon.time is not None, horizon.max_time is not None
-    times = fixed, problem.moves, horizon.min_coast, fixed or limited
+    carried, horizon, terms = tuple(problem.parts.items()), problem.horizon, terms_of(problem.cost)
+    fixed = horizon.time is not None
+    limited = fixed or horizon.max_time is not None
+    priced = terms is not None and (terms.switch > 0.0 or terms.direction_change > 0.0)
+    few = horizon.max_trims is not None or horizon.min_coast > 0.0
+    times = fixed, problem.moves, horizon.min_coast, limited, not limited and (priced or few)
     return (problem.cost, problem.footprint, carried, *times)
 
 
@@ -180,6 +183,7 @@ def _library(
     waits: bool,
     min_coast: float,
     limited: bool,
+    saving: bool,
     choice: Chosen | None = None,
 ) -> LatticeLibrary:
     if switched_in_plane(automaton):
@@ -190,6 +194,7 @@ def _library(
             waits=waits,
             min_coast=min_coast,
             limited=limited,
+            saving=saving,
             choice=choice,
         )
     else:

@@ -28,6 +28,7 @@ from maneuver_automaton.words.library import (
 )
 
 MOST_TRIMS = 10  # moving; of a larger library a few stand for all where the lattice is searched
+MOST_SAVING = 16  # the same where switches are saved: chattering between a few is no substitute
 TURN = 4.0  # length scales that a full turn is taken for, whose radius the speed decides
 WORDS_AN_EXPANSION = 150.0  # words of a connection that take as long as an expansion
 MOST_INTERVAL = 400.0  # expansions between two connections that are tried
@@ -59,22 +60,25 @@ def trims_at_will(
     waits: bool,
     min_coast: float,
     limited: bool = False,
+    saving: bool = False,
     choice: Chosen | None = None,
 ) -> PricedTrims:
     """The most useful trims in the plane of a vehicle that switches at will between all.
 
     `waits`: rest is a trim like any other, since obstacles move; `limited`: so is the time, and
-    the fastest trims of a large library are taken. A `choice` says which are taken instead.
+    the fastest trims of a large library are taken; `saving`: one trim is worth more than two that
+    do the same by turns, and more of them are taken. A `choice` says which are taken instead.
     """
     known = moving_trims(automaton, cost)
     pads = fixed_time and known.rest is not None
     rates = known.rates - (known.rest_rate if pads else 0.0)
     if choice is not None:
         chosen = np.flatnonzero(np.isin(known.trims, choice.words + choice.others))
-    elif len(known.trims) <= MOST_TRIMS:
+    elif len(known.trims) <= (MOST_SAVING if saving else MOST_TRIMS):
         chosen = np.arange(len(known.trims))
     else:
-        chosen = coarse_trims(known.twists, np.ones(len(rates)) if limited else rates)
+        paid = np.ones(len(rates)) if limited else rates
+        chosen = coarse_trims(known.twists, paid, directions=DENSE if saving else DIRECTIONS)
     trims = known.trims[chosen]
     twists, rates = known.twists[chosen, :3], rates[chosen]
     twists[np.abs(twists[:, 2]) < STRAIGHT, 2] = 0.0
@@ -196,8 +200,10 @@ def _words(moving: IntArray, twists: Array) -> IntArray:
 
 
 DIRECTIONS = 8  # straight, on the spot, and between the two, with both signs
+DENSE = 16  # and between these, where the nearest trim stands for a direction
 NEAR = 0.03  # [rad] from a direction, within which the cheapest trim stands for it
 COVERED = 0.8  # share of what the farthest trim reaches in a direction that a few have to reach
+CORNER, MOST_CORNERS = 0.9, 20  # the same in the own direction of each trim, and while so few
 LOOKS = 720  # directions in which the trims that pay are looked for
 SAME_PATH = 1e-12  # of the cosine between two twists that lead along one path
 PACES, STEPS = 8, 128  # prices of time that double, and how many are tried on either side
@@ -210,8 +216,10 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     In the plane of speed and turn rate, each divided by its greatest, some directions are taken;
     for each the trim that is the cheapest for what it covers, of equal ones the nearest to the
     direction, then the fastest; where nothing turns on the spot, the sharpest turns; last what gets
-    far for its cost, aside as well, where none of these does. Rates (m,) are costs per second.
+    far for its cost, aside as well, where none of these does, in its own direction too. Rates (m,)
+    are costs per second.
     """
+    within = NEAR if directions == DIRECTIONS else math.pi / directions
     ahead = np.abs(twists[:, 1]) <= np.abs(twists[:, 0])
     along = np.flatnonzero(ahead) if ahead.any() else np.arange(len(twists))
     chosen: list[int] = []
@@ -219,7 +227,8 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
     angles, sizes = np.arctan2(plane[:, 1], plane[:, 0]), np.hypot(*plane.T)
     for angle in np.arange(directions) * (2.0 * math.pi / directions):
         off = np.abs(np.remainder(angles - angle + math.pi, 2.0 * math.pi) - math.pi)
-        near = np.flatnonzero((off <= NEAR) & (sizes > 0.0))
+        off[sizes == 0.0] = math.inf
+        near = np.flatnonzero(off <= min(max(float(off.min()), NEAR), within))
         covered = plane @ np.array([math.cos(angle), math.sin(angle)])
         chosen += _cheapest(along, near, rates[along], covered, off)
     drives = (plane[:, 0] != 0.0) & (plane[:, 1] != 0.0)
@@ -238,6 +247,13 @@ def coarse_trims(twists: Array, rates: Array, *, directions: int = DIRECTIONS) -
             farthest = covered >= covered.max() * (1.0 - 1e-9)
             sizes = np.where(farthest, np.abs(reach).sum(axis=1), math.inf)
             chosen += np.flatnonzero(sizes <= sizes.min() * (1.0 + 1e-9)).tolist()
+    reach /= np.abs(reach).max()
+    sizes = np.sum(reach * reach, axis=1)
+    while len(set(chosen)) < MOST_CORNERS:
+        spare = (reach[chosen] @ reach.T).max(axis=0) - CORNER * sizes
+        if spare.min() >= 0.0:
+            break
+        chosen.append(int(spare.argmin()))
     return np.array(sorted(set(chosen)), dtype=np.int64)
 
 
