@@ -153,7 +153,8 @@ def _static_arrays(
 def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[float, ...]:
     """A pose that moves with the obstacles: at the first static one that has a direction.
 
-    The pose `otherwise` (3,) where there is none.
+    Two discs have one, from the first to the next that stands clear of its centre. The pose
+    `otherwise` (3,) where there is none.
     """
     return frame_at_first(obstacles) or tuple(otherwise[:3].tolist())
 
@@ -161,10 +162,17 @@ def own_frame(obstacles: tuple[AnyObstacle, ...], otherwise: Array) -> tuple[flo
 @functools.lru_cache(maxsize=64)
 def frame_at_first(obstacles: tuple[AnyObstacle, ...]) -> tuple[float, ...]:
     """The pose of `own_frame`; empty where there is none."""
+    first: Disc | None = None
     for obstacle in obstacles:
         if isinstance(obstacle, OccupancyMap):
             return tuple(obstacle.origin.tolist())
-        if obstacle.motion is not None or isinstance(obstacle.shape, Disc):
+        if obstacle.motion is not None:
+            continue
+        if isinstance(obstacle.shape, Disc):
+            first = first or obstacle.shape
+            ahead, aside = (obstacle.shape.center - first.center).tolist()
+            if math.hypot(ahead, aside) > first.radius:
+                return (*first.center.tolist(), math.atan2(aside, ahead))
             continue
         if isinstance(obstacle.shape, Box):
             return (*obstacle.shape.center.tolist(), obstacle.shape.heading)

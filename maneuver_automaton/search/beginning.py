@@ -15,6 +15,7 @@ import numpy as np
 from maneuver_automaton._compile import bound
 from maneuver_automaton._kept import Prepared, kept_with
 from maneuver_automaton.budget import UNLIMITED, Budget, Pace
+from maneuver_automaton.collision.world import frame_at_first
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.search import _kernels_begin as kernels
 from maneuver_automaton.search import _kernels_nodes as layout
@@ -152,6 +153,8 @@ def _first_call(problem: Problem, prepared: Prepared) -> FirstCall | None:
         return None
     if problem.parts or problem.moves or problem.zones or (bounds.x is None) != (bounds.y is None):
         return None
+    if not frame_at_first(problem.obstacles):
+        return None  # the world is seen from the goal, and from another one in the next query
     query = lattice_query(problem, tuple(range(len(problem.goals))), prepared=prepared)
     library, world = query.library, query.world
     first = first_resolutions(library, query.problem.search)[0]

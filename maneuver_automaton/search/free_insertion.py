@@ -149,7 +149,8 @@ def _improved_from(work: _Insertion, begun: list[TimedWord]) -> SearchResult:
     limit = problem.search.max_expansions
     words: list[TimedWord] = []
     status = SearchStatus.EXHAUSTED
-    rounds = FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS
+    alone = len(begun) == 1  # nothing is to be compared with it: it has all its rounds at once
+    rounds = ROUNDS if alone else FIRST_ROUNDS_OF_MANY if many else FIRST_ROUNDS
     for seed in begun:
         if words and (task.budget.is_over or (limit is not None and len(words) >= limit)):
             status = SearchStatus.OUT_OF_BUDGET
@@ -157,20 +158,20 @@ def _improved_from(work: _Insertion, begun: list[TimedWord]) -> SearchResult:
         words.append(_with_insertions(library, seed, most, _fitting(work, rounds), counts))
     counts["expansions"] = counts["seeds"] = len(words)
     words = sorted((word for word in words if math.isfinite(word.cost)), key=attrgetter("cost"))
-    for k in range(min(len(words), max(FULL_OF_MANY if many else FULL, task.alternatives + 1))):
-        if words[k].certificate < -ACCURACY * library.scale and not task.budget.is_over:
-            words[k] = _with_insertions(library, words[k], most, _fitting(work, ROUNDS), counts)
+    full = 0 if alone else max(FULL_OF_MANY if many else FULL, task.alternatives + 1)
+    pays = -ACCURACY * library.scale
+    for k, word in enumerate(words[:full]):
+        if word.certificate < pays and not task.budget.is_over:
+            again = _with_insertions(library, word, most, _fitting(work, ROUNDS), counts)
+            words[k] = again if math.isfinite(again.cost) else word  # its times may fail to solve
     words = [_with_short_runs(library, word) for word in words]
-    binding = (
-        not words or min(words, key=attrgetter("cost")).certificate < -ACCURACY * library.scale
-    )
+    binding = not words or min(words, key=attrgetter("cost")).certificate < pays
     if most < LONGEST and binding and not library.tail and not task.budget.is_over:
         words += _from_longer(work, begun, counts)
     if prices_switches(problem.cost) and not task.budget.is_over:
         words += _with_fewer_switches(library, words, task.budget)
-    if (
-        task.alternatives > 0 and not task.budget.is_over
-    ):  # the best times of a seed's own word are locally optimal, too
+    # The best times of a seed's own word are locally optimal, too.
+    if task.alternatives > 0 and not task.budget.is_over:
         words += [_with_insertions(library, seed, most, 0, counts) for seed in begun]
     if task.budget.is_over:
         status = SearchStatus.OUT_OF_BUDGET

@@ -9,7 +9,7 @@ import pytest
 
 from maneuver_automaton._kept import Prepared
 from maneuver_automaton.budget import UNLIMITED
-from maneuver_automaton.collision import Box, Obstacle
+from maneuver_automaton.collision import Box, Disc, Obstacle
 from maneuver_automaton.planning import Planner, plan
 from maneuver_automaton.problem import Problem, SearchSettings
 from maneuver_automaton.search import beginning
@@ -63,6 +63,18 @@ def test_a_planner_finds_what_a_plan_alone_finds(seed: int) -> None:
         assert many.plan.word == alone.plan.word
         assert many.plan.durations.tolist() == alone.plan.durations.tolist()
         assert many.counts == alone.counts
+
+
+@compiled_only
+@pytest.mark.parametrize("number", [1, 2])
+def test_another_goal_among_discs_is_planned_as_by_itself(number: int) -> None:
+    """Of one disc nothing says in which direction it lies: what was begun was seen from a goal."""
+    discs = (Disc(3.0, [1.0, 0.5]), Disc(1.0, [4.0, 7.0]))[:number]
+    planner = Planner(CAR.automaton, obstacles=discs, footprint=CAR_BODY, search=ONCE)
+    planner.plan([-9, 0, 0], [9, 0, 0])
+    for goal in ([7.0, 6.0, 2.0], [6.0, -7.0, -1.0]):
+        found, alone = planner.plan([-8, -3, 0.5], goal), plan(planner.problem([-8, -3, 0.5], goal))
+        assert found.plan.durations.tolist() == alone.plan.durations.tolist()
 
 
 @compiled_only
