@@ -12,7 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import separation
-from maneuver_automaton.collision.arrays import SweptAreas, WorldArrays
+from maneuver_automaton.collision.arrays import Place, SweptAreas, WorldArrays
 from maneuver_automaton.collision.body import Body
 
 WIDEST = 0.5 * math.pi  # [rad] of a turn whose tangents hold it closely
@@ -141,16 +141,14 @@ def not_parted(
     body: Body,
     swept: SweptAreas,
     motion: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
+    place: Place,
     enough: float,
 ) -> int:
     """A solid that is not parted by more than `enough` from all that a motion covers; or FREE.
 
-    The motion begins at (x, y, cos, sin). UNKNOWN where it covers more than the buckets know.
+    The motion begins at `place`. UNKNOWN where it covers more than the buckets know.
     """
+    x, y, c, s = place
     # FREE is a proof for the whole motion: its polygons hold all that the body covers, the lists of
     # the buckets all solids within `reach`, and along an axis each is farther than `enough`.
     buckets, solids = world.buckets, world.solids
@@ -174,22 +172,20 @@ def not_parted(
         for b in range(n_pieces):
             wanted = enough + body.radius[b] + solids.plates[p, 4]
             piece = motion * n_pieces + b
-            apart, _, _ = separation(swept, piece, x, y, c, s, solids, p, wanted)
+            apart, _, _ = separation(swept, piece, place, solids, p, wanted)
             if not apart > wanted:
                 return int(p)
     return FREE
 
 
 @bare_inner_kernel
-def overlaps(
-    world: WorldArrays, body: Body, x: float, y: float, c: float, s: float, p: int
-) -> bool:
-    """Whether the core of the body at (x, y, cos, sin) surely overlaps that of one solid."""
+def overlaps(world: WorldArrays, body: Body, place: Place, p: int) -> bool:
+    """Whether the core of the body surely overlaps that of one solid."""
     n_corners = world.solids.first[p + 1] - world.solids.first[p]
     for b in range(body.first.shape[0] - 1):
         # Normals do not part a point from a line beyond its end, nor two points.
         if body.first[b + 1] - body.first[b] + n_corners > 3:
-            apart, _, _ = separation(body, b, x, y, c, s, world.solids, p, 0.0)
+            apart, _, _ = separation(body, b, place, world.solids, p, 0.0)
             if apart <= 0.0:
                 return True
     return False
