@@ -10,7 +10,14 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_inner_kernel
-from maneuver_automaton.collision.arrays import AboutCenter, Field, Place, SweptAreas, WorldArrays
+from maneuver_automaton.collision.arrays import (
+    AboutCenter,
+    Buckets,
+    Field,
+    Place,
+    SweptAreas,
+    WorldArrays,
+)
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.collision.convex import Solids
 
@@ -226,6 +233,24 @@ def field_bound(field: Field, body: Body, place: Place) -> float:
 
 
 @bare_inner_kernel
+def bucket_of(buckets: Buckets, x: float, y: float) -> int:
+    """The bucket that a place is in; -1 outside of all."""
+    i = math.floor((x - buckets.origin_x) / buckets.cell)
+    j = math.floor((y - buckets.origin_y) / buckets.cell)
+    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+        return -1
+    return j * buckets.columns + i
+
+
+@bare_inner_kernel
+def square_to_plate(solids: Solids, p: int, x: float, y: float) -> float:
+    """Squared distance of a place to the upright box around a solid."""
+    d_x = max(max(solids.plates[p, 0] - x, x - solids.plates[p, 2]), 0.0)
+    d_y = max(max(solids.plates[p, 1] - y, y - solids.plates[p, 3]), 0.0)
+    return d_x * d_x + d_y * d_y
+
+
+@bare_inner_kernel
 def near_clearance(world: WorldArrays, body: Body, place: Place, near: float, most: float) -> float:
     """Clearance to the solids near the body, exact below `near`; at most the buckets' reach.
 
@@ -237,19 +262,15 @@ def near_clearance(world: WorldArrays, body: Body, place: Place, near: float, mo
     m_y = y + s * body.middle_x + c * body.middle_y
     # A solid in no list of this cell is at least that far away from a body whose middle is here.
     best = min(buckets.reach, most)
-    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
-    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
-    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+    k = bucket_of(buckets, m_x, m_y)
+    if k < 0:
         return best
-    k = j * buckets.columns + i
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
-        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
-        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
         # The upright box around a solid against the disc around the body: what cannot be nearer
         # than the nearest so far is passed over before any axis is computed.
         away = best + body.reach
-        if d_x * d_x + d_y * d_y >= away * away:
+        if square_to_plate(solids, p, m_x, m_y) >= away * away:
             continue
         for b in range(body.first.shape[0] - 1):
             clearance, _, _ = piece_clearance(body, b, place, solids, p, near, best)
@@ -381,18 +402,14 @@ def near_step(
     # The step may at first be longer than the motion, so that solids up to `near` are looked at and
     # the bound of the clearance that is returned means something at the end of a motion, too.
     step = min(max(most, near / speed), nearest / speed)
-    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
-    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
-    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+    k = bucket_of(buckets, m_x, m_y)
+    if k < 0:
         return min(step, most), nearest
-    k = j * buckets.columns + i
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
-        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
-        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
         # A solid further away than this cannot shorten the step: it is passed over before any axis.
         away = step * speed + keep + body.reach
-        if d_x * d_x + d_y * d_y >= away * away:
+        if square_to_plate(solids, p, m_x, m_y) >= away * away:
             continue
         for b in range(body.first.shape[0] - 1):
             enough = step * speed + keep

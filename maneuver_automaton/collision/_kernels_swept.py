@@ -11,7 +11,7 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
-from maneuver_automaton.collision._kernels_clearance import separation
+from maneuver_automaton.collision._kernels_clearance import bucket_of, separation, square_to_plate
 from maneuver_automaton.collision.arrays import Place, SweptAreas, WorldArrays
 from maneuver_automaton.collision.body import Body
 
@@ -157,17 +157,13 @@ def not_parted(
         return UNKNOWN
     m_x = x + c * swept.places[motion, 0] - s * swept.places[motion, 1]
     m_y = y + s * swept.places[motion, 0] + c * swept.places[motion, 1]
-    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
-    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
-    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+    k = bucket_of(buckets, m_x, m_y)
+    if k < 0:
         return FREE
-    k = j * buckets.columns + i
     n_pieces = body.first.shape[0] - 1
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
-        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
-        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
-        if d_x * d_x + d_y * d_y >= reach * reach:
+        if square_to_plate(solids, p, m_x, m_y) >= reach * reach:
             continue
         for b in range(n_pieces):
             wanted = enough + body.radius[b] + solids.plates[p, 4]
