@@ -73,7 +73,7 @@ def compile_sooner() -> None:
         (base.BaseContext, "refresh", where_something_is_new),
         (context.BaseContext, "refresh", where_something_is_new),
         (context.BaseContext, "find_matching_getattr_template", functools.cache),
-        (errors.WarningsFixer, "catch_warnings", without_context),
+        (errors.WarningsFixer, "catch_warnings", without_context),  # type: ignore[attr-defined]
         (ir.Inst, "_rec_list_vars", variables_in),
         (lowering, "new_error_context", without_context),
         (targetconfig.TargetConfig, "__hash__", one_for_all),
