@@ -7,6 +7,7 @@ import numpy as np
 from maneuver_automaton._compile import kernel
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.collision._kernels_advancement import free_time
+from maneuver_automaton.collision._kernels_moving import coast_of
 from maneuver_automaton.collision.body import fastest_points
 from maneuver_automaton.collision.world import World, own_frame, world_of
 from maneuver_automaton.groups import SE2
@@ -39,25 +40,9 @@ def moved(obstacles, by: SE2):
 
 
 @kernel
-def _free_times_and_clearances(
-    world, body, poses, twists, speeds, durations, keep, margin, clocks, out
-):
-    for k in range(durations.shape[0]):
-        out[k, 0], out[k, 1] = free_time(
-            world,
-            body,
-            poses[k, 0],
-            poses[k, 1],
-            poses[k, 2],
-            twists[k, 0],
-            twists[k, 1],
-            twists[k, 2],
-            speeds[k],
-            durations[k],
-            keep,
-            margin,
-            clocks[k],
-        )
+def _free_times_and_clearances(world, body, motions, keep, margin, out):
+    for k in range(motions.shape[0]):
+        out[k, 0], out[k, 1] = free_time(world, body, coast_of(motions, k), keep, margin)
 
 
 def free_times_and_clearances(
@@ -67,11 +52,11 @@ def free_times_and_clearances(
     twists = np.array(twists, dtype=np.float64)
     n = len(twists)
     out = np.empty((n, 2))
-    durations = np.array(np.broadcast_to(np.asarray(durations, dtype=np.float64), n))
-    clocks = np.array(np.broadcast_to(np.asarray(times, dtype=np.float64), n))
+    durations, clocks = (np.broadcast_to(one, n) for one in (durations, times))
     speeds = fastest_points(world.body, twists)
-    _free_times_and_clearances(world.arrays, world.body, np.array(poses), twists, speeds, durations,
-                         keep, margin, clocks, out)  # fmt: skip
+    motions = np.column_stack([poses, twists[:, :3], speeds, durations, clocks])
+    _free_times_and_clearances(world.arrays, world.body, np.ascontiguousarray(motions, dtype=float),
+                               keep, margin, out)  # fmt: skip
     return out
 
 

@@ -78,18 +78,19 @@ def _place(ways: Ways, element: int, share: float) -> tuple[complex, complex]:
 def _near(
     ways: Ways,
     body: BodyOutline,
-    a: complex,
-    b: complex,
-    radius: float,
-    element: int,
-    lasting: float,
-    place: complex,
-    turn: complex,
-    then: complex,
-    turned: complex,
+    edge: tuple[complex, complex, float],
+    stretch: tuple[int, float],
+    poses: tuple[complex, complex, complex, complex],
     doubt: float,
 ) -> _Bounds:
-    """What is known of an edge, while the frame moves from a place to another in `lasting` [s]."""
+    """What is known of an edge, while the frame moves from a pose to another.
+
+    An `edge` is its ends and its radius, a `stretch` the element that it is part of and how long it
+    lasts [s]; `poses` are places and directions.
+    """
+    a, b, radius = edge
+    element, lasting = stretch
+    place, turn, then, turned = poses
     eighth = 0.125 * lasting * lasting
     off, off_by_reach = eighth * ways.bend[element], eighth * ways.swerve[element]
     chord, least, begin, end = math.inf, math.inf, math.inf, math.inf
@@ -129,18 +130,18 @@ def _nearest(
     body: BodyOutline,
     edges: Outline,
     spans: Spans,
-    place: NDArray[np.complex128],
-    turn: NDArray[np.complex128],
-    span: IntArray,
-    edge: IntArray,
-    doubt: float,
-    enough: float,
-    contact: float,
+    poses: tuple[NDArray[np.complex128], NDArray[np.complex128]],
+    pairs: tuple[IntArray, IntArray],
+    limits: tuple[float, float, float],
 ) -> StillClearance:
     """The least clearance over pairs of stretches and edges, by number.
 
-    Places (2, s) and directions of the body are those as stretches begin and end.
+    Places (2, s) and directions of the body are those as stretches begin and end; `limits` are
+    those of `nearest_still`.
     """
+    place, turn = poses
+    span, edge = pairs
+    doubt, enough, contact = limits
     element, begin, end = spans.element, spans.begin, spans.end
     middle = body.middle
     # From discs around the body: the pair that may be the nearest comes first.
@@ -167,17 +168,15 @@ def _nearest(
             continue
         s, j = span[k], edge[k]
         here = element[s]
-        a, b, radius = edges.begins[j], edges.ends[j], edges.radius[j]
+        one = (edges.begins[j], edges.ends[j], edges.radius[j])
         now, at, towards = begin[s], place[0, s], turn[0, s]
         ends[0], places[0], turns[0], levels[0] = end[s], place[1, s], turn[1, s], 0
         waiting = 1
         while waiting > 0:
             top = waiting - 1
             lasting = (ends[top] - now) * ways.lengths[here]
-            near = _near(
-                ways, body, a, b, radius, here, lasting,
-                at, towards, places[top], turns[top], doubt,
-            )  # fmt: skip
+            passed = (at, towards, places[top], turns[top])
+            near = _near(ways, body, one, (here, lasting), passed, doubt)
             if near.chord <= 0.0:
                 return StillClearance(0.0, 0.0, here, now, True)
             if near.begin < measured:
@@ -250,14 +249,12 @@ def nearest_still(
     edges: Outline,
     index: EdgeBoxes,
     spans: Spans,
-    doubt: float,
-    enough: float,
-    contact: float,
+    limits: tuple[float, float, float],
 ) -> StillClearance:
     """The least clearance of a body over stretches of time to edges, of which there is one.
 
-    ``doubt`` [m] is taken off all bounds, ``enough`` is the clearance that decides, and what is
-    nearer than ``contact`` touches.
+    Of the limits [m] the first is taken off all bounds, the second is the clearance that decides,
+    and what is nearer than the third touches.
     """
     stretches = spans.element.size
     place = np.empty((2, stretches), dtype=np.complex128)
@@ -308,10 +305,8 @@ def nearest_still(
         if len(edge) == 0:
             within *= FURTHER
             continue
-        found = _nearest(
-            ways, body, edges, spans, place, turn,
-            np.array(span), np.array(edge), doubt, enough, contact,
-        )  # fmt: skip
+        pairs = (np.array(span), np.array(edge))
+        found = _nearest(ways, body, edges, spans, (place, turn), pairs, limits)
         if found.touches or found.measured <= within:
             return found
         within = found.measured

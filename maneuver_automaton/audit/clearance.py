@@ -65,7 +65,7 @@ def least_clearance(
         ways = Ways(own.series, lengths, own.speed, own.bend, own.swerve, body.offset)
         doubt = body.doubt * (1.0 + outline.most_reach)
         edges = around.outline, around.index
-        found = nearest_still(ways, outline, *edges, spans, doubt, enough, CONTACT)
+        found = nearest_still(ways, outline, *edges, spans, (doubt, enough, CONTACT))
         if not found.touches:
             least = _at(body, found.distance, found.measured, found.element, found.share)
             if not around.movers.motions:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from maneuver_automaton._arrays import IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.bounds._kernels_dual import LANES, gather
+from maneuver_automaton.bounds._kernels_dual import LANES, Nodes, gather
 from maneuver_automaton.bounds.arrays import Single
 
 ROWS = 48  # of the array `w`
@@ -121,12 +121,10 @@ def lower_nodes(
     w: Single,
     room: Single,
     base: NDArray[np.int32],
-    at: np.uint64,
-    first: np.uint64,
-    over_x: np.uint64,
-    over_y: np.uint64,
+    nodes: Nodes,
 ) -> None:
     """The room of nodes becomes the lesser of itself and that in a block."""
+    at, first, over_x, over_y = nodes
     row = np.uint64(LANES)
     for k in range(row):
         n = np.uint64(base[at + k]) + first
@@ -165,8 +163,8 @@ def room_above(
     for block in range(base.size // LANES):
         at = np.uint64(block * LANES)
         for m in range(side.size):
-            first = np.uint64(gear[m] * size)
-            gather(w, value, base, at, first, over_x, over_y)
+            nodes = (at, np.uint64(gear[m] * size), over_x, over_y)
+            gather(w, value, base, nodes)
             for q in range(4):
                 begin = np.uint64((m * 4 + q) * layers)
                 to = np.uint64((20 + q) * LANES)
@@ -190,7 +188,7 @@ def room_above(
                     lower_row(w, 32 + upper, 40 + here + upper)
                     lower_row(w, 34 + 2 * upper, 40 + beside_x + upper)
                     lower_row(w, 35 + 2 * upper, 40 + beside_y + upper)
-            lower_nodes(w, room, base, at, first, over_x, over_y)
+            lower_nodes(w, room, base, nodes)
 
 
 @bare_kernel

@@ -12,6 +12,8 @@ the turn, 32 to 43 what differences 8 to 19 get back.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,9 @@ from maneuver_automaton.bounds.arrays import Rows, Single
 
 LANES = 64  # cells of a block
 ROWS = 44  # of the array `w`
+
+# The first cell of a block, the first node of its gear, and how far apart neighbours lie along x, y
+Nodes: TypeAlias = tuple[np.uint64, np.uint64, np.uint64, np.uint64]
 
 
 @bare_inner_kernel
@@ -130,12 +135,10 @@ def gather(
     w: Single,
     x: Single,
     base: NDArray[np.int32],
-    at: np.uint64,
-    first: np.uint64,
-    over_x: np.uint64,
-    over_y: np.uint64,
+    nodes: Nodes,
 ) -> None:
     """Values at the corners of a block of cells, and their differences."""
+    at, first, over_x, over_y = nodes
     row = np.uint64(LANES)
     one = np.uint64(1)
     for k in range(row):
@@ -162,12 +165,10 @@ def scatter(
     w: Single,
     back: Single,
     base: NDArray[np.int32],
-    at: np.uint64,
-    first: np.uint64,
-    over_x: np.uint64,
-    over_y: np.uint64,
+    nodes: Nodes,
 ) -> None:
     """Add what the differences get back to the nodes."""
+    at, first, over_x, over_y = nodes
     row = np.uint64(LANES)
     one = np.uint64(1)
     for k in range(row):
@@ -216,9 +217,9 @@ def dual_step(
     for block in range(base.size // LANES):
         at = np.uint64(block * LANES)
         for m in range(families):
-            first = np.uint64(rows.gear[m] * size)
+            nodes = (at, np.uint64(rows.gear[m] * size), over_x, over_y)
             if m == 0 or rows.gear[m - 1] != rows.gear[m]:
-                gather(w, x, base, at, first, over_x, over_y)
+                gather(w, x, base, nodes)
             for q in range(7):
                 begin = np.uint64((m * 7 + q) * layers)
                 to = np.uint64((20 + q) * LANES)
@@ -242,7 +243,7 @@ def dual_step(
             if m + 1 < families and rows.gear[m + 1] == rows.gear[m]:
                 scale(w, 16, 20, np.float32(1.0) / rows.turn[m])
             else:
-                scatter(w, back, base, at, first, over_x, over_y)
+                scatter(w, back, base, nodes)
 
 
 @bare_kernel

@@ -14,8 +14,8 @@ from maneuver_automaton.collision._kernels_clearance import (
     near_step,
     static_clearance,
 )
-from maneuver_automaton.collision._kernels_moving import free_of_moving, moving_clearance
-from maneuver_automaton.collision.arrays import WorldArrays
+from maneuver_automaton.collision._kernels_moving import coast_of, free_of_moving, moving_clearance
+from maneuver_automaton.collision.arrays import AboutCenter, Coast, Place, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 
@@ -24,35 +24,20 @@ FLAT = 1e5  # [m] radius beyond which an arc is not counted from its centre
 
 @bare_shared_kernel
 def free_time(
-    world: WorldArrays,
-    body: Body,
-    x: float,
-    y: float,
-    heading: float,
-    v_x: float,
-    v_y: float,
-    turn_rate: float,
-    speed: float,
-    duration: float,
-    keep: float,
-    margin: float,
-    clock: float,
+    world: WorldArrays, body: Body, motion: Coast, keep: float, margin: float
 ) -> tuple[float, float]:
-    """How long a motion from a pose is proven free, at most `duration`; and the last clearance.
+    """How long a motion is proven free, at most its duration; and the last clearance.
 
-    No point of the body is faster than `speed`. The clearance is more than `keep + margin` wherever
-    it is looked at, and more than `keep` in between. The world's time at the start is `clock`; a
-    negative `duration` drives, and dates, the motion backwards.
+    The clearance is more than `keep + margin` wherever it is looked at, and more than `keep` in
+    between.
     """
-    free, clearance = free_of_static(
-        world, body, x, y, heading, v_x, v_y, turn_rate, speed, duration, keep, margin
-    )
+    free, clearance = free_of_static(world, body, motion, keep, margin)
     # Where it begins too near to a solid, there is nothing left to prove.
     if world.moving.speed.shape[0] > 0 and (free > 0.0 or clearance > margin):
+        x, y, heading, v_x, v_y, turn_rate, speed, duration, clock = motion
         t = free if duration >= 0.0 else -free
-        lasts, nearest = free_of_moving(
-            world.moving, body, x, y, heading, v_x, v_y, turn_rate, speed, t, keep, margin, clock
-        )
+        begun = Coast(x, y, heading, v_x, v_y, turn_rate, speed, t, clock)
+        lasts, nearest = free_of_moving(world.moving, body, begun, keep, margin)
         clearance = min(clearance, nearest) if lasts == free else nearest
         free = lasts
     return free, clearance
@@ -60,20 +45,10 @@ def free_time(
 
 @bare_inner_kernel
 def free_of_static(
-    world: WorldArrays,
-    body: Body,
-    x: float,
-    y: float,
-    heading: float,
-    v_x: float,
-    v_y: float,
-    turn_rate: float,
-    speed: float,
-    duration: float,
-    keep: float,
-    margin: float,
+    world: WorldArrays, body: Body, motion: Coast, keep: float, margin: float
 ) -> tuple[float, float]:
     """How long a motion is proven free of static obstacles, as `free_time`; the last clearance."""
+    x, y, heading, v_x, v_y, turn_rate, speed, duration, _ = motion
     # Backwards in time the same poses are passed in the other order: only velocities change their
     # sign, and the clock runs down.
     sign = 1.0 if duration >= 0.0 else -1.0
@@ -96,6 +71,7 @@ def free_of_static(
     # Beyond that radius the centre loses digits: poses come from `coast`, and no axis is followed.
     if flat and turn_rate != 0.0:
         turning = math.inf
+    course = AboutCenter(center_x, center_y, w_x, w_y, turning)
     # The state of the loop: all before time `t` is proven; (p_x, p_y, p_heading) with cosine and
     # sine (c, s) is the pose at `t`; `nearest` is the least bound of the clearance met so far at
     # the last pose.
@@ -116,7 +92,8 @@ def free_of_static(
                 p_y = center_y - (c * v_x - s * v_y) / turn_rate
         # The order of the tests: the field, a few look-ups, decides most poses in the open. Solids
         # are asked where it does not.
-        clearance = field_bound(world.field, body, p_x, p_y, c, s)
+        place = Place(p_x, p_y, c, s)
+        clearance = field_bound(world.field, body, place)
         if clearance > keep + near:
             nearest = clearance - keep
             # The proof of this step: no point of the body is faster than `speed`, so none comes
@@ -124,23 +101,7 @@ def free_of_static(
             step = nearest / speed if speed > 0.0 else math.inf
         else:
             step, nearest = near_step(
-                world.buckets,
-                world.solids,
-                body,
-                p_x,
-                p_y,
-                c,
-                s,
-                center_x,
-                center_y,
-                w_x,
-                w_y,
-                turning,
-                speed,
-                keep,
-                margin,
-                near,
-                length - t,
+                world, body, place, course, speed, keep, margin, near, length - t
             )
             if step < 0.0:
                 return t, nearest
@@ -152,35 +113,11 @@ def free_of_static(
 
 
 @kernel
-def free_times(
-    world: WorldArrays,
-    body: Body,
-    poses: Array,
-    twists: Array,
-    speeds: Array,
-    durations: Array,
-    keep: float,
-    margin: float,
-    clocks: Array,
-) -> Array:
-    """`free_time` of many motions (k,)."""
-    free = np.empty(durations.shape[0])
-    for k in range(durations.shape[0]):
-        free[k], _ = free_time(
-            world,
-            body,
-            poses[k, 0],
-            poses[k, 1],
-            poses[k, 2],
-            twists[k, 0],
-            twists[k, 1],
-            twists[k, 2],
-            speeds[k],
-            durations[k],
-            keep,
-            margin,
-            clocks[k],
-        )
+def free_times(world: WorldArrays, body: Body, motions: Array, keep: float, margin: float) -> Array:
+    """`free_time` of many motions (k, 9)."""
+    free = np.empty(motions.shape[0])
+    for k in range(motions.shape[0]):
+        free[k], _ = free_time(world, body, coast_of(motions, k), keep, margin)
     return free
 
 
@@ -190,12 +127,13 @@ def clearances(world: WorldArrays, body: Body, poses: Array, times: Array) -> Ar
     out = np.empty(poses.shape[0])
     for k in range(poses.shape[0]):
         x, y, heading = poses[k, 0], poses[k, 1], poses[k, 2]
-        best = static_clearance(world, body, x, y, math.cos(heading), math.sin(heading))
+        place = Place(x, y, math.cos(heading), math.sin(heading))
+        best = static_clearance(world, body, place)
         moving = world.moving
         for m in range(moving.speed.shape[0]):
             if not moving.present[m, 0] <= times[k] <= moving.present[m, 1]:
                 continue
-            clearance = moving_clearance(moving, m, body, x, y, heading, times[k], 0.0, best)
+            clearance = moving_clearance(moving, m, body, (x, y, heading), times[k], 0.0, best)
             best = min(best, clearance)
         out[k] = best
     return out

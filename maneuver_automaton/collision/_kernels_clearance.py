@@ -10,7 +10,14 @@ from __future__ import annotations
 import math
 
 from maneuver_automaton._compile import bare_inner_kernel
-from maneuver_automaton.collision.arrays import Buckets, Field, SweptAreas, WorldArrays
+from maneuver_automaton.collision.arrays import (
+    AboutCenter,
+    Buckets,
+    Field,
+    Place,
+    SweptAreas,
+    WorldArrays,
+)
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.collision.convex import Solids
 
@@ -44,10 +51,7 @@ def point_to_segment(x: float, y: float, ax: float, ay: float, bx: float, by: fl
 def separation(
     body: Body | SweptAreas,
     b: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
+    place: Place,
     solids: Solids,
     p: int,
     enough: float,
@@ -60,6 +64,7 @@ def separation(
     # The theorem of the separating axis: two convex polygons with an area are apart exactly if the
     # normal of an edge of one of them parts them. Every such separation is a lower bound of the
     # distance, so the largest is, and a positive one proves that they are apart.
+    x, y, c, s = place
     best, axis_x, axis_y = -math.inf, 0.0, 0.0
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
@@ -98,19 +103,17 @@ def separation(
 def core_distance(
     body: Body,
     b: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
+    place: Place,
     solids: Solids,
     p: int,
-    n_x: float,
-    n_y: float,
+    axis: tuple[float, float],
 ) -> tuple[float, float, float]:
     """Distance of two convex cores that do not overlap, and its direction towards the body.
 
-    The direction (n_x, n_y), towards the body, parts the two, or is none, (0, 0).
+    The direction `axis`, towards the body, parts the two, or is none, (0, 0).
     """
+    x, y, c, s = place
+    n_x, n_y = axis
     b_0, b_1 = body.first[b], body.first[b + 1]
     p_0, p_1 = solids.first[p], solids.first[p + 1]
     best, axis_x, axis_y = math.inf, 0.0, 0.0
@@ -174,16 +177,13 @@ def core_distance(
 def piece_clearance(
     body: Body,
     b: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
+    place: Place,
     solids: Solids,
     p: int,
     near: float,
     enough: float,
 ) -> tuple[float, float, float]:
-    """Clearance of one piece of the body at (x, y, cos, sin) to one solid, and its direction.
+    """Clearance of one piece of the body to one solid, and its direction.
 
     A lower bound; exact where it is a small share of `near`; at most 0 if they touch. Need not be
     exact above `enough`.
@@ -192,7 +192,7 @@ def piece_clearance(
     # of their cores less both radii. `enough` is asked of the rounded ones, so the cores are asked
     # for more.
     rounding = body.radius[b] + solids.plates[p, 4]
-    distance, axis_x, axis_y = separation(body, b, x, y, c, s, solids, p, enough + rounding)
+    distance, axis_x, axis_y = separation(body, b, place, solids, p, enough + rounding)
     # In front of a corner the separation of two cores is less than their distance. For sharp
     # corners that vanishes on contact; rounded cores are a radius apart there, so what they lose
     # does not, and they are made exact from further away.
@@ -203,13 +203,14 @@ def piece_clearance(
     # case, and needed: no normal parts the line from a point beyond its end.
     apart = not -math.inf < distance <= 0.0 or corners <= 3  # two points, or a point and a line
     if apart and distance - rounding <= min(exact, enough):
-        distance, axis_x, axis_y = core_distance(body, b, x, y, c, s, solids, p, axis_x, axis_y)
+        distance, axis_x, axis_y = core_distance(body, b, place, solids, p, (axis_x, axis_y))
     return distance - rounding, axis_x, axis_y
 
 
 @bare_inner_kernel
-def field_bound(field: Field, body: Body, x: float, y: float, c: float, s: float) -> float:
+def field_bound(field: Field, body: Body, place: Place) -> float:
     """Lower bound of the clearance from the distances stored at cell centres, by discs."""
+    x, y, c, s = place
     best = math.inf
     for d in range(body.discs.shape[0]):
         q_x, q_y = body.discs[d, 0], body.discs[d, 1]
@@ -232,41 +233,47 @@ def field_bound(field: Field, body: Body, x: float, y: float, c: float, s: float
 
 
 @bare_inner_kernel
-def near_clearance(
-    buckets: Buckets,
-    solids: Solids,
-    body: Body,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    near: float,
-    most: float,
-) -> float:
+def bucket_of(buckets: Buckets, x: float, y: float) -> int:
+    """The bucket that a place is in; -1 outside of all."""
+    i = math.floor((x - buckets.origin_x) / buckets.cell)
+    j = math.floor((y - buckets.origin_y) / buckets.cell)
+    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+        return -1
+    return j * buckets.columns + i
+
+
+@bare_inner_kernel
+def square_to_plate(solids: Solids, p: int, x: float, y: float) -> float:
+    """Squared distance of a place to the upright box around a solid."""
+    d_x = max(max(solids.plates[p, 0] - x, x - solids.plates[p, 2]), 0.0)
+    d_y = max(max(solids.plates[p, 1] - y, y - solids.plates[p, 3]), 0.0)
+    return d_x * d_x + d_y * d_y
+
+
+@bare_inner_kernel
+def near_clearance(world: WorldArrays, body: Body, place: Place, near: float, most: float) -> float:
     """Clearance to the solids near the body, exact below `near`; at most the buckets' reach.
 
     What is not nearer than `most` is not looked at.
     """
+    buckets, solids = world.buckets, world.solids
+    x, y, c, s = place
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     # A solid in no list of this cell is at least that far away from a body whose middle is here.
     best = min(buckets.reach, most)
-    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
-    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
-    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+    k = bucket_of(buckets, m_x, m_y)
+    if k < 0:
         return best
-    k = j * buckets.columns + i
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
-        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
-        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
         # The upright box around a solid against the disc around the body: what cannot be nearer
         # than the nearest so far is passed over before any axis is computed.
         away = best + body.reach
-        if d_x * d_x + d_y * d_y >= away * away:
+        if square_to_plate(solids, p, m_x, m_y) >= away * away:
             continue
         for b in range(body.first.shape[0] - 1):
-            clearance, _, _ = piece_clearance(body, b, x, y, c, s, solids, p, near, best)
+            clearance, _, _ = piece_clearance(body, b, place, solids, p, near, best)
             best = min(best, clearance)
             if best <= 0.0:
                 return best
@@ -319,26 +326,21 @@ def stays_above(a: float, b: float, ahead: float, turn: float, limit: float, mos
 def axis_time(
     body: Body,
     b: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    center_x: float,
-    center_y: float,
-    v_x: float,
-    v_y: float,
-    turn: float,
-    axis_x: float,
-    axis_y: float,
+    place: Place,
+    course: AboutCenter,
+    axis: tuple[float, float],
     drop: float,
     lasts: float,
     most: float,
 ) -> float:
     """How long a piece of the body stays apart along a fixed axis: until it is nearer by `drop`.
 
-    The body turns about the centre, or moves with the world velocity (v_x, v_y). Need not be exact
-    where it is `lasts` at most, which is known to hold, nor where it is `most` at least.
+    Need not be exact where it is `lasts` at most, which is known to hold, nor where it is `most` at
+    least.
     """
+    x, y, c, s = place
+    center_x, center_y, v_x, v_y, turn = course
+    axis_x, axis_y = axis
     lowest = math.inf
     b_0, b_1 = body.first[b], body.first[b + 1]
     m_x, m_y = c * axis_x + s * axis_y, c * axis_y - s * axis_x
@@ -371,18 +373,10 @@ def axis_time(
 
 @bare_inner_kernel
 def near_step(
-    buckets: Buckets,
-    solids: Solids,
+    world: WorldArrays,
     body: Body,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
-    center_x: float,
-    center_y: float,
-    v_x: float,
-    v_y: float,
-    turn: float,
+    place: Place,
+    course: AboutCenter,
     speed: float,
     keep: float,
     margin: float,
@@ -392,9 +386,11 @@ def near_step(
     """How long the motion that goes on from here stays free of what is near, at most `most` [s].
 
     Every solid keeps apart for its clearance over the body's speed, or for as long as the axis
-    between the two parts them (not asked for if `turn` is inf). Also a lower bound of the
+    between the two parts them (not asked for if the turn is inf). Also a lower bound of the
     clearance. The time is -1 if a clearance is at most `margin`.
     """
+    buckets, solids = world.buckets, world.solids
+    x, y, c, s = place
     m_x = x + c * body.middle_x - s * body.middle_y
     m_y = y + s * body.middle_x + c * body.middle_y
     near_enough = near + keep / SHARP  # clearances are exact where the distance to keep begins
@@ -406,23 +402,19 @@ def near_step(
     # The step may at first be longer than the motion, so that solids up to `near` are looked at and
     # the bound of the clearance that is returned means something at the end of a motion, too.
     step = min(max(most, near / speed), nearest / speed)
-    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
-    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
-    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+    k = bucket_of(buckets, m_x, m_y)
+    if k < 0:
         return min(step, most), nearest
-    k = j * buckets.columns + i
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
-        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
-        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
         # A solid further away than this cannot shorten the step: it is passed over before any axis.
         away = step * speed + keep + body.reach
-        if d_x * d_x + d_y * d_y >= away * away:
+        if square_to_plate(solids, p, m_x, m_y) >= away * away:
             continue
         for b in range(body.first.shape[0] - 1):
             enough = step * speed + keep
             clearance, axis_x, axis_y = piece_clearance(
-                body, b, x, y, c, s, solids, p, near_enough, enough
+                body, b, place, solids, p, near_enough, enough
             )
             clearance -= keep
             nearest = min(nearest, clearance)
@@ -434,24 +426,9 @@ def near_step(
             # wall, where the clearance hardly changes: until the lowest corner has come down by
             # the clearance above the margin.
             lasts = clearance / speed
-            if lasts < step and turn < math.inf:
+            if lasts < step and course.turn < math.inf:
                 along = axis_time(
-                    body,
-                    b,
-                    x,
-                    y,
-                    c,
-                    s,
-                    center_x,
-                    center_y,
-                    v_x,
-                    v_y,
-                    turn,
-                    axis_x,
-                    axis_y,
-                    clearance - margin,
-                    lasts,
-                    step,
+                    body, b, place, course, (axis_x, axis_y), clearance - margin, lasts, step
                 )
                 lasts = max(lasts, along)
             step = min(step, lasts)
@@ -460,13 +437,11 @@ def near_step(
 
 
 @bare_inner_kernel
-def static_clearance(
-    world: WorldArrays, body: Body, x: float, y: float, c: float, s: float
-) -> float:
+def static_clearance(world: WorldArrays, body: Body, place: Place) -> float:
     """Lower bound of the clearance to all static obstacles, at most the field's reach."""
     near = max(NEAR * body.reach, 0.25 * world.field.cell)
-    bound = field_bound(world.field, body, x, y, c, s)
+    bound = field_bound(world.field, body, place)
     if bound <= near:
-        exact = near_clearance(world.buckets, world.solids, body, x, y, c, s, near, math.inf)
+        exact = near_clearance(world, body, place, near, math.inf)
         bound = exact if exact <= 0.0 else max(bound, exact)
     return bound

@@ -7,9 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from maneuver_automaton._arrays import Array, IntArray
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
 from maneuver_automaton.collision._kernels_clearance import point_to_segment
+from maneuver_automaton.collision.arrays import Buckets, Field, Place
+from maneuver_automaton.collision.convex import Solids
 
 
 @inner_kernel
@@ -30,18 +32,11 @@ def distance_to_piece(x: float, y: float, corners: Array, first: int, last: int)
 
 
 @kernel
-def write_pieces(
-    distance: Array,
-    origin_x: float,
-    origin_y: float,
-    cell: float,
-    cap: float,
-    edges: Array,
-    first: IntArray,
-    plates: Array,
-    n: int,
-) -> None:
-    """Lower the field `distance` to that of each of `n` pieces, as far as `cap` reaches."""
+def write_pieces(field: Field, solids: Solids, n: int) -> None:
+    """Lower the distances of a field to those of each of the first `n` solids."""
+    distance, cell, cap = field.distance, field.cell, field.outside
+    origin_x, origin_y = field.origin_x, field.origin_y
+    edges, first, plates = solids.edges, solids.first, solids.plates
     rows, columns = distance.shape
     for p in range(n):
         i_0 = max(0, int((plates[p, 0] - cap - origin_x) / cell))
@@ -128,24 +123,15 @@ def to_cells(
 
 
 @kernel
-def write_map(
-    distance: Array,
-    origin_x: float,
-    origin_y: float,
-    cell: float,
-    cap: float,
-    blocked: NDArray[np.bool_],
-    resolution: float,
-    m_x: float,
-    m_y: float,
-    c: float,
-    s: float,
-) -> None:
-    """Lower the field to the exact distance of a map at (m_x, m_y, c, s), negative inside.
+def write_map(field: Field, blocked: NDArray[np.bool_], resolution: float, place: Place) -> None:
+    """Lower the distances of a field to the exact ones of a map in its place, negative inside.
 
     In two passes: along each column the rows to the nearest cell, then the least hypotenuse over
     the columns, to the cells' edges.
     """
+    distance, cell = field.distance, field.cell
+    origin_x, origin_y = field.origin_x, field.origin_y
+    m_x, m_y, c, s = place
     n_rows, n_columns = blocked.shape
     to_blocked, to_free = rows_to(blocked, True), rows_to(blocked, False)
     rows, columns = distance.shape
@@ -165,49 +151,35 @@ def write_map(
 
 
 @bare_inner_kernel
-def cells_between(low: float, high: float, origin: float, cell: float, n: int) -> tuple[int, int]:
-    """First cell of a row of `n` that an interval touches, and the one after the last."""
-    return max(0, math.floor((low - origin) / cell)), min(n, math.floor((high - origin) / cell) + 1)
+def cells_around(buckets: Buckets, plate: Array, around: float) -> tuple[int, int, int, int]:
+    """First column that a plate comes near, the one after the last, and the rows."""
+    left, right = plate[0] - around - buckets.origin_x, plate[2] + around - buckets.origin_x
+    below, above = plate[1] - around - buckets.origin_y, plate[3] + around - buckets.origin_y
+    return (
+        max(0, math.floor(left / buckets.cell)),
+        min(buckets.columns, math.floor(right / buckets.cell) + 1),
+        max(0, math.floor(below / buckets.cell)),
+        min(buckets.rows, math.floor(above / buckets.cell) + 1),
+    )
 
 
 @kernel
-def count_buckets(
-    start: IntArray,
-    plates: Array,
-    origin_x: float,
-    origin_y: float,
-    cell: float,
-    columns: int,
-    rows: int,
-    reach: float,
-) -> None:
-    """How many pieces each bucket holds, one place late: `start[k + 1]`."""
+def count_buckets(buckets: Buckets, plates: Array, around: float) -> None:
+    """How many pieces are `around` each bucket, one place late: `start[k + 1]`."""
+    start, columns = buckets.start, buckets.columns
     for p in range(plates.shape[0]):
-        plate = plates[p]
-        i_0, i_1 = cells_between(plate[0] - reach, plate[2] + reach, origin_x, cell, columns)
-        j_0, j_1 = cells_between(plate[1] - reach, plate[3] + reach, origin_y, cell, rows)
+        i_0, i_1, j_0, j_1 = cells_around(buckets, plates[p], around)
         for j in range(j_0, j_1):
             for i in range(i_0, i_1):
                 start[j * columns + i + 1] += 1
 
 
 @kernel
-def fill_buckets(
-    start: IntArray,
-    items: IntArray,
-    plates: Array,
-    origin_x: float,
-    origin_y: float,
-    cell: float,
-    columns: int,
-    rows: int,
-    reach: float,
-) -> None:
+def fill_buckets(buckets: Buckets, plates: Array, around: float) -> None:
     """Write the pieces of each bucket; `start` is moved on by the count, and must be moved back."""
+    start, items, columns = buckets.start, buckets.items, buckets.columns
     for p in range(plates.shape[0]):
-        plate = plates[p]
-        i_0, i_1 = cells_between(plate[0] - reach, plate[2] + reach, origin_x, cell, columns)
-        j_0, j_1 = cells_between(plate[1] - reach, plate[3] + reach, origin_y, cell, rows)
+        i_0, i_1, j_0, j_1 = cells_around(buckets, plates[p], around)
         for j in range(j_0, j_1):
             for i in range(i_0, i_1):
                 k = j * columns + i

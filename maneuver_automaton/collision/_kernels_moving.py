@@ -4,14 +4,22 @@ from __future__ import annotations
 
 import math
 
+from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_clearance import NEAR, SHARP, piece_clearance
 from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
-from maneuver_automaton.collision.arrays import MovingObstacles
+from maneuver_automaton.collision.arrays import Coast, MovingObstacles, Place
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 
 SOON = 1e-11  # [s] a knot that is nearer in time counts as reached: in it nothing moves 1e-9 m
+
+
+@bare_inner_kernel
+def coast_of(motions: Array, k: int) -> Coast:
+    """One of several motions (n, 9)."""
+    row = motions[k]
+    return Coast(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
 
 
 @bare_inner_kernel
@@ -60,18 +68,18 @@ def closing_of(
     moving: MovingObstacles,
     m: int,
     body: Body,
+    motion: Coast,
     heading: float,
-    v_x: float,
-    v_y: float,
-    turn_rate: float,
     time: float,
-    sign: float,
     most: float,
 ) -> tuple[float, float]:
     """How fast a body and an obstacle come together at most, and for how long that holds.
 
-    It holds to the next knot, no longer than `most` [s]. `sign` is the direction of time.
+    Seen at a `time` of the motion, when the body has a `heading`. It holds to the next knot, no
+    longer than `most` [s].
     """
+    v_x, v_y, turn_rate = motion.v_x, motion.v_y, motion.turn_rate
+    sign = 1.0 if motion.duration >= 0.0 else -1.0  # the direction of time
     k_0, last = moving.first_knot[m], moving.first_knot[m + 1] - 1
     m_x, m_y, m_turn, m_bend = 0.0, 0.0, 0.0, 0.0
     # A knot that is reached just now belongs to what comes next, in either direction.
@@ -113,9 +121,7 @@ def moving_clearance(
     moving: MovingObstacles,
     m: int,
     body: Body,
-    x: float,
-    y: float,
-    heading: float,
+    pose: tuple[float, float, float],
     time: float,
     keep: float,
     enough: float,
@@ -124,6 +130,7 @@ def moving_clearance(
 
     Exact around the distance `keep` too.
     """
+    x, y, heading = pose
     o_x, o_y, o_heading = obstacle_pose(moving, m, time)
     d_x, d_y = x - o_x, y - o_y
     # Discs around both frames first: an obstacle far away costs no cosine.
@@ -142,13 +149,13 @@ def moving_clearance(
     best = math.sqrt(m_x * m_x + m_y * m_y) - body.reach - moving.reach[m]
     if best > enough:
         return best
-    best = math.inf
+    best, seen = math.inf, Place(r_x, r_y, c, s)
     # Exact where the distance to keep begins, as in `near_step`.
     near = NEAR * (body.reach + moving.reach[m]) + keep / SHARP
     for p in range(moving.first_piece[m], moving.first_piece[m + 1]):
         for b in range(body.first.shape[0] - 1):
             clearance, _, _ = piece_clearance(
-                body, b, r_x, r_y, c, s, moving.solids, p, near, min(best, enough)
+                body, b, seen, moving.solids, p, near, min(best, enough)
             )
             best = min(best, clearance)
             if best <= 0.0:
@@ -158,19 +165,7 @@ def moving_clearance(
 
 @bare_inner_kernel
 def free_of_moving(
-    moving: MovingObstacles,
-    body: Body,
-    x: float,
-    y: float,
-    heading: float,
-    v_x: float,
-    v_y: float,
-    turn_rate: float,
-    speed: float,
-    duration: float,
-    keep: float,
-    margin: float,
-    clock: float,
+    moving: MovingObstacles, body: Body, motion: Coast, keep: float, margin: float
 ) -> tuple[float, float]:
     """How long a motion is proven free of moving obstacles, as `free_time`; the last clearance.
 
@@ -178,13 +173,14 @@ def free_of_moving(
     the body never comes as near to them as it would stop at. Each of the others is followed by
     itself, as long as it is there.
     """
+    x, y, heading, v_x, v_y, turn_rate, speed, duration, clock = motion
     sign = 1.0 if duration >= 0.0 else -1.0
     free, nearest = abs(duration), math.inf
     n, slabs = moving.speed.shape[0], moving.slabs
     during, swept = (0, 0), (0.0, 0.0, 0.0, 0.0)
     if slabs.leaves > 0:
         during = slabs_during(slabs, clock, duration)
-        swept = swept_box(body, x, y, heading, v_x, v_y, turn_rate, duration)
+        swept = swept_box(body, motion)
     for m in range(n):
         if slabs.leaves > 0:
             apart = apart_during(slabs, n, m, during, swept) - body.reach - keep
@@ -204,22 +200,20 @@ def free_of_moving(
         stands = high <= moving.time[first] or low >= moving.time[last]
         fast = speed if stands else speed + moving.speed[m]
         while True:
-            p_x, p_y, p_heading = x, y, heading
+            pose = (x, y, heading)
             if t > 0.0:
                 d_x, d_y, turn = coast(v_x, v_y, turn_rate, sign * t)
-                p_x, p_y, p_heading = compose(x, y, heading, d_x, d_y, turn)
+                pose = compose(x, y, heading, d_x, d_y, turn)
             time, left = clock + sign * t, end - t
             shrinks = fast * left if fast > 0.0 else 0.0  # until the end, at most
             enough = keep + margin + shrinks
-            clearance = moving_clearance(moving, m, body, p_x, p_y, p_heading, time, keep, enough)
+            clearance = moving_clearance(moving, m, body, pose, time, keep, enough)
             clearance -= keep
             if clearance <= margin:
                 free, nearest = t, clearance
                 break
             if clearance - shrinks <= margin:
-                closing, lasting = closing_of(
-                    moving, m, body, p_heading, v_x, v_y, turn_rate, time, sign, left
-                )
+                closing, lasting = closing_of(moving, m, body, motion, pose[2], time, left)
                 shrinks = closing * left if closing > 0.0 else 0.0
                 if lasting < left or clearance - shrinks <= margin:
                     step = min(clearance / closing, lasting) if closing > 0.0 else lasting

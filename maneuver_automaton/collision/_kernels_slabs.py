@@ -12,7 +12,7 @@ import math
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.collision.arrays import MovingObstacles, Slabs
+from maneuver_automaton.collision.arrays import Coast, MovingObstacles, Slabs
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 
@@ -131,17 +131,9 @@ def slabs_during(slabs: Slabs, clock: float, duration: float) -> tuple[int, int]
 
 
 @bare_inner_kernel
-def swept_box(
-    body: Body,
-    x: float,
-    y: float,
-    heading: float,
-    v_x: float,
-    v_y: float,
-    turn_rate: float,
-    duration: float,
-) -> tuple[float, float, float, float]:
+def swept_box(body: Body, motion: Coast) -> tuple[float, float, float, float]:
     """Box [low x, low y, high x, high y] around the body's middle during a motion."""
+    x, y, heading, v_x, v_y, turn_rate, _, duration, _ = motion
     m_x, m_y = body.middle_x, body.middle_y
     from_x, from_y, _ = compose(x, y, heading, m_x, m_y, 0.0)
     d_x, d_y, turn = coast(v_x, v_y, turn_rate, duration)

@@ -11,8 +11,8 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, inner_kernel, kernel
-from maneuver_automaton.collision._kernels_clearance import separation
-from maneuver_automaton.collision.arrays import SweptAreas, WorldArrays
+from maneuver_automaton.collision._kernels_clearance import bucket_of, separation, square_to_plate
+from maneuver_automaton.collision.arrays import Place, SweptAreas, WorldArrays
 from maneuver_automaton.collision.body import Body
 
 WIDEST = 0.5 * math.pi  # [rad] of a turn whose tangents hold it closely
@@ -141,16 +141,14 @@ def not_parted(
     body: Body,
     swept: SweptAreas,
     motion: int,
-    x: float,
-    y: float,
-    c: float,
-    s: float,
+    place: Place,
     enough: float,
 ) -> int:
     """A solid that is not parted by more than `enough` from all that a motion covers; or FREE.
 
-    The motion begins at (x, y, cos, sin). UNKNOWN where it covers more than the buckets know.
+    The motion begins at `place`. UNKNOWN where it covers more than the buckets know.
     """
+    x, y, c, s = place
     # FREE is a proof for the whole motion: its polygons hold all that the body covers, the lists of
     # the buckets all solids within `reach`, and along an axis each is farther than `enough`.
     buckets, solids = world.buckets, world.solids
@@ -159,37 +157,31 @@ def not_parted(
         return UNKNOWN
     m_x = x + c * swept.places[motion, 0] - s * swept.places[motion, 1]
     m_y = y + s * swept.places[motion, 0] + c * swept.places[motion, 1]
-    i = math.floor((m_x - buckets.origin_x) / buckets.cell)
-    j = math.floor((m_y - buckets.origin_y) / buckets.cell)
-    if not (0 <= i < buckets.columns and 0 <= j < buckets.rows):
+    k = bucket_of(buckets, m_x, m_y)
+    if k < 0:
         return FREE
-    k = j * buckets.columns + i
     n_pieces = body.first.shape[0] - 1
     for item in range(buckets.start[k], buckets.start[k + 1]):
         p = buckets.items[item]
-        d_x = max(max(solids.plates[p, 0] - m_x, m_x - solids.plates[p, 2]), 0.0)
-        d_y = max(max(solids.plates[p, 1] - m_y, m_y - solids.plates[p, 3]), 0.0)
-        if d_x * d_x + d_y * d_y >= reach * reach:
+        if square_to_plate(solids, p, m_x, m_y) >= reach * reach:
             continue
         for b in range(n_pieces):
             wanted = enough + body.radius[b] + solids.plates[p, 4]
             piece = motion * n_pieces + b
-            apart, _, _ = separation(swept, piece, x, y, c, s, solids, p, wanted)
+            apart, _, _ = separation(swept, piece, place, solids, p, wanted)
             if not apart > wanted:
                 return int(p)
     return FREE
 
 
 @bare_inner_kernel
-def overlaps(
-    world: WorldArrays, body: Body, x: float, y: float, c: float, s: float, p: int
-) -> bool:
-    """Whether the core of the body at (x, y, cos, sin) surely overlaps that of one solid."""
+def overlaps(world: WorldArrays, body: Body, place: Place, p: int) -> bool:
+    """Whether the core of the body surely overlaps that of one solid."""
     n_corners = world.solids.first[p + 1] - world.solids.first[p]
     for b in range(body.first.shape[0] - 1):
         # Normals do not part a point from a line beyond its end, nor two points.
         if body.first[b + 1] - body.first[b] + n_corners > 3:
-            apart, _, _ = separation(body, b, x, y, c, s, world.solids, p, 0.0)
+            apart, _, _ = separation(body, b, place, world.solids, p, 0.0)
             if apart <= 0.0:
                 return True
     return False

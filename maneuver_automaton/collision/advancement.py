@@ -35,18 +35,12 @@ def free_times(
     starts = np.atleast_2d(as_array("poses", poses, last=3))
     velocities = np.atleast_2d(as_array("twists", twists, last=3))
     n = len(starts)
-    lasting = np.array(np.broadcast_to(as_array("durations", durations), n))
-    clocks = np.array(np.broadcast_to(as_array("times", times), n))
+    lasting = np.broadcast_to(as_array("durations", durations), n)
+    clocks = np.broadcast_to(as_array("times", times), n)
+    fastest = fastest_points(world.body, velocities)
+    motions = np.column_stack([starts, velocities, fastest, lasting, clocks])
     free: Array = _kernels_advancement.free_times(
-        world.arrays,
-        world.body,
-        np.array(starts),
-        np.array(velocities),
-        fastest_points(world.body, velocities),
-        lasting,
-        keep,
-        margin,
-        clocks,
+        world.arrays, world.body, np.ascontiguousarray(motions), keep, margin
     )
     return free
 

@@ -11,6 +11,39 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.collision.convex import Solids
 
 
+class Place(NamedTuple):
+    """Where a body is: a pose, by cosine and sine of its heading."""
+
+    x: float  # [m]
+    y: float
+    c: float
+    s: float
+
+
+class Coast(NamedTuple):
+    """A constant twist from a pose on. Rows of motions (n, 9) have these fields."""
+
+    x: float  # [m]
+    y: float
+    heading: float  # [rad]
+    v_x: float  # [m/s] in the body's frame
+    v_y: float
+    turn_rate: float  # [rad/s]
+    speed: float  # [m/s] that no point of the body exceeds
+    duration: float  # [s]; a negative one drives, and dates, the motion backwards
+    clock: float  # [s] time of the world where it begins
+
+
+class AboutCenter(NamedTuple):
+    """How a body goes on from where it is: it turns about a centre, or keeps its velocity."""
+
+    center_x: float  # [m]
+    center_y: float
+    v_x: float  # [m/s] in the world
+    v_y: float
+    turn: float  # [rad/s]; 0 on a straight, inf where the centre is too far away to count from
+
+
 class Field(NamedTuple):
     """Distances to the nearest solid at cell centres, capped."""
 

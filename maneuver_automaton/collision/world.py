@@ -15,7 +15,14 @@ import numpy as np
 
 from maneuver_automaton._arrays import FEW, Array, wrapped
 from maneuver_automaton.collision import _kernels_field, _kernels_slabs
-from maneuver_automaton.collision.arrays import Buckets, Field, MovingObstacles, Slabs, WorldArrays
+from maneuver_automaton.collision.arrays import (
+    Buckets,
+    Field,
+    MovingObstacles,
+    Place,
+    Slabs,
+    WorldArrays,
+)
 from maneuver_automaton.collision.body import Body, body_of
 from maneuver_automaton.collision.convex import (
     DIGITS,
@@ -227,14 +234,14 @@ def _field(solids: Solids, listed: int, maps: list[OccupancyMap], body: Body, ke
     cap = keep + max(4.0 * body.half_width, body.inscribed, 8.0 * cell)
     columns, rows = np.ceil((width + 2.0 * cap) / cell).astype(int)
     left, below = (low - cap).tolist()
-    where = (np.full((rows, columns), cap), left, below, cell, cap)
-    _kernels_field.write_pieces(*where, solids.edges, solids.first, solids.plates, listed)
+    field = Field(np.full((rows, columns), cap), left, below, cell, cap)
+    _kernels_field.write_pieces(field, solids, listed)
     for one in maps:
         x, y, heading = one.origin.tolist()
-        turn = math.cos(heading), math.sin(heading)
+        place = Place(x, y, math.cos(heading), math.sin(heading))
         cells = np.broadcast_to(one.blocked, one.blocked.shape)  # read-only, wherever it is from
-        _kernels_field.write_map(*where, cells, one.resolution, x, y, *turn)
-    return Field(*where)
+        _kernels_field.write_map(field, cells, one.resolution, place)
+    return field
 
 
 def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
@@ -248,13 +255,13 @@ def _buckets(plates: Array, body: Body, keep: float) -> Buckets:
     cell = max(0.4 * around, math.sqrt(float(width.prod()) / MOST_BUCKETS))
     columns, rows = (int(n) for n in np.ceil(width / cell))
     start = np.zeros(rows * columns + 1, dtype=np.int64)
-    where = (plates, float(low[0]), float(low[1]), cell, columns, rows, around)
-    _kernels_field.count_buckets(start, *where)
+    where = (float(low[0]), float(low[1]), cell, columns, rows, reach)
+    _kernels_field.count_buckets(Buckets(start, start[:0], *where), plates, around)
     start = np.cumsum(start)
     items = np.empty(int(start[-1]), dtype=np.int64)
     # A copy, as the kernel moves the starts on while it fills.
-    _kernels_field.fill_buckets(start[:-1].copy(), items, *where)
-    return Buckets(start, items, float(low[0]), float(low[1]), cell, columns, rows, reach)
+    _kernels_field.fill_buckets(Buckets(start[:-1].copy(), items, *where), plates, around)
+    return Buckets(start, items, *where)
 
 
 class _Moving(NamedTuple):

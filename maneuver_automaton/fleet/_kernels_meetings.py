@@ -6,7 +6,7 @@ import math
 
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
-from maneuver_automaton.collision._kernels_moving import free_of_moving
+from maneuver_automaton.collision._kernels_moving import coast_of, free_of_moving
 from maneuver_automaton.collision._kernels_slabs import apart_during, slabs_during, swept_box
 from maneuver_automaton.collision.arrays import MovingObstacles, Slabs
 from maneuver_automaton.collision.body import Body
@@ -18,20 +18,17 @@ def first_meetings(
 ) -> None:
     """When a body first comes within `keep` of each of what moves [s]; inf if it never does.
 
-    Rows of `coasts` (n, 9) are a pose, a twist, the speed of the body's fastest point, and how long
-    and from when it coasts so. Between two looks the bodies keep `keep`, at each of them more than
+    `coasts` (n, 9) are motions. Between two looks the bodies keep `keep`, at each of them more than
     that by `margin`.
     """
     slabs, n = moving.slabs, out.shape[0]
     out[:] = math.inf
     for k in range(coasts.shape[0]):
-        x, y, heading = coasts[k, 0], coasts[k, 1], coasts[k, 2]
-        v_x, v_y, turn_rate, speed = coasts[k, 3], coasts[k, 4], coasts[k, 5], coasts[k, 6]
-        duration, clock = coasts[k, 7], coasts[k, 8]
+        motion = coast_of(coasts, k)
         during, swept = (0, 0), (0.0, 0.0, 0.0, 0.0)
         if slabs.leaves > 0:
-            during = slabs_during(slabs, clock, duration)
-            swept = swept_box(body, x, y, heading, v_x, v_y, turn_rate, duration)
+            during = slabs_during(slabs, motion.clock, motion.duration)
+            swept = swept_box(body, motion)
         for m in range(n):
             if out[m] < math.inf:
                 continue  # by an earlier coast
@@ -39,23 +36,9 @@ def first_meetings(
                 apart = apart_during(slabs, n, m, during, swept) - body.reach - keep
                 if apart > margin:
                     continue
-            free, _ = free_of_moving(
-                one_of(moving, m),
-                body,
-                x,
-                y,
-                heading,
-                v_x,
-                v_y,
-                turn_rate,
-                speed,
-                duration,
-                keep,
-                margin,
-                clock,
-            )
-            if free < duration:
-                out[m] = clock + free
+            free, _ = free_of_moving(one_of(moving, m), body, motion, keep, margin)
+            if free < motion.duration:
+                out[m] = motion.clock + free
 
 
 @bare_inner_kernel

@@ -23,6 +23,7 @@ from maneuver_automaton._compile import (
 )
 from maneuver_automaton.collision._kernels_advancement import free_of_static
 from maneuver_automaton.collision._kernels_moving import free_of_moving
+from maneuver_automaton.collision.arrays import Coast
 from maneuver_automaton.roads.arrays import (
     Clearing,
     Limits,
@@ -223,15 +224,12 @@ def free_tick(
     fastest = math.hypot(abs(v_x) + abs(w) * car.half_width, abs(v_y) + abs(w) * front)
     off, traffic = clearing.off_static, clearing.off_traffic
     # Static obstacles first: their proof costs the same however much moves on the road.
-    lasts, _ = free_of_static(
-        clearing.world, body, x, y, heading, v_x, v_y, w, fastest, duration, off, margin
-    )
+    clock = clearing.start + tick * duration
+    motion = Coast(x, y, heading, v_x, v_y, w, fastest, duration, clock)
+    lasts, _ = free_of_static(clearing.world, body, motion, off, margin)
     if lasts < duration:  # proven is what lasts for the duration itself
         return False
-    moving, clock = clearing.world.moving, clearing.start + tick * duration
-    lasts, _ = free_of_moving(
-        moving, body, x, y, heading, v_x, v_y, w, fastest, duration, traffic, margin, clock
-    )
+    lasts, _ = free_of_moving(clearing.world.moving, body, motion, traffic, margin)
     return lasts >= duration
 
 
@@ -262,9 +260,8 @@ def stays_free(horizon: RoadArrays, x: float, y: float, heading: float, tick: in
         last = max(last, horizon.goals.tick[g, 1])
     duration, clock = (last - tick) * clearing.tick, clearing.start + tick * clearing.tick
     moving, body, off = clearing.world.moving, clearing.body, clearing.off_traffic
-    lasts, _ = free_of_moving(
-        moving, body, x, y, heading, 0.0, 0.0, 0.0, 0.0, duration, off, clearing.margin, clock
-    )
+    stay = Coast(x, y, heading, 0.0, 0.0, 0.0, 0.0, duration, clock)
+    lasts, _ = free_of_moving(moving, body, stay, off, clearing.margin)
     return lasts >= duration
 
 

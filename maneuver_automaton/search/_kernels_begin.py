@@ -15,6 +15,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
+from maneuver_automaton.collision.arrays import Place
 from maneuver_automaton.collision.world import HALF_TURN, SHARE
 from maneuver_automaton.search._kernels_distance import detour_of, grid_layout, sow
 from maneuver_automaton.search._kernels_lattice import expanded
@@ -58,7 +59,8 @@ def see_ends(call: FirstCallArrays, scene: Scene, lib: LatticeArrays) -> bool:
         x, y = rounded(c * d_x - s * d_y), rounded(s * d_x + c * d_y)
         call.seen[k, 0], call.seen[k, 1], call.seen[k, 2] = x, y, heading
         world = scene.layers.first
-        clear = static_clearance(world, lib.parts.body, x, y, math.cos(heading), math.sin(heading))
+        place = Place(x, y, math.cos(heading), math.sin(heading))
+        clear = static_clearance(world, lib.parts.body, place)
         call.clear[k] = clear
         if not clear > scene.keep + call.margins.clearly:
             free = False

@@ -15,7 +15,7 @@ from maneuver_automaton._compile import bare_inner_kernel
 from maneuver_automaton.collision._kernels_advancement import free_time
 from maneuver_automaton.collision._kernels_layers import layer_world, times_between
 from maneuver_automaton.collision._kernels_swept import UNKNOWN, not_parted
-from maneuver_automaton.collision.arrays import WorldArrays
+from maneuver_automaton.collision.arrays import Coast, Place, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search.arrays import BodyArrays, LatticeArrays, Scene
@@ -125,8 +125,8 @@ def part_free(
     if begin != 0.0:
         d_x, d_y, angle = coast(v_x, v_y, turn, begin)
         x, y, heading = compose(x, y, heading, d_x, d_y, angle)
-    clock += begin
-    return free_time(world, body, x, y, heading, v_x, v_y, turn, speed, t, keep, margin, clock)
+    whole = Coast(x, y, heading, v_x, v_y, turn, speed, t, clock + begin)
+    return free_time(world, body, whole, keep, margin)
 
 
 @bare_inner_kernel
@@ -151,21 +151,11 @@ def coast_proven(
     every edge, and to choose a part and a layer copies more than the proof takes.
     """
     if is_one_in_plane(scene, lib):
-        free, clearance = free_time(
-            scene.layers.first,
-            lib.parts.body,
-            pose[0],
-            pose[1],
-            pose[2],
-            lib.library.twists[trim, 0],
-            lib.library.twists[trim, 1],
-            lib.library.twists[trim, 2],
-            lib.parts.fastest[trim],
-            t,
-            scene.keep,
-            scene.margin,
-            clock,
-        )
+        twist, fastest = lib.library.twists[trim], lib.parts.fastest[trim]
+        x, y, heading, _ = pose
+        motion = Coast(x, y, heading, twist[0], twist[1], twist[2], fastest, t, clock)
+        world = scene.layers.first
+        free, clearance = free_time(world, lib.parts.body, motion, scene.keep, scene.margin)
     else:
         free, clearance = coast_proven_everywhere(scene, lib, trim, pose, t, clock)
     return free, clearance
@@ -182,21 +172,22 @@ def edge_swept(
     """
     if not is_one_in_plane(scene, lib):
         return UNKNOWN
-    c, s = math.cos(pose[2]), math.sin(pose[2])
+    place = Place(pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2]))
     swept, enough = lib.coasts.swept, scene.keep + scene.margin
-    return not_parted(
-        scene.layers.first, lib.parts.body, swept, motion, pose[0], pose[1], c, s, enough
-    )
+    return not_parted(scene.layers.first, lib.parts.body, swept, motion, place, enough)
 
 
 @bare_inner_kernel
 def swept_end(
-    lib: LatticeArrays, motion: int, pose: tuple[float, float, float, float]
-) -> tuple[float, float]:
-    """Cosine and sine of the heading at the end of an edge of coasting."""
+    lib: LatticeArrays,
+    motion: int,
+    pose: tuple[float, float, float, float],
+    end: tuple[float, float, float, float],
+) -> Place:
+    """The end of an edge of coasting from a pose, without a cosine and a sine of its own."""
     c, s, places = math.cos(pose[2]), math.sin(pose[2]), lib.coasts.swept.places
     turn_c, turn_s = places[motion, 3], places[motion, 4]
-    return c * turn_c - s * turn_s, s * turn_c + c * turn_s
+    return Place(end[0], end[1], c * turn_c - s * turn_s, s * turn_c + c * turn_s)
 
 
 @bare_inner_kernel
@@ -320,10 +311,8 @@ def may_stay(
             at = lib.parts.offsets[p, trim]
             p_x, p_y, p_heading = compose(x, y, heading, at[0], at[1], at[2])
             body, t = part_body(lib.parts.bodies, p), until - clock
-            keep, margin = scene.keep, scene.margin
-            proven, _ = free_time(
-                world, body, p_x, p_y, p_heading, 0.0, 0.0, 0.0, 0.0, t, keep, margin, clock
-            )
+            stay = Coast(p_x, p_y, p_heading, 0.0, 0.0, 0.0, 0.0, t, clock)
+            proven, _ = free_time(world, body, stay, scene.keep, scene.margin)
             if proven < t:
                 return False
     return True

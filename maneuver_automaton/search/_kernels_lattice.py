@@ -232,15 +232,11 @@ def relax_coasts(search: LatticeSearch, node: int, upper_bound: float) -> None:
                 motion = trim * durations.shape[1] + q
                 met = edge_swept(scene, lib, motion, pose) if known else UNKNOWN
                 first = scene.layers.first
-                end_cos, end_sin = swept_end(lib, motion, pose)
+                end = swept_end(lib, motion, pose, child)
                 if met == NOTHING_MET:
-                    clearance = field_bound(first.field, lib.parts.body, n_x, n_y, end_cos, end_sin)
+                    clearance = field_bound(first.field, lib.parts.body, end)
                     clearance = max(clearance - scene.keep, scene.margin)
-                elif (
-                    met >= 0
-                    and not cut.kept
-                    and overlaps(first, lib.parts.body, n_x, n_y, end_cos, end_sin, met)
-                ):
+                elif met >= 0 and not cut.kept and overlaps(first, lib.parts.body, end, met):
                     free = 0.0
                 else:
                     clock = limits.clock + task.sign * spent

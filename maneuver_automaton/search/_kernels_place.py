@@ -13,7 +13,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel, bare_shared_kernel
 from maneuver_automaton.collision._kernels_clearance import SHARP, field_bound, near_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
-from maneuver_automaton.collision.arrays import WorldArrays
+from maneuver_automaton.collision.arrays import Place, WorldArrays
 from maneuver_automaton.collision.body import Body
 from maneuver_automaton.groups._kernels import coast, compose
 from maneuver_automaton.search._kernels_coast import (
@@ -42,12 +42,11 @@ def distance_within(
 
     The world has to know all that is nearer than `within`, as one does that keeps that distance.
     """
-    c, s = math.cos(heading), math.sin(heading)
-    if field_bound(world.field, body, x, y, c, s) >= within:
+    place = Place(x, y, math.cos(heading), math.sin(heading))
+    if field_bound(world.field, body, place) >= within:
         return within
     # Corners are looked at where a clearance is below `SHARP` times the last argument.
-    sharp = within / SHARP
-    return max(near_clearance(world.buckets, world.solids, body, x, y, c, s, sharp, within), 0.0)
+    return max(near_clearance(world, body, place, within / SHARP, within), 0.0)
 
 
 @bare_inner_kernel

@@ -39,6 +39,7 @@ from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton._compile import bare_inner_kernel, bare_kernel
 from maneuver_automaton.collision._kernels_clearance import static_clearance
 from maneuver_automaton.collision._kernels_layers import layer_world
+from maneuver_automaton.collision.arrays import Place
 from maneuver_automaton.search._kernels_connection import edge_inside, edge_proven
 from maneuver_automaton.search._kernels_distance import pop, push
 from maneuver_automaton.search._kernels_nodes import node_in, slot_of
@@ -139,12 +140,12 @@ def clearance_at(tested: Tested, pose: tuple[float, float, float, float]) -> flo
     """Clearance of the body at a pose beyond the distance to keep: a bound, exact near contact."""
     x, y, heading, z = pose
     scene, lib = tested.scene, tested.lib
-    layers, c, s = scene.layers, math.cos(heading), math.sin(heading)
+    layers, place = scene.layers, Place(x, y, math.cos(heading), math.sin(heading))
     least = scene.far
     for n in range(layers.low.shape[0] - scene.zone_trims.shape[0]):
         if layers.low[n] <= z <= layers.high[n]:
             world = layer_world(layers, n)
-            least = min(least, static_clearance(world, lib.parts.body, x, y, c, s) - scene.keep)
+            least = min(least, static_clearance(world, lib.parts.body, place) - scene.keep)
     return least
 
 

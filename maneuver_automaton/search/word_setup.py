@@ -344,7 +344,7 @@ def _library(
     chosen = set(moving[most_different(twists[moving], most_trims)].tolist())
     chosen |= set(wanted) & set(moving.tolist())
     if steers:
-        words, n_few = words_of(sorted(chosen), library.transitions)
+        words, n_few = words_of(sorted(chosen), library.transitions, library.arrays.twists)
         library = replace(library, arrays=with_words(library.arrays, words, n_few))
     upright = library.arrays.tried.climbs[: library.arrays.tried.n_upright].tolist()
     return tuple(sorted(chosen.union(upright))), library

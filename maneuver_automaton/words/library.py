@@ -283,13 +283,9 @@ def library_of(
     transitions = transitions_of(automaton, prices)
     moving = np.flatnonzero(twists[:, :3].any(axis=1))
     chosen = moving[most_different(twists[moving], MOST_TRIMS)].tolist() if trims is None else trims
-    words, n_few = words_of([int(k) for k in chosen], transitions)
-    arrays = library_arrays(
-        twists,
-        per_second,
-        transitions,
-        longest=np.array([trim.max_duration for trim in automaton.trims]),
-    )
+    words, n_few = words_of([int(k) for k in chosen], transitions, twists)
+    longest = np.array([trim.max_duration for trim in automaton.trims])
+    arrays = library_arrays(twists, per_second, transitions, longest=longest)
     return Library(
         automaton=automaton,
         trims=np.arange(m),
@@ -419,7 +415,7 @@ def moving_trims(automaton: Automaton, cost: StageCost) -> MovingTrims:
     return found
 
 
-def words_of(trims: Sequence[int], transitions: Transitions) -> tuple[IntArray, int]:
+def words_of(trims: list[int], transitions: Transitions, twists: Array) -> tuple[IntArray, int]:
     """Words of none to three of these trims, neighbours different, that transitions allow.
 
     Those of the first few trims come first; how many they are.
@@ -427,6 +423,8 @@ def words_of(trims: Sequence[int], transitions: Transitions) -> tuple[IntArray, 
     classes = transitions.class_of[list(trims)]
     joined = np.isfinite(transitions.cost)[np.ix_(classes, classes)]
     joined &= ~np.eye(len(trims), dtype=np.bool_)
+    if transitions.cost.size == 1:  # of parallel twists each follows the path of the other
+        joined &= np.cross(twists[trims, None, :3], twists[trims, :3]).any(axis=-1)
     # Words as places in the list of trims; the last place, -1, holds no trim.
     one, none = np.arange(len(trims)), np.full((joined.size * len(trims), 1), -1)
     pairs = np.argwhere(joined)

@@ -10,6 +10,7 @@ import shapely
 
 from maneuver_automaton.collision import Box, Disc, Obstacle, OccupancyMap
 from maneuver_automaton.collision._kernels_field import write_map
+from maneuver_automaton.collision.arrays import Field, Place
 from maneuver_automaton.collision.surroundings import runs_of
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
@@ -92,8 +93,11 @@ def test_a_map_is_as_far_as_its_cells(yaw):
         if not cells.blocked.any():
             continue
         distance = np.full((40, 50), 2.5)
-        where = (-3.0, -5.0, 0.2, 2.5)
-        write_map(distance, *where, cells.blocked, 0.3, 1.0, -2.0, math.cos(yaw), math.sin(yaw))
+        field, place = (
+            Field(distance, -3.0, -5.0, 0.2, 2.5),
+            Place(1.0, -2.0, math.cos(yaw), math.sin(yaw)),
+        )
+        write_map(field, cells.blocked, 0.3, place)
         x, y = -3.0 + 0.2 * (np.arange(50) + 0.5), -5.0 + 0.2 * (np.arange(40) + 0.5)
         places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
         exact = shapely_world((), [cells]).clearance(np.column_stack([places, 0 * places[:, 0]]))

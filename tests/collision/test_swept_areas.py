@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from maneuver_automaton._compile import kernel
+from maneuver_automaton._compile import inner_kernel, kernel
 from maneuver_automaton.collision._kernels_swept import FREE, UNKNOWN, not_parted, overlaps
 from maneuver_automaton.collision.advancement import swept_areas
+from maneuver_automaton.collision.arrays import Place
 from maneuver_automaton.collision.body import body_of, fastest_points
 from maneuver_automaton.groups import SE2
 from tests.collision import scenes
@@ -62,16 +63,19 @@ def test_no_pose_along_a_motion_stands_out(name, twist, duration):
             assert np.hypot(*(corners - middle).T).max() + radius <= reach + ROUNDED
 
 
+@inner_kernel
+def place_of(pose):
+    return Place(pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2]))
+
+
 @kernel
 def parted(world, body, swept, poses, enough, ends, out):
     """`not_parted` of every pose and motion, and whether what is met overlaps the end."""
     for k in range(poses.shape[0]):
         for motion in range(swept.places.shape[0]):
-            x, y, c, s = poses[k, 0], poses[k, 1], math.cos(poses[k, 2]), math.sin(poses[k, 2])
-            p = not_parted(world, body, swept, motion, x, y, c, s, enough)
+            p = not_parted(world, body, swept, motion, place_of(poses[k]), enough)
             out[k, motion, 0] = p
-            e = ends[k, motion]
-            if p >= 0 and overlaps(world, body, e[0], e[1], math.cos(e[2]), math.sin(e[2]), p):
+            if p >= 0 and overlaps(world, body, place_of(ends[k, motion]), p):
                 out[k, motion, 1] = 1
 
 
