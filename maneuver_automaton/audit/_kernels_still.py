@@ -177,19 +177,16 @@ def _nearest(
             lasting = (ends[top] - now) * ways.lengths[here]
             passed = (at, towards, places[top], turns[top])
             near = _near(ways, body, one, (here, lasting), passed, doubt)
-            if near.chord <= 0.0:
-                return StillClearance(0.0, 0.0, here, now, True)
             if near.begin < measured:
                 measured, where, share = near.begin, here, now
             if near.end < measured:
                 measured, where, share = near.end, here, ends[top]
-            undecided = near.least <= enough and enough < measured
-            if (
-                (near.least < _sharp(measured) or undecided)
-                and measured > contact
-                and levels[top] < HALVINGS
-                and halvings < MOST
-            ):
+            crosses = near.chord <= 0.0  # a chord cuts corners that the body itself may clear
+            undecided = crosses or (near.least <= enough and enough < measured)
+            sharper = measured > contact and levels[top] < HALVINGS and halvings < MOST
+            if crosses and not sharper:
+                return StillClearance(0.0, 0.0, here, now, True)
+            if sharper and (near.least < _sharp(measured) or undecided):
                 halvings += 1
                 levels[top] += 1
                 half = 0.5 * (now + ends[top])

@@ -92,7 +92,8 @@ def _at_the_limits(automaton: Automaton) -> Automaton | None:
 
 def besides(problem: Problem) -> float:
     """Cost of every plan that does not depend on its path: of resting for a fixed time."""
-    return (rest_rate(problem) or 0.0) * (problem.horizon.time or 0.0)
+    rest = rest_rate(problem) if not problem.has_inertia else None
+    return 0.0 if rest is None else rest * (problem.horizon.time or 0.0)
 
 
 def _families(per_cost: Array, *, gears: bool) -> Families:

@@ -34,6 +34,7 @@ from maneuver_automaton.planning.steps import uses_lattice
 from maneuver_automaton.planning.within_tolerance import free_aims
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
+from maneuver_automaton.refinement.fitting import MET
 from maneuver_automaton.refinement.improve import NO_WORD, Patience, WordSchedule, words_of
 from maneuver_automaton.search.lattice import FirstPlan, first_plan
 from maneuver_automaton.search.lattice_pass import plan_of_word
@@ -255,10 +256,16 @@ class FleetMember:
         if first.word is None:
             self.why_none = first.enclosed or "no path was found"
             return
+        word = first.word
+        if not self._meets(query, word):  # an exact end beside it needs other words
+            exact = self._planned(self.problem, budget, improve=False)
+            if exact.plan is not None and exact.goal_index in query.goal_index:
+                goal = query.goal_index.index(exact.goal_index)
+                word = query.word_of(self._steps(exact.plan), goal)
         if hurried:
-            self._keep(query, [first.word])
+            self._keep(query, [word])
         else:
-            self._keep_ways(query, first.word, budget, AT_ONCE)
+            self._keep_ways(query, word, budget, AT_ONCE)
         if bounded:
             exact = self.aimed is self.problem
             self.bound = lattice_bound(query) if exact else formula_bound(self.problem)
@@ -280,11 +287,25 @@ class FleetMember:
         self._keep(query, [better.word, word, *better.others, *self.ways])
 
     def _keep(self, query: LatticeQuery, words: Sequence[Word]) -> None:
-        """Keep the cheapest of some words as its ways."""
+        """Keep the cheapest of some words as its ways, of those that meet their goals."""
+        words = [one for one in words if self._meets(query, one)] or words
         words = sorted(words, key=lambda one: one.cost)
         distinct = {tuple(one.trims.tolist()): one for one in reversed(words)}
         self.ways = list(distinct.values())[::-1][:WAYS]
         self.alone = self._word_found(query, self.ways[0], self.aims)
+
+    def _meets(self, query: LatticeQuery, word: Word) -> bool:
+        """Whether the plan of a word ends at its goal as a check of it asks."""
+        goal = query.problem.goals[query.goal_index[word.goal]]
+        distance, turn = goal.off(plan_of_word(query, word).end)
+        return distance <= goal.tolerance_m + MET and turn <= goal.tolerance_rad + MET
+
+    def _steps(self, plan: Plan) -> list[tuple[int, int, float]]:
+        """The moving trims of a plan that switches at will, with their times [s]."""
+        word = word_of_plan(self.problem.automaton, plan)
+        assert word is not None
+        moving = [k for k, trim in enumerate(plan.trims) if not trim.is_rest]
+        return [(SWITCH, int(word.trims[k]), float(word.durations[k])) for k in moving]
 
     def own(self, plan: Plan, goal_index: int | None = 0, *, cost: float | None = None) -> OwnPlan:
         """A plan as its own; it has its price if no cost is given."""
@@ -429,11 +450,7 @@ class FleetMember:
         """Keep a way on which it makes room for others, to drive it at other times."""
         plan, exact = found.plan, not (self.problem.goals[0].tolerance_m or len(self.aims) > 1)
         if self.ways and exact and not self.problem.goals[0].tolerance_rad:
-            word = word_of_plan(self.problem.automaton, plan)
-            assert word is not None
-            moving = [k for k, trim in enumerate(plan.trims) if not trim.is_rest]
-            steps = [(SWITCH, int(word.trims[k]), float(word.durations[k])) for k in moving]
-            self.aside = self._query(self.aimed).word_of(steps, goal=0)
+            self.aside = self._query(self.aimed).word_of(self._steps(plan), goal=0)
 
     def _past_the_arrived(self, others: Sequence[Obstacle]) -> Problem:
         """Its problem where those that stay at their goals stand there already."""

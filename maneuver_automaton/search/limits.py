@@ -205,7 +205,7 @@ def _is_alone(prices: Array) -> bool:
 
 def rest_rate(problem: Problem) -> float | None:
     """Cost per second of the cheapest rest where it pads a fixed time; None if nothing pads."""
-    if problem.horizon.time is None or problem.has_inertia:
+    if problem.horizon.time is None:
         return None
     still = ~problem.automaton.body_velocities.any(axis=1)
     return float(problem.rates[still].min()) if still.any() else None

@@ -322,11 +322,13 @@ def candidates(
                         least += branches[branch, n] * lib.rates[words[row, n]]
                 if not least < upper_bound:
                     continue
-                cost, duration, usable = fixed, 0.0, True
+                cost, duration, usable, driven = fixed, 0.0, True, 0
                 trim, gear = start_trim, start_gear
                 for n in range(n_trims):
                     t, this = branches[branch, n], words[row, n]
                     scratch.times[count, n] = t
+                    if t > 0.0:
+                        driven += 1
                     if t > 0.0 and this < lib.n_trims:  # the turn of a free heading is no trim
                         cost += t * lib.rates[this] + price_of_switch(lib, trim, gear, this)
                         if t > lib.longest[this] or (t < lib.min_coast and trim != this):
@@ -367,7 +369,7 @@ def candidates(
                     if climb >= 0:
                         cost += t * lib.rates[climb]
                         duration += t
-                if n_trims < 3:  # fewer times than the goal has coordinates: does it meet the goal?
+                if driven < 3:  # fewer times than the goal has coordinates: does it meet the goal?
                     folded, target = (s_x, s_y, s_heading), (e_x, e_y, e_heading)
                     missed = word_misses(
                         lib, words[row], folded, facing, target, scratch.times[count]
