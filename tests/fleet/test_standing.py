@@ -192,7 +192,7 @@ def test_who_finds_no_room_goes_first_the_next_time():
     assert verify_fleet(fleet, {fleet.names[k]: one.plan for k, one in driven.items()}).passed
 
 
-@pytest.mark.parametrize("off", (4e-10, 3.6e-9))
+@pytest.mark.parametrize("off", [4e-10, 3.6e-9])
 def test_headings_of_few_digits_are_met_exactly(off):
     one = Problem(reeds_shepp(), [0.0, 0.0, 0.0], [20.0, 20.0 * off, off], footprint=BODY)
     two = Problem(reeds_shepp(), [5.0, 9.0, 0.0], [5.0, 9.0, 0.0], footprint=BODY)
