@@ -258,10 +258,10 @@ class FleetMember:
             return
         word = first.word
         if not self._meets(query, word):  # an exact end beside it needs other words
-            exact = self._planned(self.problem, budget, improve=False)
-            if exact.plan is not None and exact.goal_index in query.goal_index:
-                goal = query.goal_index.index(exact.goal_index)
-                word = query.word_of(self._steps(exact.plan), goal)
+            found = self._planned(self.problem, budget, improve=False)
+            if found.plan is not None and found.goal_index in query.goal_index:
+                goal = query.goal_index.index(found.goal_index)
+                word = query.word_of(self._steps(found.plan), goal)
         if hurried:
             self._keep(query, [word])
         else:
