@@ -410,18 +410,14 @@ def late_at_first(query: LatticeQuery) -> LatticeQuery:
 
 
 def _steered_freely(problem: Problem) -> Problem | None:
-    """The problem without prices of steering at rest, and of switches where maneuvers make them.
-
-    None where there is none to pay.
-    """
+    """The problem without prices of steering at rest and of maneuvers' switches; None if free."""
     automaton, cost, terms = problem.automaton, problem.cost, terms_of(problem.cost)
     if 0.0 < getattr(automaton.model, "steering_at_rest", 0.0) < math.inf:
         automaton = _without_price_at_rest(automaton)
     if automaton.maneuvers and terms is not None and prices_switches(terms):
         cost = replace(terms, switch=0.0, direction_change=0.0)
-    if automaton is problem.automaton and cost is problem.cost:
-        return None
-    return replace(problem, automaton=automaton, cost=cost)
+    free = automaton is problem.automaton and cost is problem.cost
+    return None if free else replace(problem, automaton=automaton, cost=cost)
 
 
 @kept_by_first

@@ -187,8 +187,7 @@ def _states(
         return None
     rows = []  # state, target, edge, cost
     for e, k in enumerate(arrays.edges.maneuver.tolist()):
-        driven = problem.velocities_along(automaton.maneuvers[k])
-        signs = np.sign(driven[:, 0])
+        signs = np.sign(problem.velocities_along(automaton.maneuvers[k])[:, 0])
         signs = signs[signs != 0.0].astype(int)
         for gear in range(directed):
             before, after = (0, 1, -1)[gear], gear
