@@ -11,9 +11,9 @@ import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
-from maneuver_automaton.automaton.headings import origin_of
 from maneuver_automaton.costs import StageCost, terms_of
-from maneuver_automaton.problem import Goal, Problem
+from maneuver_automaton.problem import Problem
+from maneuver_automaton.search.word_setup import maneuver_prices
 from maneuver_automaton.words.library import (
     NO_TRIM,
     STRAIGHT,
@@ -135,8 +135,8 @@ def stands_for_more(problem: Problem) -> bool:
 def trims_of(library: Library, cost: StageCost) -> PricedTrims:
     """All trims of an automaton, whatever leads from one to the other.
 
-    Where maneuvers do, prices of switches and changes of direction are left to whoever compares
-    plans.
+    Where maneuvers do, each has the price of the switch to it and of those within it; a switch to a
+    coast, and a change of direction between two maneuvers, are left to whoever compares plans.
     """
     rest = None
     if library.automaton.is_kinematic:
@@ -162,15 +162,9 @@ def _with_prices(arrays: LibraryArrays, cost: StageCost) -> LibraryArrays:
 
 
 def priced_library(automaton: Automaton, cost: StageCost) -> Library:
-    """All trims and maneuvers of an automaton, priced by a cost."""
-    origin = origin_of(automaton, automaton.trims[0])
-    rest = automaton.trims[0].name
-    known = Problem(automaton, origin, Goal(pose=origin, trim=rest), start_trim=rest, cost=cost)
-    return library_of(
-        automaton,
-        rates=known.rates,
-        maneuver_costs=[known.maneuver_cost(maneuver) for maneuver in automaton.maneuvers],
-    )
+    """All trims and maneuvers of an automaton, priced by a cost: a maneuver with its switches."""
+    rates = cost.rates(automaton.controls, automaton.body_velocities)
+    return library_of(automaton, rates=rates, maneuver_costs=maneuver_prices(automaton, cost))
 
 
 def is_mirrored(twists: Array, rates: Array) -> bool:

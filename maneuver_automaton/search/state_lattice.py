@@ -187,16 +187,14 @@ def _states(
         return None
     rows = []  # state, target, edge, cost
     for e, k in enumerate(arrays.edges.maneuver.tolist()):
-        driven = problem.velocities_along(automaton.maneuvers[k])
-        signs = np.sign(driven[:, 0])
+        signs = np.sign(problem.velocities_along(automaton.maneuvers[k])[:, 0])
         signs = signs[signs != 0.0].astype(int)
-        price = float(arrays.edges.cost[e]) + cost.switching(driven) + cost.switch
         for gear in range(directed):
             before, after = (0, 1, -1)[gear], gear
             if len(signs) and directed > 1:
                 after = {1: 1, -1: 2}[int(signs[-1])]
             turns = bool(len(signs) and before and before != signs[0])
-            paid = price + cost.direction_change * turns
+            paid = float(arrays.edges.cost[e]) + cost.direction_change * turns
             rows.append(
                 (int(source[e]) * directed + gear, int(target[e]) * directed + after, e, paid)
             )

@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import UNLIMITED
 from maneuver_automaton.collision import Box, Disc, Motion, Obstacle, Polygon
 from maneuver_automaton.costs import Cost
@@ -195,6 +197,8 @@ def test_a_connection_ends_at_a_goal_and_costs_what_it_says(name):
 ORDER = """
 import hashlib, math
 from dataclasses import replace
+from maneuver_automaton.automaton import Plan
+from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.budget import UNLIMITED
 from tests.search.test_lattice import PROBLEMS, TIGHT, grown, query_of
 from maneuver_automaton.search.lattice import first_plan
@@ -245,3 +249,16 @@ def test_joined_and_priced_by_hand():
     assert word.durations.tolist() == [1.5, 2.0, 1.0]
     assert with_cost(word, query).cost == pytest.approx(4.5 + 2 * 0.2 + 2 * 0.7)
     assert with_cost(query.word_of([], 0), query).cost == 0.0
+
+
+def test_a_maneuver_is_searched_at_the_price_of_its_switches():
+    """The search prefers few maneuvers where switches cost something: one to each, as in a plan."""
+    automaton, still = load_stock_library("hovercraft"), [0.0, 0.0, 0.0]
+    problem = Problem(automaton, still, [9.0, 3.0, 0.5], cost=PRICES)
+    library = query_of(problem).library
+    edges = library.arrays.edges
+    for maneuver, cost in zip(edges.maneuver[:9], edges.cost[:9], strict=True):
+        one = library.priced.automaton.maneuvers[maneuver]
+        ends = (automaton[one.source], automaton[one.target])
+        alone = Plan(still, ends, durations=[0.0, 0.0], maneuvers=(one,))
+        assert cost == pytest.approx(problem.cost_of(alone) + PRICES.switch)
