@@ -94,7 +94,7 @@ def trims_at_will(
     arrays = library_arrays(four_columns(twists), rates, identities(automaton), trims=trims)
     with np.errstate(divide="ignore", invalid="ignore"):
         per_radian = np.where(twists[:, 2] != 0.0, rates / np.abs(twists[:, 2]), np.inf)
-    best = float(per_radian.min())
+    best = float(per_radian.min(initial=math.inf))
     return PricedTrims(
         library=Library(
             automaton=automaton,
