@@ -27,7 +27,7 @@ from maneuver_automaton.roads.scene import RoadScene
 from maneuver_automaton.roads.vehicle import RoadVehicle
 
 SOONER = (4.0, 8.0, 12.0)  # [s] before a goal is over, by which it is to be reached but for a stop
-WIDTHS = (100, 400, 0, 1600, 4000)  # 0: driven in closed loop instead
+WIDTHS = (100, 400, 1600, 4000, 0)  # 0: driven in closed loop instead, which takes longest
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -345,7 +345,7 @@ def _who_hits(planner: RoadPlanner) -> str:
     names = {one.name for one in planner.scene.traffic if one.motion is not None}
     if not names or stopped():
         return ""
-    wider = planner.wider(WIDTHS[-2], horizon_s=planner.last_tick * planner.tick)
+    wider = planner.wider(WIDTHS[2], horizon_s=planner.last_tick * planner.tick)
     found = _past_stops(wider.without(names), planner.start_state, 0)
     if found is None or not found.reaches:
         return ""

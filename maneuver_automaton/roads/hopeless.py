@@ -19,7 +19,7 @@ from maneuver_automaton.automaton import Plan
 from maneuver_automaton.collision import Disc, Shape
 from maneuver_automaton.collision.outline import united
 from maneuver_automaton.groups import SE2
-from maneuver_automaton.roads.lanelets import drivable_area
+from maneuver_automaton.roads.lanelets import SEAM, drivable_area
 from maneuver_automaton.roads.rules import judged
 from maneuver_automaton.roads.scene import (
     EXACT,
@@ -34,7 +34,6 @@ from maneuver_automaton.roads.vehicle import RoadVehicle
 TOUCHES, FAR = 1e-3, 1e5  # [m] what is nearer is not apart, and what is further is not looked at
 WIDER = 1.01  # than a circle: shapely draws it as a polygon inside
 MOST_NAMES = 20  # of road users who are looked at one by one
-SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
 MOST_BOXES = 30_000  # of poses: beyond, no proof is looked for
 PROVEN = 1e-6  # [m] by which the road is taken to be larger for a proof
 Wall: TypeAlias = tuple[Any, float, float]  # a shapely geometry, from when and until when [s]

@@ -19,6 +19,7 @@ from maneuver_automaton.groups import LieGroup
 SAME_TIME = 1e-9  # [s]
 ROUNDED = 1e-5  # [m] gaps of less than twice this are what rounding left
 TILE = 20.0  # [m] pieces are cut to this size: a search tree, or a bucket, then leaves most out
+SEAM = 0.01  # [m] of gaps between lanelets, which a file may have by rounding
 SLIVER = 1e-6  # [m^2] smaller pieces are what rounding left between lanelets
 
 
@@ -65,9 +66,8 @@ class Lanelet:
                     f"lanelet {self.number}: the {name} bound has shape {bound.shape}, need "
                     "(n, 2) with n >= 2"
                 )
-        object.__setattr__(self, "successors", tuple(self.successors))
-        object.__setattr__(self, "beside", tuple(self.beside))
-        object.__setattr__(self, "against", tuple(self.against))
+        for name in ("successors", "beside", "against"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         if self.speed_limit is not None and not self.speed_limit > 0.0:
             raise ValueError(
                 f"lanelet {self.number}: the speed limit must be positive, got "
@@ -170,15 +170,14 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
     """The union of all lanelets, a valid shapely polygon or multipolygon.
 
     Bounds are drawn by hand and miss each other by centimetres. Between lanelets that are stated to
-    be neighbours there is road; any other gap is none, however narrow.
+    be neighbours there is road, and up to `SEAM` where corners amid their row and amid the row that
+    follows miss each other; any other gap is none, however narrow.
     Source: the road boundary of `commonroad-drivability-checker` (2025.4), which judges solutions:
-    it fills every row of neighbours from the first bound to the last, and closes nothing else.
+    it fills every row of neighbours from the first bound to the last, and of the ends of a row it
+    looks at the outermost corners only.
 
     Examples
     --------
-    >>> lanes = [Lanelet(k, [[0, k + 1], [9, k + 1]], [[0, k], [9, k]]) for k in range(2)]
-    >>> round(drivable_area(lanes).area, 9)
-    18.0
     >>> gap = [Lanelet(0, [[0, 1], [9, 1]], [[0, 0], [9, 0]], beside=[1]),
     ...        Lanelet(1, [[0, 2], [9, 2]], [[0, 1.1], [9, 1.1]], beside=[0])]
     >>> round(drivable_area(gap).area, 9)
@@ -187,40 +186,42 @@ def drivable_area(lanelets: Sequence[Lanelet]) -> Any:
     import shapely
 
     known = {lanelet.number: lanelet for lanelet in lanelets}
-    rings = [lanelet.ring for lanelet in lanelets]
+    rings, inner = [lanelet.ring for lanelet in lanelets], set[tuple[int, int]]()
     for lanelet in lanelets:
-        rings += [_between(lanelet, known[k]) for k in lanelet.beside if k in known]
-        rings += [_between(lanelet, known[k], opposite=True) for k in lanelet.against if k in known]
+        for k in filter(known.__contains__, (*lanelet.beside, *lanelet.against)):
+            side, ring = _between(lanelet, known[k])
+            rings.append(ring)
+            inner.add((lanelet.number, side))
+    for lanelet in lanelets:
+        for k in filter(known.__contains__, lanelet.successors):
+            ring = np.stack(
+                [lanelet.left[-1], lanelet.right[-1], known[k].right[0], known[k].left[0]]
+            )
+            amid = [{(lanelet.number, side), (k, side)} <= inner for side in (0, 1)]
+            apart = np.hypot(*(ring[:2] - ring[:1:-1]).T)
+            if apart.max() > ROUNDED and (apart <= np.where(amid, SEAM, ROUNDED)).all():
+                rings.append(ring)
     parts = [shapely.make_valid(shapely.Polygon(ring)) for ring in rings]
-    area = _flat(united([one for part in parts for one in _polygons(part)]))
+    area = _flat(_flat(parts))
     grown = shapely.buffer(area, ROUNDED, join_style="mitre")
     return _flat(united([area, shapely.buffer(grown, -ROUNDED, join_style="mitre")]))
 
 
-def _between(one: Lanelet, other: Lanelet, *, opposite: bool = False) -> Array:
-    """Outline (n, 2) of the gap between two neighbours: the bounds that face each other."""
-    if opposite:  # the bounds run against each other
-        pairs = [(one.left, other.left), (one.right, other.right)]
-    else:
-        pairs = [(one.left, other.right[::-1]), (one.right, other.left[::-1])]
-    apart = [float(np.hypot(*(a.mean(axis=0) - b.mean(axis=0)))) for a, b in pairs]
-    return np.concatenate(pairs[int(np.argmin(apart))])
+def _between(one: Lanelet, other: Lanelet) -> tuple[int, Array]:
+    """Side of a neighbour, 0 for left, and outline (n, 2) of the gap: two bounds that face."""
+    turned = (other.left, other.right), (other.right[::-1], other.left[::-1])
+    facing = zip((one.left, one.right), turned[other.number not in one.against], strict=True)
+    pairs = [(float(np.hypot(*(a.mean(axis=0) - b.mean(axis=0)))), a, b) for a, b in facing]
+    side = int(pairs[1][0] < pairs[0][0])
+    return side, np.concatenate(pairs[side][1:])
 
 
-def _polygons(geometry: Any) -> list[Any]:
+def _flat(geometries: Any) -> Any:
+    """The union of the polygons among geometries and their parts."""
     import shapely
 
-    parts = shapely.get_parts(geometry)
-    return [
-        one
-        for part in parts
-        for one in (_polygons(part) if part.geom_type.startswith("Multi") else (part,))
-        if one.geom_type == "Polygon"
-    ]
-
-
-def _flat(area: Any) -> Any:
-    return united(_polygons(area))
+    parts = shapely.get_parts(shapely.get_parts(geometries))
+    return united(parts[shapely.get_dimensions(parts) == 2].tolist())
 
 
 def obstacles_in(land: Any) -> tuple[Obstacle, ...]:

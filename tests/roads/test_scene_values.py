@@ -63,6 +63,19 @@ def test_there_is_road_between_stated_neighbours_only(gap):
         assert_allclose(joined.area, 100.0 * (8.0 + gap), atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("middle", "side", "whole"), [(1e-4, 0.0, True), (0.0, 1e-4, False), (0.1, 0.0, False)]
+)
+def test_there_is_road_where_only_corners_amid_two_rows_miss_each_other(middle, side, whole):
+    lanes = [
+        Lanelet(1, [[0, 2], [9, 2]], [[0, 0], [9, 0]], successors=[3], against=[2]),
+        Lanelet(2, [[9, 2], [0, 2]], [[9, 4], [0, 4]], against=[1]),
+        Lanelet(3, [[9 + middle, 2], [20, 2]], [[9 + side, 0], [20, 0]], against=[4]),
+        Lanelet(4, [[20, 2], [9 + middle, 2]], [[20, 4], [9 + side, 4]], [2], against=[3]),
+    ]
+    assert (drivable_area(lanes).buffer(-0.5).geom_type == "Polygon") == whole
+
+
 def test_rounding_leaves_no_gap():
     area = drivable_area([straight(1, 0.0), straight(2, 4.0 + 1e-7)])
     assert area.geom_type == "Polygon"
