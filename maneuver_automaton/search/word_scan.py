@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -151,9 +151,23 @@ class WordScan:
         tail = 1 if self.setup.free_heading else 0
         if max_words is None:
             at_once = [mode for mode in modes if self._takes_a_moment(mode, budget)]
-            if at_once:
-                self._run_at_once(at_once, tail)
             modes = [mode for mode in modes if mode not in at_once]
+            if at_once:  # in one call: calls take longer than a scan of few words
+                both = (*at_once, at_once[0])[:2]  # in place of a second way to meet the time
+                limits = [min(mode.most_moving, self.most) for mode in at_once]
+                _kernels_words.scan_all_words(
+                    *both[0].kernel_problem,
+                    *both[1].kernel_problem,
+                    np.array([*limits, 0][:2]),
+                    np.array([mode.at_least for mode in both]),
+                    self.candidates,
+                    self.found,
+                    tail,
+                    PORTIONS_AT_ONCE,
+                    self.most,
+                    TIE,
+                    self.not_first,
+                )
         for n in range(1, self.most + 1):
             for mode in modes:
                 if n > mode.most_moving or mode.at_least > tied(float(self.found.best[-1])):
@@ -173,24 +187,6 @@ class WordScan:
         numbers = range(1, most + 1)
         seconds = math.fsum(len(self.setup.library.trims) ** n * each[n + tail] for n in numbers)
         return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
-
-    def _run_at_once(self, modes: Sequence[Mode], tail: int) -> None:
-        """The whole scan of some modes in one call: calls take longer than a scan of few words."""
-        both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
-        limits = [min(mode.most_moving, self.most) for mode in modes]
-        _kernels_words.scan_all_words(
-            *both[0].kernel_problem,
-            *both[1].kernel_problem,
-            np.array([*limits, 0][:2]),
-            np.array([mode.at_least for mode in both]),
-            self.candidates,
-            self.found,
-            tail,
-            PORTIONS_AT_ONCE,
-            self.most,
-            TIE,
-            self.not_first,
-        )
 
     def _scan_all(
         self,
