@@ -170,7 +170,12 @@ def lattice_query(
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
     turns = library.at_will  # at the end, to any heading
-    poses, index = _end_poses(problem, goals, turns=turns)
+    aimed = [
+        problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
+        for k in goals
+    ]
+    index = [k for k, rows in zip(goals, aimed, strict=True) for _ in rows]
+    poses = np.concatenate([problem.start[None], *aimed])
     level = float(poses[1, 3]) if poses.shape[1] > 3 else 0.0
     trims, automaton = np.full(len(poses), NO_TRIM), library.priced.automaton
     if not automaton.is_kinematic:
@@ -216,19 +221,6 @@ def lattice_query(
         most_time=math.inf if most is None else most * (1.0 + 1e-12),
         prepared=prepared,
     )
-
-
-def _end_poses(problem: Problem, goals: Sequence[int], *, turns: bool) -> tuple[Array, list[int]]:
-    """The start and poses aimed at (1 + n, dof), and which of the goals these belong to (n,).
-
-    Unless the vehicle `turns` at its end, there are several headings where any will do.
-    """
-    rows = [
-        problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
-        for k in goals
-    ]
-    index = [k for k, row in zip(goals, rows, strict=True) for _ in row]
-    return np.concatenate([problem.start[None], *rows]), index
 
 
 def _end_clearances(
