@@ -267,8 +267,8 @@ class FleetMember:
         else:
             self._keep_ways(query, word, budget, AT_ONCE)
         if bounded:
-            exact = self.aimed is self.problem
-            self.bound = lattice_bound(query) if exact else formula_bound(self.problem)
+            aims_exactly = self.aimed is self.problem
+            self.bound = lattice_bound(query) if aims_exactly else formula_bound(self.problem)
 
     def look_for_better_ways(self, budget: Budget) -> None:
         """Better ways past past obstacles, and others beside them."""

@@ -5,22 +5,19 @@ It stops at each switch.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from maneuver_automaton._kernel_list import load_kernels
 from maneuver_automaton.automaton import Plan
-from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Obstacle
 from maneuver_automaton.planning.checking import TooLate, what_is_hit
 from maneuver_automaton.planning.incumbents import Incumbents, PlanningStep
 from maneuver_automaton.planning.no_way import proven_apart
 from maneuver_automaton.planning.polishing import Polish, guess_along
 from maneuver_automaton.planning.result import Workspace
-from maneuver_automaton.planning.tracking import AT_ONCE, Tracked, track
+from maneuver_automaton.planning.tracking import AT_ONCE, track
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.guesses import path_guesses
 from maneuver_automaton.refinement.stop_and_steer import kinematic_problem, stop_and_steer
@@ -46,40 +43,32 @@ class AlongPaths(PlanningStep):
 
     def offer(self, found: Incumbents) -> None:
         """Offer plans along a first path, then along one that is fast to follow so."""
-        found.offer_as_they_come(self._plans(found))
-
-    def _plans(self, found: Incumbents) -> Iterator[tuple[Plan, int]]:
-        problem, ended = found.problem, found.ended
-        free = kinematic_problem(problem, switch=0.0)
-        first = _path(found, free, found.budget.stage(FIRST_SHARE), patience=AT_ONCE)
+        problem, ended, prepared = found.problem, found.ended, found.workspace.prepared
+        free, part = kinematic_problem(problem, switch=0.0), found.budget.stage(FIRST_SHARE)
+        first = track(free, budget=part, prepared=prepared, patience=AT_ONCE)
+        found.counts.update(expansions=first.expansions, collision_queries=first.queries)
         if first.plan is None or first.goal_index is None:
             ended.proof = first.reason if first.enclosed else ""
             ended.remark = f" ({first.reason})" if first.reason else ""
             ended.is_complete = proven_apart(problem, found.budget)
             return
-        yield from _stopping(found, first.plan, first.goal_index)
-        if found.budget.is_over:
+        _offer_along(found, first.plan, first.goal_index)
+        if not found.wants_more:
             return
         along = path_guesses(problem.automaton.model)
         if self.polish and along and first.plan.duration > 0.0:
             self.polish.guesses.append(guess_along(problem, along, first.plan))
-        soon = found.budget.stage(IMPROVED_SHARE)
-        better = _path(found, kinematic_problem(problem), soon, known=first.plan)
-        if better.plan is not None and better.goal_index is not None and found.may_check:
-            yield from _stopping(found, better.plan, better.goal_index)
+        priced, part = kinematic_problem(problem), found.budget.stage(IMPROVED_SHARE)
+        better = track(priced, budget=part, prepared=prepared, known=first.plan)
+        found.counts.update(expansions=better.expansions, collision_queries=better.queries)
+        if better.plan is not None and better.goal_index is not None:
+            _offer_along(found, better.plan, better.goal_index)
 
 
-def _path(found: Incumbents, problem: Problem, budget: Budget, **more: Any) -> Tracked:
-    """A path of the simpler vehicle; what it takes is counted."""
-    path = track(problem, budget=budget, prepared=found.workspace.prepared, **more)
-    found.counts.update(expansions=path.expansions, collision_queries=path.queries)
-    return path
-
-
-def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[Plan, int]]:
-    """Stop and steer along a path, once moving obstacles let it pass."""
+def _offer_along(found: Incumbents, path: Plan, goal_index: int) -> None:
+    """Offer to stop and steer along a path, once moving obstacles let it pass."""
     problem, goal = found.problem, found.problem.goals[goal_index]
-    if found.for_checks.left_to_check < STOPPING_S:
+    if not found.may_check or found.for_checks.left_to_check < STOPPING_S:
         return
     plan = stop_and_steer(
         problem.automaton.model,  # type: ignore[arg-type]
@@ -88,7 +77,7 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
         last=problem.last_trim(goal),
     )
     if not problem.moves:
-        yield plan, goal_index
+        found.offer(plan, goal_index)
         return
     settled = max(
         float(one.motion.time[-1])
@@ -106,5 +95,5 @@ def _stopping(found: Incumbents, path: Plan, goal_index: int) -> Iterator[tuple[
         except TooLate:
             return
         if not hit:
-            yield later, goal_index
+            found.offer(later, goal_index)
             return

@@ -142,26 +142,21 @@ def plan_in(
     budget = Budget.from_now(time_limit, expansions=problem.search.max_expansions)
     budget = replace(budget, shows=shows)
     with patient():
-        if gap is not None:
+        if gap is None:
+            if watch is not None:
+                watch.problem = problem
+                budget = replace(budget, watch=watch)
+            result = answer(problem, budget, workspace, alternatives=alternatives)
+        else:
             watch = watch or Watch(gap=gap)
             watch.gap, watch.problem = gap, problem
-            search = functools.partial(
-                plan_within, problem, workspace=workspace, alternatives=alternatives
-            )
+
+            def search(part: Budget) -> PlanResult:
+                return answer(problem, part, workspace, alternatives=alternatives)
+
             kept = kept_bounds(problem, workspace)
-            return plan_to_gap(problem, search, budget, watch, kept=kept)
-        if watch is not None:
-            watch.problem = problem
-            budget = replace(budget, watch=watch)
-        return plan_within(problem, budget, workspace, alternatives=alternatives)
-
-
-def plan_within(
-    problem: Problem, budget: Budget, workspace: Workspace, *, alternatives: int
-) -> PlanResult:
-    """The answer to a problem within a budget, or the proof that there is none; all is loaded."""
-    result = answer(problem, budget, workspace, alternatives=alternatives)
-    return _noted(with_proof(result, budget))
+            result = plan_to_gap(problem, search, budget, watch, kept=kept)
+        return _noted(with_proof(result, budget))
 
 
 def _noted(result: PlanResult) -> PlanResult:

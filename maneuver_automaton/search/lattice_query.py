@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,98 +169,58 @@ def lattice_query(
     """
     library = library or lattice_library(problem, goals, prepared=prepared)
     worlds, horizon = worlds_around(problem, library.parts, prepared=prepared), problem.horizon
-    if library.at_will and not (problem.parts or problem.moves):
-        aimed = _ends_in_plane(problem, goals, ends or ends_of(problem))
-    else:
-        aimed = _ends(problem, goals, library, worlds)
-    # the usual clearance, at most half of that at start and goals
-    halves = [0.5 * one for one in aimed.clear.tolist() if one > 0.0]
-    margin = float(max(LEAST_MARGIN, min([usual_margin(library, worlds.whole), *halves])))
-    radius = library.radius
-    box, window, bounded = window_of(problem.bounds, worlds.outer, aimed.seen, radius=radius)
-    most = horizon.max_time if horizon.time is None else horizon.time
-    return LatticeQuery(
-        problem=problem,
-        library=library,
-        worlds=worlds,
-        around=scene_of(problem, library, worlds, window, box, margin=margin, level=aimed.level),
-        start=aimed.seen[0],
-        start_trim=int(aimed.trims[0]),
-        goals=aimed.seen[1:],
-        goal_trims=aimed.trims[1:],
-        free_heading=aimed.free,
-        goal_poses=aimed.poses[1:],
-        goal_index=aimed.goals,
-        box=box,
-        bounded=bounded,
-        most_time=math.inf if most is None else most * (1.0 + 1e-12),
-        prepared=prepared,
-    )
-
-
-class _Ends(NamedTuple):
-    """The start, then poses that are aimed at."""
-
-    poses: Array  # (1 + n, dof) as the problem sees them
-    seen: Array  # (1 + n, 4) as the query does
-    clear: Array  # (1 + n,) [m] clearance beyond the margin
-    trims: IntArray  # (1 + n,) NO_TRIM: any will do
-    goals: tuple[int, ...]  # (n,) which of the problem's goals they belong to
-    free: NDArray[np.bool_]  # (n,) whether any heading will do
-    level: float = 0.0  # [m] altitude from which others are counted
-
-
-def _ends_in_plane(problem: Problem, goals: Sequence[int], known: tuple[Array, Array]) -> _Ends:
-    """The ends of a vehicle that switches at will in a plane, which were looked at before."""
-    seen = np.zeros((1 + len(problem.goals), 4))
-    seen[:, :3], clear = known[0], known[1] - problem.margin
-    if len(goals) < len(problem.goals):
-        kept = [0, *(1 + k for k in goals)]
-        seen, clear = seen[kept], clear[kept]
-    return _Ends(
-        poses=np.array([problem.start, *(problem.goals[k].pose for k in goals)]),
-        seen=seen,
-        clear=clear,
-        trims=np.full(1 + len(goals), NO_TRIM),
-        goals=tuple(goals),
-        free=np.array([problem.goals[k].free_heading for k in goals], dtype=np.bool_),
-    )
-
-
-def _ends(problem: Problem, goals: Sequence[int], library: LatticeLibrary, worlds: Worlds) -> _Ends:
-    """The ends of any vehicle, several headings at goals where any will do included."""
     turns = library.at_will  # at the end, to any heading
-    rows = [
+    aimed = [
         problem.goals[k].pose[None] if turns else poses_aimed_at(problem, problem.goals[k])
         for k in goals
     ]
-    index = np.array([k for k, row in zip(goals, rows, strict=True) for _ in row])
-    free = np.array([problem.goals[k].free_heading for k in index])
-    poses = np.concatenate([problem.start[None], *rows])
+    index = [k for k, rows in zip(goals, aimed, strict=True) for _ in rows]
+    poses = np.concatenate([problem.start[None], *aimed])
     level = float(poses[1, 3]) if poses.shape[1] > 3 else 0.0
-    seen = _seen(worlds.whole, poses, level)
-    trims, automaton = np.full(len(seen), NO_TRIM), library.priced.automaton
+    trims, automaton = np.full(len(poses), NO_TRIM), library.priced.automaton
     if not automaton.is_kinematic:
         last = [problem.last_trim(problem.goals[k]).name for k in index]
         numbers = [automaton.index_of(name) for name in (problem.first_trim.name, *last)]
         trims = np.asarray(library.number_of[numbers], dtype=np.int64)
-    clear = _end_clearances(problem, library, worlds, seen, trims, level)
+    seen = np.zeros((len(poses), 4))
+    if turns and not (problem.parts or problem.moves):
+        asked = [0, *(1 + k for k in index)]
+        seen[:, :3], clear = (one[asked] for one in ends or ends_of(problem))
+        clear = clear - problem.margin
+    else:
+        seen[:, :3] = worlds.whole.into(poses[:, :3])
+        if poses.shape[1] > 3:
+            seen[:, 3] = np.round(poses[:, 3] - level, DIGITS)
+        clear = _end_clearances(problem, library, worlds, seen, trims, level)
     # The clearance at one heading says nothing of a goal at which the vehicle may turn; nor that
     # after the last event of one that is reached before.
     if not (turns or problem.moves) and (clear[1:] > 0.0).any():
         kept = np.append(0, 1 + np.flatnonzero(clear[1:] > 0.0))
         clear, seen, trims, poses = clear[kept], seen[kept], trims[kept], poses[kept]
-        index, free = index[kept[1:] - 1], free[kept[1:] - 1]
-    return _Ends(poses, seen, clear, trims, tuple(index.tolist()), free & turns, level)
-
-
-def _seen(world: World, poses: Array, level: float) -> Array:
-    """Poses (n, dof) as the query keeps them, (n, 4)."""
-    seen = np.zeros((len(poses), 4))
-    seen[:, :3] = world.into(poses[:, :3])
-    if poses.shape[1] > 3:
-        seen[:, 3] = np.round(poses[:, 3] - level, DIGITS)
-    return seen
+        index = [index[k - 1] for k in kept[1:].tolist()]
+    # the usual clearance, at most half of that at start and goals
+    halves = [0.5 * one for one in clear.tolist() if one > 0.0]
+    margin = float(max(LEAST_MARGIN, min([usual_margin(library, worlds.whole), *halves])))
+    radius = library.radius
+    box, window, bounded = window_of(problem.bounds, worlds.outer, seen, radius=radius)
+    most = horizon.max_time if horizon.time is None else horizon.time
+    return LatticeQuery(
+        problem=problem,
+        library=library,
+        worlds=worlds,
+        around=scene_of(problem, library, worlds, window, box, margin=margin, level=level),
+        start=seen[0],
+        start_trim=int(trims[0]),
+        goals=seen[1:],
+        goal_trims=trims[1:],
+        free_heading=np.array([turns and problem.goals[k].free_heading for k in index], np.bool_),
+        goal_poses=poses[1:],
+        goal_index=tuple(index),
+        box=box,
+        bounded=bounded,
+        most_time=math.inf if most is None else most * (1.0 + 1e-12),
+        prepared=prepared,
+    )
 
 
 def _end_clearances(

@@ -8,7 +8,6 @@ of switches within maneuvers.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -21,7 +20,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget, Pace
 from maneuver_automaton.costs import terms_of
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import TIE, SearchResult, SearchStatus, TimedWord, in_order
-from maneuver_automaton.search.word_scan import WordScan, scanned
+from maneuver_automaton.search.word_scan import WordScan
 from maneuver_automaton.search.word_setup import WordSetup, word_setup
 from maneuver_automaton.words import _kernels_candidates as kernels
 from maneuver_automaton.words.library import NO_TRIM, four_columns
@@ -96,8 +95,7 @@ def scan_linked_words(
     pads = problem.horizon.time is not None and setup.pad is not None  # rest is a trim more
     most = min(max_trims, LONGEST - int(goal.free_heading)) + int(pads)
     everything = alternatives is None and upper_bound == math.inf
-    scan_of = functools.partial(
-        WordScan,
+    scan = WordScan(
         problem,
         setup.as_search(),
         min(most, problem.horizon.max_trims or most),
@@ -108,7 +106,7 @@ def scan_linked_words(
         slack=math.inf if everything else SLACK,
     )
     most_words = None if expansions is None else WORDS_AN_EXPANSION * expansions
-    scan, finished = scanned(scan_of, budget, most_words)
+    finished = scan.run(budget, most_words)
     found = _made_good(
         setup, scan.timed(), alternatives, upper_bound, budget, refined=setup.is_mended
     )

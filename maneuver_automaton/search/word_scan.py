@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -50,21 +50,6 @@ BoolArray = NDArray[np.bool_]
 KernelProblem = tuple[WordProblem, Links]
 
 
-def scanned(
-    scan_of: Callable[..., WordScan], budget: Budget, most_words: int | None
-) -> tuple[WordScan, bool]:
-    """A scan with `capacity` for all that it finds, and whether no limit ended it."""
-    capacity = CAPACITY
-    while True:
-        scan = scan_of(capacity=capacity)
-        finished = scan.run(budget, most_words)
-        if scan.n_found <= capacity:
-            return scan, finished
-        if budget.is_over:  # there is no time to scan them again, with room for all
-            return scan, False
-        capacity = 2 * scan.n_found
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Mode:
     """One way to meet the time: padded by rest, exactly, or free."""
@@ -88,7 +73,6 @@ class WordScan:
         most: int,
         alternatives: int | None,
         *,
-        capacity: int = CAPACITY,
         nodes: int = NODES,
         spare: bool = False,
         slack: float = math.inf,
@@ -106,13 +90,18 @@ class WordScan:
             [] if not_first is None else np.flatnonzero(setup.library.trims == not_first).tolist()
         )
         self.not_first = rows[0] if rows else -1  # a row of the search
-        width = MOST_TRIMS + 1
         # a user's own price of switches is added afterwards: what is cheap now may be costly then
         self.own_prices = terms_of(problem.cost) is None
         if self.own_prices:
             alternatives = None
         self.pruned = alternatives is not None or upper_bound < math.inf
-        asked = capacity if alternatives is None else alternatives + 1
+        self.asked = None if alternatives is None else alternatives + 1
+        self.upper_bound = upper_bound
+        self._begin(CAPACITY)
+
+    def _begin(self, capacity: int) -> None:
+        """Begin to scan, with room for so many solutions."""
+        width = MOST_TRIMS + 1
         self.candidates = Candidates(
             words=np.empty((CAPACITY, width), dtype=np.int64),
             times=np.empty((CAPACITY, width)),
@@ -127,7 +116,7 @@ class WordScan:
             times=np.empty((capacity + 1, width)),
             costs=np.empty(capacity),
             counter=np.zeros(1, dtype=np.int64),
-            best=np.full(asked, upper_bound),
+            best=np.full(self.asked or capacity, self.upper_bound),
         )
 
     @property
@@ -146,22 +135,44 @@ class WordScan:
         return int(self.candidates.counter[2])
 
     def run(self, budget: Budget, max_words: int | None) -> bool:
-        """Scan and polish, shorter words first; False if a limit ended it."""
+        """Scan and polish, shorter words first; False if a limit ended it.
+
+        Where there is no room for all solutions they are scanned again, if there is time.
+        """
         modes = list(self.modes())
         tail = 1 if self.setup.free_heading else 0
         if max_words is None:
             at_once = [mode for mode in modes if self._takes_a_moment(mode, budget)]
-            if at_once:
-                self._run_at_once(at_once, tail)
             modes = [mode for mode in modes if mode not in at_once]
-        for n in range(1, self.most + 1):
-            for mode in modes:
-                if n > mode.most_moving or mode.at_least > tied(float(self.found.best[-1])):
-                    continue
-                for flat, chunk in self._scans(n + tail, mode):
-                    if not self._scan_all(flat, chunk, mode, n, budget, max_words):
-                        return False
-        return True
+            if at_once:  # in one call: calls take longer than a scan of few words
+                both = (*at_once, at_once[0])[:2]  # in place of a second way to meet the time
+                limits = [min(mode.most_moving, self.most) for mode in at_once]
+                _kernels_words.scan_all_words(
+                    *both[0].kernel_problem,
+                    *both[1].kernel_problem,
+                    np.array([*limits, 0][:2]),
+                    np.array([mode.at_least for mode in both]),
+                    self.candidates,
+                    self.found,
+                    tail,
+                    PORTIONS_AT_ONCE,
+                    self.most,
+                    TIE,
+                    self.not_first,
+                )
+        finished = all(
+            self._scan_all(flat, chunk, mode, n, budget, max_words)
+            for n in range(1, self.most + 1)
+            for mode in modes
+            if n <= mode.most_moving and mode.at_least <= tied(float(self.found.best[-1]))
+            for flat, chunk in self._scans(n + tail, mode)
+        )
+        if self.n_found <= len(self.found.costs):
+            return finished
+        if budget.is_over:
+            return False
+        self._begin(2 * self.n_found)
+        return self.run(budget, max_words)
 
     def _takes_a_moment(self, mode: Mode, budget: Budget) -> bool:
         """Whether a whole scan is so short that nobody asks the clock meanwhile."""
@@ -173,24 +184,6 @@ class WordScan:
         numbers = range(1, most + 1)
         seconds = math.fsum(len(self.setup.library.trims) ** n * each[n + tail] for n in numbers)
         return seconds <= MOMENT and seconds <= AT_ONCE * budget.left
-
-    def _run_at_once(self, modes: Sequence[Mode], tail: int) -> None:
-        """The whole scan of some modes in one call: calls take longer than a scan of few words."""
-        both = (*modes, modes[0])[:2]  # in place of a second way to meet the time
-        limits = [min(mode.most_moving, self.most) for mode in modes]
-        _kernels_words.scan_all_words(
-            *both[0].kernel_problem,
-            *both[1].kernel_problem,
-            np.array([*limits, 0][:2]),
-            np.array([mode.at_least for mode in both]),
-            self.candidates,
-            self.found,
-            tail,
-            PORTIONS_AT_ONCE,
-            self.most,
-            TIE,
-            self.not_first,
-        )
 
     def _scan_all(
         self,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.result import SearchResult, SearchStatus, in_order, tied
 from maneuver_automaton.search.setup import SearchSetup, search_setup
-from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan, scanned
+from maneuver_automaton.search.word_scan import MOST_TRIMS, NODES, WordScan
 from maneuver_automaton.words.word import Word
 
 MOST_LATE = 100  # solutions, of thousands, that are handed over once the time is over
@@ -89,8 +88,7 @@ def search_words(
         )
     if setup.start_is_goal and (problem.horizon.time is None or setup.library.rest is not None):
         return resting(problem, setup)
-    scan_of = partial(
-        WordScan,
+    job = WordScan(
         problem,
         setup,
         most,
@@ -99,7 +97,7 @@ def search_words(
         upper_bound=upper_bound,
         not_first=not_first,
     )
-    job, finished = scanned(scan_of, budget, problem.search.max_expansions)
+    finished = job.run(budget, problem.search.max_expansions)
     solutions = tuple(in_order(_handed_over(job, budget)))
     if alternatives is not None and len(solutions) > alternatives + 1:
         asked = solutions[: alternatives + 1]

@@ -11,7 +11,8 @@ import pytest
 from maneuver_automaton.budget import Budget
 from maneuver_automaton.collision import Disc
 from maneuver_automaton.planning import steps
-from maneuver_automaton.planning.plan import plan_within, prepare
+from maneuver_automaton.planning.no_way import with_proof
+from maneuver_automaton.planning.plan import prepare
 from maneuver_automaton.planning.result import PlanStatus, workspace_of
 from maneuver_automaton.problem import Horizon, Problem, SearchSettings
 from tests.inertia import unicycle_automaton
@@ -38,8 +39,8 @@ def looks_after(
     seen = itertools.count()
     budget = Budget(began=0.0, deadline=1.0, clock=lambda: 0.0 if next(seen) < looks else late)
     workspace = workspace_of(problem.obstacles)
-    result = plan_within(problem, budget, workspace, alternatives=alternatives)
-    return next(seen) - looks, result.status
+    result = steps.answer(problem, budget, workspace, alternatives=alternatives)
+    return next(seen) - looks, with_proof(result, budget).status
 
 
 @pytest.mark.parametrize("name", TASKS)
