@@ -117,7 +117,7 @@ class AppliedEntry(PlaceEntry):
     off_plan: Annotated[Known, says("m or rad between pose and the last plan's prediction")]
     lower_bound: Number
     gap: NotRequired[Annotated[Known, says("(value - lower_bound) / value")]]
-    exhaustive: Annotated[Flag, says("every admitted word was searched")]
+    exhaustive: Annotated[Flag, says("no admitted word is cheaper")]
     arrived: Flag
     decision: NotRequired[Annotated[str, says(", ".join(one.value for one in Decision))]]
     deed: NotRequired[Annotated[str, says("decision, in files of earlier versions")]]

@@ -260,6 +260,9 @@ class _Search:
             if k == n:
                 priced = priced.min(axis=1, keepdims=True)
             self.costs[np.ix_(rows[i], rows[k])] = np.maximum(priced, self.bounds[i, k])
+            sole = all(self.ways[way].is_sole for way in (i, k) if way < n)
+            if sole and self.estimated.are_least:
+                self.bounds[i, k] = self.costs[np.ix_(rows[i], rows[k])].item()
 
     def _pairs(self) -> Iterator[tuple[int, int]]:
         """Which ways may follow each other; n is the start of a pair, or the goal at its end."""

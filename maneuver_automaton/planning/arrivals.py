@@ -25,7 +25,7 @@ from maneuver_automaton.planning.result import PlanStatus
 from maneuver_automaton.primitives import Trim
 from maneuver_automaton.problem import Goal, Problem, Via
 from maneuver_automaton.search.lattice_goals import nodes_within
-from maneuver_automaton.search.limits import closed_bound
+from maneuver_automaton.search.limits import closed_bound, three_are_enough
 from maneuver_automaton.words._kernels_steering import steer_batch
 from maneuver_automaton.words.library import most_different, moving_trims
 
@@ -295,8 +295,10 @@ class LegCosts:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.by_words = estimates_words(problem)
+        self.are_least = False  # between poses none costs less
         if self.by_words:
             library = moving_trims(problem.automaton, problem.cost)
+            self.are_least = len(library.twists) <= MOST_LETTERS and three_are_enough(problem)
             few = most_different(library.twists, min(MOST_LETTERS, len(library.twists)))
             spin = np.array([[0.0, 0.0, 1.0]])
             self.twists = np.vstack([library.twists[few][:, :3], spin])

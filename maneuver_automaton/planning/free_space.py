@@ -96,7 +96,7 @@ class AllWords(PlanningStep):
 
     candidates: list[Candidate] = field(default_factory=list)  # cheapest first, then the shortest
     exhausted: bool = True  # no search was cut short
-    proven: bool = False  # every admitted word was searched
+    proven: bool = False  # no admitted word is cheaper
 
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """Load the kernels."""
@@ -119,7 +119,7 @@ class AllWords(PlanningStep):
         ]
         others = None if sorted_out else SPARE * found.alternatives
         words: list[tuple[Word, int]] = []
-        proven = set[int]()  # goals whose every admitted word was searched
+        proven = set[int]()  # goals to which no admitted word is cheaper
         for index, result in free_words(found, goals, others=others):
             self.exhausted &= result.status is not SearchStatus.OUT_OF_BUDGET
             proven |= {index} if result.exhaustive else set()

@@ -91,7 +91,7 @@ class Step:
     shifted_value: float | None  # cost of the rest of the last plan, None if it has none here
     off_plan: float | None  # [m or rad] between `pose` and the prediction of the last plan
     lower_bound: float
-    exhaustive: bool  # every admitted word was searched
+    exhaustive: bool  # no admitted word is cheaper
     solve_s: float
     number: int  # 0 for the first
     arrived: bool = False  # nothing remains to be done but to rest

@@ -25,6 +25,7 @@ from maneuver_automaton.automaton import Automaton, Plan
 from maneuver_automaton.budget import UNLIMITED, Budget
 from maneuver_automaton.problem import Goal, Problem
 from maneuver_automaton.search.free_insertion import free_stages
+from maneuver_automaton.search.limits import three_are_enough
 from maneuver_automaton.search.linked_insertion import linked_stages
 from maneuver_automaton.search.result import InsertionTask, SearchResult, SearchStatus, in_order
 from maneuver_automaton.search.setup import SearchSetup, few_of, search_setup
@@ -119,7 +120,8 @@ def search_goal(
                 upper_bound=upper_bound,
                 ties=ties,
             )
-            results.append(replace(short, exhaustive=False))
+            proven = short.exhaustive and three_are_enough(problem)
+            results.append(replace(short, exhaustive=proven))
     return results
 
 

@@ -19,6 +19,7 @@ from maneuver_automaton.words.library import moving_trims
 
 MISSED = 1e-6  # [m, rad] for a goal a metre away: what is nearer may be met
 CLEARLY = 1e-3  # share by which a price is higher that nobody takes for the same
+ALIKE = 1e-12  # relative, of prices and curvatures that are one but for rounding
 HARDLY_TURNING = 1e-6  # turn rate, as a share of a twist, that is too small to measure a path by
 
 
@@ -155,6 +156,27 @@ def sole_bound(problem: Problem, goal: Goal) -> float:
         turn * prices.per_radian if prices.one_per_radian else 0.0,
     )
     return bound + (library.rest_rate * limit if limit is not None else 0.0)
+
+
+def three_are_enough(problem: Problem) -> bool:
+    """Whether the cheapest word of at most three trims is the cheapest of all.
+
+    It is where all trims drive forward, and none is cheaper per metre than straight ahead and the
+    turns of the least radius to both sides.
+    Source: Dubins (1957), *On curves of minimal length with a constraint on average curvature*.
+    """
+    automaton, horizon = problem.automaton, problem.horizon
+    limits = {horizon.time, horizon.max_time, *(trim.max_duration for trim in automaton.trims)}
+    if not automaton.is_kinematic or not limits <= {None, math.inf} or horizon.min_coast:
+        return False
+    library = moving_trims(automaton, problem.cost)
+    speeds = library.twists[:, 0]
+    if not (speeds > 0.0).all() or library.twists[:, [1, 3]].any() or prices_switches(problem.cost):
+        return False
+    curvatures, prices = library.twists[:, 2] / speeds, library.rates / speeds
+    cheapest = curvatures[prices <= prices.min(initial=np.inf) * (1.0 + ALIKE)]
+    most = np.abs(curvatures).max(initial=0.0)
+    return all((np.abs(cheapest - one) <= ALIKE * most).any() for one in (-most, 0.0, most))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -51,7 +51,7 @@ class SearchResult:
     status: SearchStatus
     solutions: tuple[Word, ...]
     complete: bool = False  # every locally optimal solution within the limits is listed
-    exhaustive: bool = False  # every admitted word was searched, so the first solution is the best
+    exhaustive: bool = False  # no admitted word is cheaper than the first solution
     counts: dict[str, int] = field(default_factory=dict)
 
 

@@ -154,6 +154,9 @@ def test_an_order_that_is_free_is_the_best_of_all():
     assert [one.number for one in result.via] == [2, 3, 1]
     assert result.cost == pytest.approx(8.0) == result.lower_bound
     assert planned(given).cost > 8.0
+    turning = [[6, 2, 1], [2, -1, 3], [4, 4, -1]]
+    result = planned(replace(given, order="free", via=turning))
+    assert result.lower_bound == result.cost  # words of three trims are enough
 
 
 def test_a_gate_is_crossed_and_a_stop_lasts():

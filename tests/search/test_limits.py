@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from maneuver_automaton import Automaton, PlanStatus, plan
+from maneuver_automaton import Automaton, Cost, Horizon, PlanStatus, plan
 from maneuver_automaton.collision import Box
 from maneuver_automaton.groups import SE2xR
 from maneuver_automaton.models import Unicycle, UserModel
 from maneuver_automaton.problem import Goal, Problem, SearchSettings
-from maneuver_automaton.search.limits import why_impossible
+from maneuver_automaton.search.limits import three_are_enough, why_impossible
 from tests.search.cases import compiled_only
 
 pytestmark = compiled_only
@@ -96,3 +97,30 @@ def test_a_goal_straight_ahead_behind_a_wall_is_not_called_off_the_curve():
                       search=SearchSettings(method="lattice"))  # fmt: skip
     result = plan(problem, time_limit=0.5)
     assert result.status in (PlanStatus.NO_PLAN, PlanStatus.OUT_OF_BUDGET)
+
+
+AHEAD, LEFT, RIGHT = (1, 0, 0, 0), (2, 0, 1, 0), (1, 0, -0.5, 0)
+LENGTH = Cost(length=1.0)
+
+
+@pytest.mark.parametrize(
+    ("twists", "cost", "horizon", "enough"),
+    [
+        ([AHEAD, LEFT, RIGHT, (1, 0, 0.2, 0)], LENGTH, Horizon(), True),
+        ([AHEAD, LEFT, RIGHT], Cost(time=1.0), Horizon(), False),  # which turns faster to one side
+        ([AHEAD, LEFT, RIGHT, (-1, 0, 0, 0)], LENGTH, Horizon(), False),
+        ([AHEAD, LEFT, RIGHT, (1, 0.1, 0, 0)], LENGTH, Horizon(), False),
+        ([AHEAD, LEFT, RIGHT, (1, 0, 0.6, 0)], LENGTH, Horizon(), False),
+        ([AHEAD, LEFT, RIGHT], LENGTH, Horizon(max_time=30.0), False),
+        ([AHEAD, LEFT, RIGHT], Cost(length=1.0, switch=0.1), Horizon(), False),
+        ([LEFT, RIGHT], LENGTH, Horizon(), False),
+    ],
+)
+def test_words_of_three_trims_are_enough_of_a_vehicle_that_drives_forward_alone(
+    twists, cost, horizon, enough
+):
+    robot = library(*twists)
+    problem = Problem(robot, [0, 0, 0, 0], [3, 1, 2, 0], cost=cost, horizon=horizon)
+    assert three_are_enough(problem) == enough
+    result = plan(problem)
+    assert (result.bound.kind == "exhaustive") == enough
