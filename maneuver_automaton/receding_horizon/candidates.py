@@ -148,9 +148,7 @@ def allowed(here: Problem, plan: Plan) -> bool:
 
 def bounded(problem: Problem) -> bool:
     """Whether places count: a problem bounds where its vehicle may go to, or prices it."""
-    return bool(problem.place_costs) or any(
-        getattr(problem.bounds, name) is not None for name in ("x", "y", "z")
-    )
+    return bool(problem.place_costs) or not problem.bounds.are_open
 
 
 def cost_until(problem: Problem, plan: Plan, until: float, *, whole: float | None = None) -> float:

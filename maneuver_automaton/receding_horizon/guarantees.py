@@ -183,12 +183,11 @@ def broken(
 
 def too_cheap(promised: Promises, now: Step) -> Iterator[Violation]:
     """Whether the piece applied costs less than the cheapest motion, without arriving."""
-    moves = promised.step - ACCURACY
     needed = (promised.least_rate + promised.rest_rate) * promised.step
     resting = now.plan.trims and now.plan.trims[0].is_rest
     cheap = now.applied_cost < needed - ACCURACY * (1.0 + needed)
-    moving = [not trim.is_rest for trim in now.plan.trims]
-    if resting or (cheap and float(now.plan.durations[moving].sum()) > moves):
+    moving = [not trim.is_rest for trim in now.plan.trims] if cheap else []
+    if resting or (cheap and float(now.plan.durations[moving].sum()) > promised.step - ACCURACY):
         yield Violation(
             guarantee=Guarantee.LEAST_COST,
             reason=f"the step costs {now.applied_cost:.9g}, need at least {needed:.9g}: it rests "

@@ -188,13 +188,16 @@ class Situation:
         """The committed part, then `plan`, which starts at its end."""
         return plan if self.head is None else joined(self.head, plan)
 
+    @cached_property
+    def is_over(self) -> bool:
+        """Whether nothing of the last plan is left but to stand still."""
+        return self.rest is not None and not moves_on(self.rest)
+
     @property
     def may_rest(self) -> bool:
         """Whether the vehicle may end its drive here: it switches at will, or its plan is over."""
-        if self.rest is not None and not moves_on(self.rest):
-            return True
         fixed = self.here.horizon.time is not None and self.settings.pad is None
-        return switches_at_will(self.here) and not fixed
+        return self.is_over or (switches_at_will(self.here) and not fixed)
 
     def given(self, first: Plan) -> StepPlan:
         """The plan that the first step was told to apply, which may not take too long."""
@@ -239,7 +242,7 @@ class Situation:
             pad = here.last_trim(here.goals[index])  # in the state in which the plan has ended
         total = here.horizon.time
         plan = Plan(here.start, (), durations=[], start_time=here.start_time)
-        if self.rest is not None and self.rest.trims and not moves_on(self.rest):
+        if self.rest is not None and self.rest.trims and self.is_over:
             plan = self.rest
         elif total is not None and pad is not None:
             plan = rested(plan, pad, total)

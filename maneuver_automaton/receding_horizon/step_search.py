@@ -27,7 +27,7 @@ from maneuver_automaton.receding_horizon.failsafe import (
     search_fail_safe,
 )
 from maneuver_automaton.receding_horizon.log import Decision, Guarantee, Origin, first_part
-from maneuver_automaton.receding_horizon.rest_of_plan import followed_by, moves_on
+from maneuver_automaton.receding_horizon.rest_of_plan import followed_by
 from maneuver_automaton.receding_horizon.settings import EXACT, switches_at_will
 from maneuver_automaton.receding_horizon.situation import Situation
 from maneuver_automaton.search.limits import closed_bound
@@ -227,8 +227,7 @@ class StepSearch:
             held = None if index is None else holding(here, now.settings, index)
             if held is not None and self.is_safe(held.plan):
                 return replace(held, shifted_value=held.cost, arrived=True)
-        over = now.rest is not None and not moves_on(now.rest)
-        if index is None and now.last is not None and over:
+        if index is None and now.last is not None and now.is_over:
             before = now.last.goal_index
             index = before if within(here.start, here.goals[before]) else None
         if index is None:
