@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from maneuver_automaton._arrays import Array, IntArray
-from maneuver_automaton.costs import prices_switches
 from maneuver_automaton.groups import SE2
 from maneuver_automaton.groups.se2 import coasted
 from maneuver_automaton.search import _kernels_waiting as kernels
@@ -43,10 +42,9 @@ def with_waits(query: LatticeQuery, word: Word) -> Word | None:
         return None
     if not len(word.trims):
         return with_cost(word, query)
-    every, words = [_with_rests(path, state, rest)], []
-    if prices_switches(query.problem.cost) or query.problem.place_costs:
-        every.append(_with_fewer_rests(query, every[0], rest))  # elsewhere it would cost the same
-    for one in every:
+    parts = _with_rests(path, state, rest)
+    words = []
+    for one in (parts, _with_fewer_rests(query, parts, rest)):
         driven = [(SWITCH, int(query.library.trims[trim]), t) for trim, t in one]
         words.append(with_cost(query.word_of(driven, word.goal), query))
     return min(words, key=lambda timed: timed.cost)
