@@ -70,6 +70,18 @@ def test_where_there_is_no_way_round_it_waits_or_dawdles():
     assert result.plan.duration < 11.0
 
 
+def test_a_word_that_waits_once_is_improved():
+    controls = {"rest": (0, 0), "ahead": (1, 0), "left": (0.8, 0.8), "right": (0.8, -0.8)}
+    way = Motion([0.0, 8.0], [[3.0, -4.0, 1.57], [3.0, 4.0, 1.57]])
+    walls = [Obstacle(Box([2.8, 0.2], [x, y])) for x in (0.9, 5.1) for y in (1.0, -1.0)]
+    robot = Automaton.of_controls(Unicycle(), controls)
+    around = [Obstacle(Box([1.4, 0.8]), motion=way), *walls]
+    body = Box([0.8, 0.6])
+    asked = Problem(robot, [0, 0, 0], [6, 0, 0], obstacles=around, footprint=body, margin=0.05,
+                    search=SearchSettings(max_expansions=10_000))  # fmt: skip
+    assert found(asked).cost < 8.74  # straight on after one rest: 8.873
+
+
 def test_without_a_rest_it_evades():
     dubins = scenes.dubins(0.6)
     result = found(replace(BASE, automaton=dubins))
