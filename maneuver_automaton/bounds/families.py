@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from maneuver_automaton._arrays import Array, IntArray
 from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.costs import Cost, terms_of
+from maneuver_automaton.models import Car
 from maneuver_automaton.problem import Problem
 from maneuver_automaton.refinement.stop_and_steer import extreme_automaton, follows_paths
 from maneuver_automaton.search.limits import rest_rate
@@ -80,20 +81,19 @@ def motions_of(problem: Problem) -> Motions | None:
 
 def _at_the_limits(automaton: Automaton) -> Automaton | None:
     """Trims of a kinematic vehicle that reach all poses of one with inertia; None if not known."""
-    model = automaton.model
-    if follows_paths(model):
+    if follows_paths(model := automaton.model):
         return extreme_automaton(automaton)
     kinematic, limits = getattr(model, "kinematic", None), model.control_limits
-    if kinematic is None or not np.isfinite(limits).all():
-        return None
+    if not (isinstance(kinematic, Car) and np.isfinite(limits).all()):
+        return None  # of another, twists between the limits may lie beyond theirs
     levels = [sorted({low, high, min(max(0.0, low), high)}) for low, high in limits.tolist()]
-    return Automaton.of_controls(kinematic, {str(one): one for one in product(*levels)})
+    return Automaton.of_controls(kinematic, {str(one): one for one in itertools.product(*levels)})
 
 
 def besides(problem: Problem) -> float:
     """Cost of every plan that does not depend on its path: of resting for a fixed time."""
-    rest = rest_rate(problem) if not problem.has_inertia else None
-    return 0.0 if rest is None else rest * (problem.horizon.time or 0.0)
+    lasts = 0.0 if problem.has_inertia else problem.horizon.time or 0.0
+    return lasts * (rest_rate(problem) or 0.0)
 
 
 def _families(per_cost: Array, *, gears: bool) -> Families:
