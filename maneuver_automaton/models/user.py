@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
@@ -107,14 +108,14 @@ class UserModel:
         z = as_array(f"{self.name}: reduced state", z, last=len(self.reduced_names))
         u = as_array(f"{self.name}: control", u, last=len(self.control_names))
         batch = np.broadcast_shapes(z.shape[:-1], u.shape[:-1])
-        z, u = np.broadcast_to(z, (*batch, z.shape[-1])), np.broadcast_to(u, (*batch, u.shape[-1]))
-        result = np.empty((*batch, n))
-        for index in np.ndindex(batch):
-            value = as_array(f"{self.name}: {what}", function(z[index], u[index]))
-            if value.shape != (n,):
-                raise ValueError(f"{self.name}: {what} returned shape {value.shape}, need ({n},)")
-            result[index] = value
-        return result
+        if not (count := math.prod(batch)):
+            return np.empty((*batch, n))
+        both = ((np.broadcast_to(a, (*batch, a.shape[-1])), a.shape[-1]) for a in (z, u))
+        rows = (a.reshape(count, size) for a, size in both)
+        values = as_array(f"{self.name}: {what}", list(map(function, *rows)))
+        if values.shape[1:] != (n,):
+            raise ValueError(f"{self.name}: {what} returned shape {values.shape[1:]}, need ({n},)")
+        return values.reshape(*batch, n)
 
 
 def model_of_vector_field(

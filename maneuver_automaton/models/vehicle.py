@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -29,6 +30,9 @@ LIKE = {  # whose limits hold for a component that has none of its own
     "hitch_2": "hitch",
     "hitch_3": "hitch",
 }
+
+
+_batch = functools.lru_cache(np.broadcast_shapes)  # which takes longer than most formulas
 
 
 class Vehicle:
@@ -102,7 +106,7 @@ class Vehicle:
         """Values (..., n) of a formula on batches of reduced states and controls."""
         z = as_array("reduced state", reduced_state, last=len(self.reduced_names))
         u = as_array("control", control, last=len(self.control_names))
-        result = np.empty((*np.broadcast_shapes(z.shape[:-1], u.shape[:-1]), n))
+        result = np.empty((*_batch(z.shape[:-1], u.shape[:-1]), n))
         # `moveaxis` does the same, and takes longer than most formulas.
         components = (a.transpose(a.ndim - 1, *range(a.ndim - 1)) for a in (z, u))
         for k, value in enumerate(function(*components)):

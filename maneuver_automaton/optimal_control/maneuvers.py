@@ -35,6 +35,7 @@ from maneuver_automaton.optimal_control.transcription import transcribe
 
 WITHIN_GRIP = 1e-3  # share of the squared lateral acceleration that is kept between nodes
 LEAST_GUESS_S = 0.1  # a first guess of the duration is not shorter
+MIDPOINTS = (2, 4, 6, 8, 10, 12, 14, 16)  # steps of the midpoint rule that are extrapolated
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -202,9 +203,10 @@ def transfer_program(
     for k, (x, u, following) in enumerate(zip(begins, others, begins[1:], strict=False)):
         nodes = casadi.horzcat(x[:n_z], casadi.reshape(u[:own], n_z, steps - 1), following[:n_z])
         added, defects, beyond = interval(nodes, u[own:], x[n_z] / n_stages)
+        within, last_ones = casadi.vertsplit(defects, [0, own, own + n_z])
         changes = (u[own:] - x[n_z + 1 :]) / casadi.DM(scale)
         cost += added + objective.smoothness * casadi.sumsqr(changes)
-        g += [-defects[own:], following[n_z:] - casadi.vertcat(x[n_z], u[own:]), defects[:own]]
+        g += [-last_ones, following[n_z:] - casadi.vertcat(x[n_z], u[own:]), within]
         if k == 0:
             g.append(casadi.vertcat(x[:n_z] - start, x[n_z + 1 :] - first))
         equality += [True] * (sum(row.numel() for row in g) - len(equality))
@@ -320,6 +322,50 @@ def solve_transfer(
         iterations=int(stats["iter_count"]),
         solve_s=solve_s,
     )
+
+
+def ends_program(model: Model, *, intervals: int) -> Any:
+    """Where constant controls in equal intervals lead, and its derivatives, for `ends_of`.
+
+    Source: Hairer, Nørsett, Wanner (1993), *Solving Ordinary Differential Equations I*, Sec. II.9:
+    the midpoint rule, extrapolated; of order 16 here.
+    """
+    casadi = load_casadi()
+    z, u = (casadi.SX.sym("v", len(names)) for names in (model.reduced_names, model.control_names))
+    h = casadi.SX.sym("h")
+    ends: list[Any] = []
+    with numpy_on_symbols(casadi):
+        for n in MIDPOINTS:
+            before, here, after = z, z, h / n
+            for _ in range(n):
+                rates = model.dynamics(casadi.vertsplit(here), casadi.vertsplit(u))
+                before, here = here, before + after * casadi.vertcat(*rates)
+                after = 2.0 * h / n
+            ends.append(here)
+    for k in range(1, len(ends)):
+        for j in reversed(range(k, len(ends))):
+            finer = (MIDPOINTS[j] / MIDPOINTS[j - k]) ** 2 - 1.0
+            ends[j] += (ends[j] - ends[j - 1]) / finer
+    slopes = [casadi.jacobian(ends[-1], by) for by in (z, u, h)]
+    return casadi.Function("interval", [z, u, h], [ends[-1], *slopes]).mapaccum("ends", intervals)
+
+
+def ends_of(
+    program: Any, start: Array, control: Array, interval: float
+) -> tuple[Array, Array, Array]:
+    """The last reduced state (n_z,) under inputs (n, n_u), each for an interval [s].
+
+    Then its derivatives by the inputs (n_z, n, n_u) and by a common factor of the time (n_z,).
+    """
+    (n, n_u), n_z = control.shape, start.size
+    answers = program(start, control.T, np.full((1, n), interval))
+    states, by_state, by_input, by_time = (np.asarray(one.full()) for one in answers)
+    gradient, by_factor, onwards = np.empty((n_z, n, n_u)), np.zeros(n_z), np.eye(n_z)
+    for k in reversed(range(n)):
+        gradient[:, k] = onwards @ by_input[:, n_u * k : n_u * (k + 1)]
+        by_factor += onwards @ by_time[:, k] * interval
+        onwards = onwards @ by_state[:, n_z * k : n_z * (k + 1)]
+    return states[:, -1], gradient, by_factor
 
 
 def drawn_in(limits: Array, share: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from maneuver_automaton.optimal_control.maneuvers import (
     TransferProgram,
     drawn_in,
     duration_guess,
+    ends_of,
     solve_transfer,
     transfer_program,
 )
@@ -210,28 +212,34 @@ def closed(
     limits: Array,
     last: int | None = None,
     enough: float = 0.0,
-    substeps: int = RUNGE_KUTTA_STEPS,
+    ends: Any = None,
 ) -> tuple[Inputs, Trajectory]:
     """Correct inputs that nearly lead from one reduced state to another, until they do.
 
     Newton's method on all inputs and a common factor of the time; of all corrections the least,
-    each input measured by its room within its limits, so that those at a limit stay there.
+    each input measured by its room within its limits, so that those at a limit stay there. Where
+    inputs lead is what the model does, or what the program `ends` makes of it, which is quicker.
     """
     control, interval = np.clip(inputs.control, *limits.T), inputs.interval
     width = np.where(np.isfinite(limits[:, 1] - limits[:, 0]), limits[:, 1] - limits[:, 0], 2.0)
     scale = np.maximum(1.0, np.abs(end))
-    best, least = None, np.inf
+    best, least, course = None, np.inf, None
     for _ in range(NEWTON_STEPS):
         tried = Inputs(control=control, interval=interval)
-        course = tried.drive(model, start)
-        miss = course.reduced_state[-1] - end
+        if ends is None:
+            course = tried.drive(model, start)
+            reached = course.reduced_state[-1]
+        else:
+            reached, gradient, by_duration = ends_of(ends, start, control, interval)
+        miss = reached - end
         size = float(np.abs(miss / scale).max())
         if best is not None and not size < 0.5 * least:
             break  # rounding
         best, least = (tried, course), size
         if size <= enough:
             break
-        gradient, by_duration = _sensitivities(model, start, tried, substeps)
+        if ends is None:
+            gradient, by_duration = _sensitivities(model, start, tried)
         room = np.minimum(control - limits[:, 0], limits[:, 1] - control)
         weight = np.where(np.isfinite(room), room, width) + 1e-9 * width
         if last is not None:
@@ -244,12 +252,11 @@ def closed(
         control = np.clip(control + weight * step[:-1].reshape(control.shape), *limits.T)
         interval *= 1.0 + max(-0.5, float(step[-1]))
     assert best is not None  # the first is
-    return best
+    inputs, course = best
+    return inputs, course or inputs.drive(model, start)
 
 
-def _sensitivities(
-    model: Model, start: Array, inputs: Inputs, substeps: int
-) -> tuple[Array, Array]:
+def _sensitivities(model: Model, start: Array, inputs: Inputs) -> tuple[Array, Array]:
     """Derivatives of the last reduced state by inputs (n_z, n, n_u) and a time factor (n_z,)."""
     control = inputs.control
     n, n_u = control.shape
@@ -258,21 +265,19 @@ def _sensitivities(
     controls = np.concatenate([control + shifts, control - shifts, control[None], control[None]])
     factors = np.ones(len(controls))
     factors[-2:] = 1.0 + PERTURBATION, 1.0 - PERTURBATION
-    ends = _last_states(model, start, controls, factors * inputs.interval, substeps)
+    ends = _last_states(model, start, controls, factors * inputs.interval)
     plus, minus = ends[: n * n_u], ends[n * n_u : -2]
     gradient = (plus - minus) / (2.0 * by.reshape(-1, 1))
     by_factor = (ends[-2] - ends[-1]) / (2.0 * PERTURBATION)
     return gradient.T.reshape(start.size, n, n_u), by_factor
 
 
-def _last_states(
-    model: Model, start: Array, controls: Array, intervals: Array, substeps: int
-) -> Array:
+def _last_states(model: Model, start: Array, controls: Array, intervals: Array) -> Array:
     """Reduced states (m, n_z) after inputs (m, n, n_u) in intervals (m,) [s], by Runge-Kutta."""
     state = np.broadcast_to(start, (len(controls), start.size))
-    step = (intervals / substeps)[:, None]
+    step = (intervals / RUNGE_KUTTA_STEPS)[:, None]
     for k in range(controls.shape[1]):
-        for _ in range(substeps):
+        for _ in range(RUNGE_KUTTA_STEPS):
             rate_1 = model.reduced_dynamics(state, controls[:, k])
             rate_2 = model.reduced_dynamics(state + step / 2.0 * rate_1, controls[:, k])
             rate_3 = model.reduced_dynamics(state + step / 2.0 * rate_2, controls[:, k])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -156,19 +157,21 @@ class _Stretch(NamedTuple):
 def _picard(model: Model, z: Array, control: Array, step: Array) -> _Stretch:
     """Reduced states from those at the begin (m, n_z), by iteration over all elements at once."""
     m, k = step.shape
-    h = step[..., None]
-    nodes = np.broadcast_to(z[:, None, None], (m, k, NODES.size, z.shape[1])).copy()
+    h, first = step[..., None], z[:, None]
+    nodes = np.broadcast_to(first[:, None], (m, k, NODES.size, z.shape[1]))
     before = np.inf
     for iteration in range(ITERATIONS):
-        rates = np.broadcast_to(model.reduced_dynamics(nodes, control), nodes.shape)
-        ends = z[:, None] + np.cumsum(h * (WEIGHTS @ rates), axis=1)
-        begins = np.concatenate([z[:, None], ends[:, :-1]], axis=1)[:, :, None]
+        rates = model.reduced_dynamics(nodes, control)
+        if rates.shape != nodes.shape:
+            rates = np.broadcast_to(rates, nodes.shape)
+        ends = first + (h * (WEIGHTS @ rates)).cumsum(axis=1)
+        begins = np.concatenate([first, ends[:, :-1]], axis=1)[:, :, None]
         new = begins + h[..., None] * (INTEGRALS @ rates)
         changes = np.abs(new - nodes) / np.maximum(1.0, np.abs(new))
         nodes = new
-        if not np.isfinite(new).all():
-            break
         change = float(changes.max(initial=0.0))
+        if not math.isfinite(change):
+            break
         hopeless = k > 1 and iteration >= HOPEFUL and change > before / 2.0
         if change <= SETTLED or hopeless or (change <= NOISE and change > before / 2.0):
             break

@@ -22,6 +22,7 @@ from maneuver_automaton.optimal_control.maneuvers import (
     TransferProgram,
     TransferSettings,
     duration_guess,
+    ends_program,
     solve_transfer,
     transfer_program,
 )
@@ -36,9 +37,10 @@ from maneuver_automaton.primitives.primitive import Maneuver, Trim
 from maneuver_automaton.primitives.turning import hitch_maneuvers
 
 FEW = TransferSettings(  # intervals: enough for a short way, and solved in some 20 ms
-    intervals=8, solver=SolverSettings(tolerance=1e-7, max_iterations=80, far=True)
+    intervals=8, steps=1, solver=SolverSettings(tolerance=1e-7, max_iterations=80, far=True)
 )
 GUESSES = ((1.0, 0.0), (2.0, 0.5))  # (factor of the guessed duration, swing), in turn
+AIMS = 4  # at ends that make up for what the program of the ends is off the vehicle
 MODELS = 16  # whose programs are kept
 LEAST = 1e-9  # [units of the reduced state] a difference that takes time
 
@@ -120,8 +122,11 @@ def all_maneuvers_between(
     if isinstance(model, CarWithTrailer):
         low, high = model.control_limits[0].tolist()
         speeds = [speed for speed in (high, low) if speed]
-        for source, target in pairs:
-            yield hitch_maneuvers(model, [(source, target, speed) for speed in speeds])
+        wanted = [(*pair, speed) for pair in pairs for speed in speeds]
+        made = hitch_maneuvers(model, wanted)
+        for pair in pairs:
+            ends = tuple(trim.name for trim in pair)
+            yield tuple(one for one in made if (one.source, one.target) == ends)
     elif _is_limited(_ModelKey(model)):
         yield from _in_closed_form(model, pairs)
     else:
@@ -170,17 +175,20 @@ def _is_limited(known: _ModelKey) -> bool:
 
 
 @functools.lru_cache(maxsize=MODELS)
-def _program_of(known: _ModelKey) -> TransferProgram:
-    """The program of short maneuvers of a model, written down once."""
-    return transfer_program(known.model, settings=FEW)
+def _program_of(known: _ModelKey) -> tuple[TransferProgram, Any]:
+    """The program of short maneuvers of a model and that of their ends, written down once."""
+    ends = ends_program(known.model, intervals=FEW.intervals)
+    return transfer_program(known.model, settings=FEW), ends
 
 
 def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneuver, ...]:
     """The quickest maneuver that the solver finds, closed to rounding; none if it finds none."""
     start, end = source.reduced_state, target.reduced_state
+    limits = model.control_limits
+    program, ends = _program_of(_ModelKey(model))
     for factor, swing in GUESSES:
         found = solve_transfer(
-            _program_of(_ModelKey(model)),
+            program,
             start=start,
             end=end,
             controls=np.stack([target.control, target.control]),
@@ -190,10 +198,16 @@ def _by_optimal_control(model: Model, source: Trim, target: Trim) -> tuple[Maneu
         )
         if found.status is not SolveStatus.SOLVED:
             continue
-        raw = Inputs(control=found.control, interval=found.duration / len(found.control))
-        limits, enough = model.control_limits, CLOSED / 2.0
-        _, course = closed(model, start, end, inputs=raw, limits=limits, enough=enough, substeps=2)
-        missed = float(np.abs(course.reduced_state[-1] - end).max())
+        inputs = Inputs(control=found.control, interval=found.duration / len(found.control))
+        aim, enough = end, CLOSED / 100.0
+        for _ in range(AIMS):
+            inputs, course = closed(
+                model, start, aim, inputs=inputs, limits=limits, enough=enough, ends=ends
+            )
+            off = course.reduced_state[-1] - end
+            if (missed := float(np.abs(off).max())) <= CLOSED:
+                break
+            aim = aim - off
         if (
             not missed <= CLOSED
             or beyond_limits(model.reduced_limits, course.reduced_state).max() > WITHIN

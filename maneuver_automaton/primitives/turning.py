@@ -189,8 +189,7 @@ def hitch_maneuvers(
     speeds = np.array([speed for _, _, speed in wanted])
     steering = np.copysign(model.max_steering, (ends - begins) * speeds)
     control = np.stack([speeds, steering], axis=-1)
-    rows = zip(control, begins.tolist(), ends.tolist(), strict=True)
-    durations = np.array([_time(model, row, begin, end) for row, begin, end in rows])
+    durations = _times(model, control, begins, ends)
     can = np.flatnonzero(np.isfinite(durations))
     if not can.size:
         return ()
@@ -221,14 +220,16 @@ def _gauss() -> tuple[Array, Array]:
     return nodes, weights
 
 
-def _time(model: CarWithTrailer, control: Array, begin: float, end: float) -> float:
-    """How long the hitch takes at a constant control [s]; inf if it stops on the way."""
+def _times(model: CarWithTrailer, control: Array, begin: Array, end: Array) -> Array:
+    """How long (m,) hitches take at constant controls (m, 2) [s]; inf if one stops on the way."""
     nodes, weights = _gauss()
-    edges = np.linspace(begin, end, PARTS + 1)
-    half = 0.5 * np.diff(edges)
-    hitch = (edges[:-1] + half)[:, None] + half[:, None] * nodes
-    (rates,) = model.dynamics([hitch], control)
-    ends = np.append(rates.ravel(), model.dynamics([np.array([begin, end])], control)[0])
-    if not (ends * (end - begin) > 0.0).all():
-        return math.inf
-    return float((half[:, None] * weights / rates).sum())
+    edges = np.linspace(begin, end, PARTS + 1, axis=-1)
+    half = 0.5 * np.diff(edges)[..., None]
+    hitch = edges[:, :-1, None] + half + half * nodes
+    (rates,) = model.dynamics([hitch], control.T[..., None, None])
+    (at_ends,) = model.dynamics([edges[:, [0, -1]]], control.T[..., None])
+    turned = (end - begin)[:, None]
+    goes = ((rates * turned[..., None] > 0.0).all(axis=(1, 2))) & (at_ends * turned > 0.0).all(1)
+    with np.errstate(divide="ignore"):
+        shares = half * weights / rates
+    return np.array([one.sum() if on else math.inf for one, on in zip(shares, goes, strict=True)])
