@@ -9,14 +9,17 @@ import pytest
 
 from maneuver_automaton.automaton.library import load_stock_library
 from maneuver_automaton.errors import MissingExtra
-from maneuver_automaton.models import Car, SecondOrderCar
+from maneuver_automaton.models import Car, CarWithTrailer, SecondOrderCar
 from maneuver_automaton.optimal_control.ipopt import SolverSettings, SolveStatus
 from maneuver_automaton.optimal_control.maneuvers import (
     ManeuverObjective,
     TransferSettings,
+    ends_of,
+    ends_program,
     solve_transfer,
     transfer_program,
 )
+from maneuver_automaton.primitives.driving import drive
 from tests.inertia import HOVERCRAFT
 
 CAR = SecondOrderCar(
@@ -41,6 +44,17 @@ def test_least_time_is_that_of_the_slowest_component(program, start, end):
     assert found.status is SolveStatus.SOLVED
     assert exact - 1e-6 <= found.duration <= exact * (1.0 + 1e-4)
     assert np.abs(found.control).max(axis=0) == pytest.approx(np.abs(end - start) / exact, rel=0.5)
+
+
+def test_a_step_in_each_interval_is_enough_for_one_reduced_state():
+    """Of a column of one row CasADi makes no empty one, as of others."""
+    settings = TransferSettings(intervals=4, steps=1)
+    cart = CarWithTrailer(wheelbase=2.5, hitch_length=3.0, max_steering=0.6, max_speed=1.0)
+    program = transfer_program(cart, settings=settings)
+    found = solve_transfer(
+        program, start=np.array([0.2]), end=np.zeros(1), controls=np.array([[1.0, 0.0]] * 2)
+    )
+    assert found.status is SolveStatus.SOLVED
 
 
 def test_a_program_keeps_nothing_of_the_pair_before(program):
@@ -119,6 +133,24 @@ def test_brakes_where_a_rate_vanishes_half_way():
     found = solve_transfer(program, start=start, end=np.zeros(3), controls=NO_INPUT)
     assert found.status is SolveStatus.SOLVED
     assert found.duration < 2.0
+
+
+def test_ends_are_where_the_vehicle_gets_and_have_its_slopes():
+    rng = np.random.default_rng(3)
+    start, control = np.array([0.7, 0.1, 0.2]), rng.uniform(-0.2, 0.2, (5, 2))
+
+    def driven(inputs, interval):
+        return drive(HOVERCRAFT, start, control=inputs, durations=[interval] * 5).reduced_state[-1]
+
+    program = ends_program(HOVERCRAFT, intervals=5)
+    end, gradient, by_factor = ends_of(program, start, control, 0.1)
+    np.testing.assert_allclose(end, driven(control, 0.1), atol=1e-12)
+    step, shift = 1e-5, np.zeros((5, 2))
+    shift[2, 1] = step
+    change = driven(control + shift, 0.1) - driven(control - shift, 0.1)
+    np.testing.assert_allclose(gradient[:, 2, 1], change / (2.0 * step), rtol=1e-6, atol=1e-9)
+    change = driven(control, 0.1 * (1.0 + step)) - driven(control, 0.1 * (1.0 - step))
+    np.testing.assert_allclose(by_factor, change / (2.0 * step), rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(

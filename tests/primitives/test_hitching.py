@@ -8,6 +8,11 @@ from maneuver_automaton.automaton import Automaton
 from maneuver_automaton.automaton.validation import validate
 from maneuver_automaton.models import CarWithTrailer, rollout
 from maneuver_automaton.primitives.connecting import maneuver_defect
+from maneuver_automaton.primitives.on_the_spot import (
+    all_maneuvers_between,
+    maneuvers_between,
+    trim_at,
+)
 from maneuver_automaton.primitives.turning import connect_hitches, hitch_trims
 from tests.reference_dynamics import trim_defect
 
@@ -52,3 +57,13 @@ def test_where_the_wheels_cannot_bring_the_hitch_there_is_no_maneuver():
     stiff = CarWithTrailer(wheelbase=1.0, hitch_length=0.5, max_steering=0.2, max_speed=1.0)
     made = connect_hitches(stiff, hitch_trims(stiff, [0.0, 0.5]))
     assert {one.name for one in made} == {"ahead from hitch 0.5 to 0", "back from hitch 0 to 0.5"}
+
+
+def test_maneuvers_to_several_trims_at_once_are_those_to_each():
+    here = trim_at(TRUCK, np.array([0.23]), "here")
+    pairs = [(here, trim) for trim in hitch_trims(TRUCK, [-0.6, 0.3, 0.6])[::3]]
+    for pair, together in zip(pairs, all_maneuvers_between(TRUCK, pairs), strict=True):
+        alone = maneuvers_between(TRUCK, *pair)
+        assert [one.name for one in together] == [one.name for one in alone]
+        for one, other in zip(together, alone, strict=True):
+            np.testing.assert_allclose(one.displacement, other.displacement, atol=1e-13)
