@@ -21,7 +21,7 @@ from maneuver_automaton.places import PER, rates_along
 from maneuver_automaton.problem import Problem
 
 EARLY = 1e-6  # share of a longest time by which a motion ends before it: closing may add some
-SMOOTHING = 1e-9  # [m^2/s^2] under the root of a speed, which has no slope at zero
+SMOOTHING = 1e-6  # [m^2/s^2] under the root of a speed: with less, solvers stall where it is 0
 HURRY = 0.01  # of the greatest price of a second, where metres alone have a price
 ROUND = 0.03  # of the greatest control, within which a norm is smooth: solvers stall at its tip
 
