@@ -1,7 +1,5 @@
 """What kernels of bounds take: boxes and cells of poses, and the rows of a linear program."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What kernels of collision take: the world, what moves in it, and what bodies sweep."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

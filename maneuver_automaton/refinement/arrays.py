@@ -1,7 +1,5 @@
 """What kernels that improve words take: the word they work on, and what is asked."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from maneuver_automaton._arrays import Array, IntArray

@@ -1,7 +1,5 @@
 """What the kernels of roads are given: each value once, and what each row means."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeAlias
 
 import numpy as np

@@ -3,8 +3,6 @@
 A record holds what changes together. `LatticeSearch` is all that a search of the lattice needs.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
