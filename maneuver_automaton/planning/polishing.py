@@ -109,6 +109,8 @@ def _frames_take_symbols(model: Model) -> bool:
 def left_out(*problems: Problem) -> tuple[str, ...]:
     """What plans of some problems do without that they should have, and why: a sentence each."""
     for one in problems:
+        if not one.automaton.model.reduced_names:
+            continue  # there is nothing to polish: CasADi is not asked for
         why = why_not_polished(one)
         if why and why in (why_no_casadi(), NUMBERS_ALONE):
             return (f"plans are not polished, and may cost much more: {why}",)
