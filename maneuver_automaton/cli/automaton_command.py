@@ -5,8 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping
 from pathlib import Path
-
-from rich.table import Table
+from typing import Any
 
 from maneuver_automaton._arrays import vector_text
 from maneuver_automaton.automaton import Automaton
@@ -156,7 +155,7 @@ def draw(file: Path, out: Path, *, look: LookOptions, model: str | None) -> int:
     return FOUND
 
 
-def _maneuver_table(automaton: Automaton) -> Table:
+def _maneuver_table(automaton: Automaton) -> Any:
     columns = ["", "maneuver", "source", "target", "duration [s]"]
     columns += ["x [m]", "y [m]", "heading [rad]", "z [m]"][: automaton.model.group.dof]
     rows = [

@@ -10,11 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from rich import box
-from rich.console import Console, JustifyMethod
-from rich.table import Table
-from rich.text import Text
-
 from maneuver_automaton import recording
 from maneuver_automaton._interrupts import compiler_began, compiler_ended
 from maneuver_automaton.cli.guard import complain
@@ -25,8 +20,10 @@ MOST_ROWS = 60  # of a table of steps; the file has all of them
 WIDE = 160  # columns where the output goes to no terminal, and COLUMNS does not say
 
 
-def console() -> Console:
+def console() -> Any:
     """Standard output, without markup: names are printed as they are."""
+    from rich.console import Console
+
     return Console(
         file=sys.stdout,
         width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE,
@@ -42,8 +39,11 @@ def table(
     rows: Iterable[Sequence[str]],
     *,
     numbers: Sequence[int] = (),
-) -> Table:
+) -> Any:
     """Rows under `columns`; those in `numbers` are aligned to the right."""
+    from rich import box
+    from rich.table import Table
+
     made = Table(
         title=title or None,
         box=box.SIMPLE_HEAD,
@@ -53,11 +53,14 @@ def table(
         pad_edge=False,
     )
     for k, column in enumerate(columns):
-        number = k in numbers
-        justify: JustifyMethod = "right" if number else "left"
-        made.add_column(column, justify=justify, overflow="fold", no_wrap=number)
+        made.add_column(
+            column,
+            justify="right" if k in numbers else "left",
+            overflow="fold",
+            no_wrap=k in numbers,
+        )
     for row in rows:
-        made.add_row(*(Text(cell) for cell in row))
+        made.add_row(*row)
     return made
 
 
@@ -76,7 +79,7 @@ def print_facts(facts: Iterable[Fact]) -> None:
                 line, out.width, subsequent_indent=" " * FACTS,
                 break_long_words=False, break_on_hyphens=False,
             )  # fmt: skip
-            out.print(Text("\n".join(wrapped)), soft_wrap=True)
+            out.print("\n".join(wrapped), soft_wrap=True)
 
 
 def print_result(name: str, tables: Sequence[recording.Table], facts: Iterable[Fact]) -> None:
@@ -90,10 +93,10 @@ def print_result(name: str, tables: Sequence[recording.Table], facts: Iterable[F
             out.print(table(title, one.columns, rows, numbers=one.numbers))
             title = ""
         elif one.instead:
-            out.print(Text(f"{title}\n\n  {one.instead}\n"))
+            out.print(f"{title}\n\n  {one.instead}\n")
             title = ""
     if title:
-        out.print(Text(title), soft_wrap=True)
+        out.print(title, soft_wrap=True)
     print_facts(facts)
     for one in tables:
         if one.title:
