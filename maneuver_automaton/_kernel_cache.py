@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite.binding import add_symbol
 from numba.core.compiler import CompileResult
-from numba.core.runtime import rtsys
+from numba.core.runtime import _nrt_python
 from numba.core.serialize import dumps
 from numba.core.types.containers import BaseTuple
 
@@ -59,7 +60,7 @@ class KernelCache:
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """What was compiled for a signature; None if that is not to be had."""
-        rtsys.initialize(target_context)
+        _find_memory()
         found = self._found(signature, target_context)
         if (
             found is None
@@ -120,6 +121,16 @@ class KernelCache:
         places = _places(getattr(signature, "args", signature))
         key = repr((self.made_from, target, signature, places))
         return f"{self.name}-{hashlib.sha256(key.encode()).hexdigest()[:24]}{ENDING}"
+
+
+@functools.cache
+def _find_memory() -> None:
+    """Name what compiled kernels call for their memory; the rest of it is compiled into them.
+
+    numba does so as well, and then compiles that rest in each process, for 20 ms.
+    """
+    for name, address in _nrt_python.c_helpers.items():
+        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 def _is_listed(name: str, signature: Any) -> bool:

@@ -38,6 +38,7 @@ def kernel_base() -> Path:
     return Path(base) if base else user_cache_folder()
 
 
+@functools.cache
 def source_hash() -> str:
     """Hash of every kernel source and of how they are compiled, 16 hexadecimal digits."""
     digest = hashlib.sha256()
