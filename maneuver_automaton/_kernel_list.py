@@ -23,14 +23,13 @@ LITERALS = {"True": True, "False": False}
 USES = {  # modules of kernels, by what calls them
     "times": ("words._kernels_solve", "search._kernels_price"),
     "words": (
-        "words._kernels_candidates",
         "words._kernels_closing",
         "words._kernels_solve",
-        "words._kernels_steering",
         "search._kernels_polish",
         "search._kernels_price",
         "search._kernels_words",
     ),
+    "linked words": ("words._kernels_candidates", "words._kernels_steering"),
     "insertion": ("search._kernels_insertion",),
     "lattice": (
         "collision._kernels_advancement",
@@ -66,7 +65,7 @@ USES = {  # modules of kernels, by what calls them
         "roads._kernels_polish",
     ),
 }
-NOW = ("times", "lattice", "improvement")  # what an installation compiles: plans among obstacles
+NOW = ("times", "linked words", "lattice", "improvement")  # compiled when installed
 LATER = tuple(use for use in USES if use not in NOW)  # what it leaves to its first use
 
 Stated = Any  # a type as the list has it

@@ -232,7 +232,7 @@ class LinkedWords(FreeWords):
     def prepare(self, problem: Problem, workspace: Workspace) -> None:
         """Load the kernels, and what the words of each goal are made of."""
         load_checking()
-        load_kernels("words")
+        load_kernels("words", "linked words")
         for goal in problem.goals:
             word_setup(problem, goal, most_trims=ALPHABET, steers=True)
 

@@ -437,7 +437,7 @@ def load_search(problem: Problem) -> None:
     """Prepare the search of a step for a problem, before its clock runs."""
     load_kernels("times")
     if needs_maneuvers(problem):
-        load_kernels("words")
+        load_kernels("words", "linked words")
         if problem.obstacles or problem.zones:
             load_kernels("lattice", "improvement")
         if problem.moves:

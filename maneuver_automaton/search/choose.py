@@ -53,7 +53,7 @@ def load_search(problem: Problem) -> None:
             library = moving_trims(problem.automaton, problem.cost)
             tables(library, free_heading=problem.goals[0].free_heading)
     else:
-        load_kernels("words", "insertion")
+        load_kernels("words", "linked words", "insertion")
 
 
 def search_goal(
